@@ -20,8 +20,9 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
-from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
+from drive_can_bridge.configuration.load import (
+    configuration_from_file, of_one_bus, write_parameter_file,
+)
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -44,15 +44,14 @@ INTERNAL: dict[str, set[str]] = {
     'security': {'', 'core', 'protocols'},
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
-    'ros.client': {'', 'clock', 'core', 'ros.recognition'},
+    'ros.client': {'', 'clock', 'core', 'client.drive', 'ros.messages', 'ros.recognition'},
     'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'clock', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core', 'process'},
-    'client.bridged': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
-        'client.drive', 'client.bridged'},
+        'client.drive', 'ros.client'},
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
@@ -80,7 +79,6 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
-    'client.bridged': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     # an optional extra
@@ -93,7 +91,7 @@ EXTERNAL: dict[str, set[str]] = {
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
-        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'client.bridged')}
+        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'ros.client')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

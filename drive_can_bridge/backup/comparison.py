@@ -5,11 +5,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
 
-from drive_can_bridge.backup.document import Backup
-from drive_can_bridge.backup.settings import (
-    in_order, is_setting, mode_bits, modes_of, settings_of,
+from drive_can_bridge.backup.document import (
+    Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, settings_of,
 )
-from drive_can_bridge.backup.values import raw_in_file
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value

@@ -15,16 +15,159 @@ The file of a backup: comments that say what it is of, and the settings as ROS p
     /conveyor:
       ros__parameters:
         ramp_time: 2.5  # s
+
+Values of a backup: how they are written, and which raw integer one of them means.
+
+Which parameters of a drive are settings: what a backup holds, and a restored one brings back.
+
+Setpoints, the control word, and what process data alone carry, are none: no command writes them.
+Neither are the bits that the profile's section ``restore`` sets and clears: they say in which mode
+a drive is, not how it is set up. No file brings them back; a mode that a drive was left in is
+ended. A parameter with such bits comes last, as its other bits are written with them.
+
+Read a backup, strictly: whatever is not plainly one is named, with its line, and nothing is used.
+
+Output of ``ros2 param dump`` is read as well: it has no head, and ``null`` for what a drive did
+not give.
 """
 
-from collections.abc import Iterable, Mapping
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+import math
+from pathlib import Path
+import re
+from typing import Any
 
-from drive_can_bridge.backup.values import value_in_file
-from drive_can_bridge.client.drive import DriveFacts
-from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
-from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.text import printable
+from drive_can_bridge.client.drive import Drive, DriveFacts
+from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY, read_sections
+from drive_can_bridge.configuration.problems import report
+from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
+from drive_can_bridge.core.parameters import Parameter, ValueKind
+from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.text import printable, TEXT_MAX
+from drive_can_bridge.core.words import describe_type, show
+
+
+def value_in_file(parameter: Parameter, raw: int) -> str:
+    """Write a raw integer as a value that YAML, rcl and :func:`raw_in_file` understand."""
+    value = parameter.value_from_raw(raw)
+    text = show(value)
+    if not isinstance(value, float) or not math.isfinite(value):
+        return text
+    if _nearest_raw(parameter, float(text)) != raw:
+        text = repr(value)
+    # without a point, YAML takes 4e+12 for a string
+    return text.replace('e', '.0e') if 'e' in text and '.' not in text else text
+
+
+def raw_in_file(parameter: Parameter, value: object) -> int:
+    """
+    Return the raw integer that a value stands for, whether or not it may be written.
+
+    :raises ValueRefused: a value of another kind.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueRefused(f'{value} is not a finite number')
+    kind = parameter.kind if parameter.listed else ValueKind.INTEGER
+    if kind is ValueKind.BOOL:
+        if isinstance(value, bool):
+            return int(value)
+    elif isinstance(value, bool):
+        pass
+    elif isinstance(value, int) or (isinstance(value, float) and kind is ValueKind.DOUBLE):
+        if not parameter.listed:
+            return int(value) if value >= 0 else parameter.word_from_raw(int(value))
+        try:
+            return parameter.raw_from_value(value)
+        except ValueRefused:
+            return _nearest_raw(parameter, value)
+    raise ValueRefused(f'wrong type: {show(value)} is {describe_type(value)}, allowed is '
+                       f'{kind.words}')
+
+
+def _nearest_raw(parameter: Parameter, value: float) -> int:
+    return math.floor((value - parameter.offset) / parameter.scale + 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class ModeBits:
+    """
+    What a restored backup does to a parameter that has bits of a mode.
+
+    :param mask: those bits.
+    :param at_end: what they are afterwards.
+    :param ended: those of them in which a drive is left that was not taken out of the mode: set
+        before, and otherwise afterwards.
+    """
+
+    mask: int
+    at_end: int
+    ended: int = 0
+
+    def to_write(self, found: int, wanted: int) -> int:
+        """
+        Return the word that a drive is to have in the end.
+
+        :param found: what it has: also the result where it has the setting and is not in the mode.
+        :param wanted: in the backup.
+        """
+        word = wanted & ~self.mask | self.at_end
+        return word if (found ^ word) & (~self.mask | self.ended) else found
+
+    def is_over(self, raw: int) -> bool:
+        """Tell whether a drive is not in the mode."""
+        return not (raw ^ self.at_end) & self.ended
+
+
+def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
+    """Return the bits that belong to modes, by parameter."""
+    found: dict[str, ModeBits] = {}
+    for step in (*table.before, *table.after) if table is not None else ():
+        known = found.get(step.parameter, ModeBits(0, 0))
+        at_end = known.at_end & ~step.mask | step.bits
+        found[step.parameter] = ModeBits(
+            known.mask | step.mask, at_end, known.ended | (known.at_end ^ at_end) & known.mask)
+    return found
+
+
+def modes_of(drive: Drive) -> tuple[str, ...]:
+    """Return the names of the parameters that tell whether a drive was left in a mode."""
+    found = [drive.find(name) for name, bits in mode_bits(drive.facts.restore).items()
+             if bits.ended]
+    return tuple(parameter.name for parameter in found
+                 if parameter is not None and parameter.readable and parameter.writable)
+
+
+def is_whole(step: RestoreStep | ModeBits, parameter: Parameter) -> bool:
+    """Tell whether all bits of a parameter are meant."""
+    return step.mask == parameter.word_from_raw(-1)
+
+
+def is_setting(drive: Drive, name: str) -> bool:
+    """Tell whether a parameter is a setting of a drive."""
+    parameter = drive.find(name)
+    if parameter is None or not (parameter.readable and parameter.writable):
+        return False
+    if parameter.number is None and parameter.index is None:
+        return False
+    bits = mode_bits(drive.facts.restore).get(name)
+    return (drive.role(name) not in (Role.CONTROL, Role.CYCLIC)
+            and not (bits is not None and is_whole(bits, parameter)))
+
+
+def settings_of(drive: Drive) -> tuple[str, ...]:
+    """Return the names of all settings, in the order in which they are written back."""
+    return in_order(drive, [name for name in drive.parameters if is_setting(drive, name)])
+
+
+def in_order(drive: Drive, names: list[str]) -> tuple[str, ...]:
+    """Sort names as the profile has them, then raw ones; what has bits of a mode comes last."""
+    bits = mode_bits(drive.facts.restore)
+    order = {name: place for place, name in enumerate(drive.parameters)}
+    return tuple(sorted(names, key=lambda name: (name in bits, order.get(name, len(order)))))
+
 
 #: names that readers of YAML 1.1 take for true, false or nothing
 _WORDS = frozenset(['y', 'yes', 'n', 'no', 'true', 'false', 'on', 'off', 'null'])
@@ -115,3 +258,80 @@ def _line(parameter: Parameter, raw: int) -> str:
     unit = f'  # {printable(parameter.unit, None)}' if parameter.unit else ''
     name = f"'{parameter.name}'" if parameter.name in _WORDS else parameter.name
     return f'    {name}: {value_in_file(parameter, raw)}{unit}'
+
+
+#: how ros2 param dump writes what has no value
+NOT_SET = 'null'
+_COMMENT = re.compile(r'# ([a-z0-9_]+): ?(.*)')
+_BRIDGE_KEYS = {'buses', 'drives'}
+
+
+def read_backup(path: Path) -> Backup:
+    """
+    Read a backup.
+
+    :raises ConfigurationError: it is none; a line for each problem.
+    :raises OSError: it cannot be read.
+    """
+    sections, problems = read_sections(path)
+    if len(sections) == 1:
+        problems += sections[0].tree.problems
+    if problems:
+        raise ConfigurationError(report(problems))
+    if len(sections) != 1:
+        names = ', '.join(section.name for section in sections)
+        raise _wrong(path, f'has sections of {len(sections)} nodes ({names}), allowed is one'
+                     if sections else 'has no parameters of any node: this is no backup')
+    section, = sections
+    data = section.tree.data
+    if _BRIDGE_KEYS & set(data):
+        raise _wrong(path, f'is a parameter file of a bridge, not a backup of a drive (it has '
+                           f'{", ".join(sorted(_BRIDGE_KEYS & set(data)))})')
+    values = dict(_flat(data, ()))
+    backup = Backup(
+        str(path), section.name,
+        {'.'.join(place): value for place, value in values.items() if value != NOT_SET},
+        _head(path), {'.'.join(place): section.tree.line(place) for place in values})
+    wrong = [backup.problem(name, f'{_described(value)}, allowed is a number, true or false')
+             for name, value in backup.values.items()
+             if not isinstance(value, (bool, int, float))]
+    wrong += [backup.problem(name, f'a name longer than {TEXT_MAX} characters')
+              for name in backup.lines if len(name) > TEXT_MAX]
+    if wrong:
+        raise ConfigurationError(wrong)
+    if not values:
+        raise _wrong(path, 'has no parameters: this is no backup')
+    return backup
+
+
+def _described(value: object) -> str:
+    return f'{show(value)} is a string' if isinstance(value, str) else describe_type(value)
+
+
+def _flat(data: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...],
+                                                                             object]]:
+    """Go through nested mappings: ``ros2 param dump`` splits names at their dots."""
+    for key, value in data.items():
+        if isinstance(value, dict):
+            yield from _flat(value, (*above, key))
+        else:
+            yield (*above, key), value
+
+
+def _head(path: Path) -> Head:
+    """Read the comments before the first line that is none, encoded as YAML may be."""
+    found: dict[str, str] = {}
+    data = path.read_bytes()
+    encoding = 'utf-16' if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else 'utf-8-sig'
+    for line in data.decode(encoding, errors='replace').splitlines():
+        line = line.strip()
+        if line and not line.startswith('#'):
+            break
+        match = _COMMENT.fullmatch(line)
+        if match is not None and match[1] in Head.__dataclass_fields__:
+            found.setdefault(match[1], match[2].strip())
+    return Head(**found)
+
+
+def _wrong(path: Path, message: str) -> ConfigurationError:
+    return ConfigurationError([printable(f'{path}: {message}', None)])

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from drive_can_bridge.backup.document import Backup, Head
-from drive_can_bridge.backup.settings import in_order, is_setting, mode_bits, ModeBits, modes_of
-from drive_can_bridge.backup.values import raw_in_file
+from drive_can_bridge.backup.document import (
+    Backup, Head, in_order, is_setting, mode_bits, ModeBits, modes_of, raw_in_file,
+)
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value

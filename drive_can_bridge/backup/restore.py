@@ -19,8 +19,8 @@ drive is asked whether somebody has enabled it: then nothing but those steps fol
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from drive_can_bridge.backup.document import is_whole
 from drive_can_bridge.backup.plan import Change, RestorePlan, value_of_word
-from drive_can_bridge.backup.settings import is_whole
 from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Value

@@ -12,7 +12,7 @@ from typing import TypeVar
 from drive_can_bridge.cli.command import WrongUsage
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.monitor.text import is_ros_name
+from drive_can_bridge.monitor.snapshot import is_ros_name
 
 #: stands for ``--params-file`` in commands that have no way through a bridge
 PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'

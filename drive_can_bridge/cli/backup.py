@@ -7,17 +7,14 @@ from datetime import datetime, timezone
 import os
 from pathlib import Path
 
-from drive_can_bridge.backup.document import head_of, written
-from drive_can_bridge.backup.settings import settings_of
+from drive_can_bridge.backup.document import head_of, settings_of, written
 from drive_can_bridge.cli.arguments import output
-from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
-from drive_can_bridge.cli.completion import complete_drives
+from drive_can_bridge.cli.atomic_write import differs, write_atomically
+from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage
 from drive_can_bridge.cli.drives import (
-    add_words, chosen, opened, read_all, source_of, unread,
+    add_words, chosen, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.questions import agreed
-from drive_can_bridge.cli.tables import print_json
-from drive_can_bridge.cli.whole_file import differs, write_whole
+from drive_can_bridge.cli.output import print_json
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
@@ -63,7 +60,7 @@ def run(args: Namespace) -> int:
     for name, made in texts.items():
         if made is not None:
             files[name].parent.mkdir(exist_ok=True)
-            write_whole(files[name], made.text.encode('utf-8'))
+            write_atomically(files[name], made.text.encode('utf-8'))
             made.tell(args, files[name])
     return FAILED if None in texts.values() else 0
 

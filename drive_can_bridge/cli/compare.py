@@ -10,14 +10,12 @@ from drive_can_bridge.backup.comparison import (
     Difference, differences, names_to_read, Setting, Side, side_of_drive, side_of_file,
     side_of_file_and_drive,
 )
-from drive_can_bridge.backup.document import Backup
-from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.document import Backup, read_backup
 from drive_can_bridge.cli.command import complain, say, WrongUsage
-from drive_can_bridge.cli.completion import complete_drives
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, opened, read_all, source_of, unread,
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.cli.output import print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore

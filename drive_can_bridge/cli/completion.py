@@ -1,38 +1,57 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What the words of a command may be: drives and parameters, of a file or of a running bridge."""
+"""
+``drive_can completion``, and the shell's way in: with argcomplete Tab completes what is typed.
 
-from argparse import Namespace
-from collections.abc import Callable, Iterable
-from contextlib import closing
-from typing import Any
+The shell starts the command with what has been typed so far in the environment.
+"""
 
-from drive_can_bridge.cli.drives import matching
-from drive_can_bridge.client.drive import Source
-from drive_can_bridge.client.opening import find_source
+from argparse import ArgumentParser, Namespace
+import os
 
+from drive_can_bridge.core.errors import DriveCanError
 
-def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
-    """Propose drives for the first word, and names of their parameters after it."""
-    def proposed(source: Source) -> list[str]:
-        names = list(source.names)
-        words = [word for word in parsed_args.words or () if word != prefix]
-        drives = matching(names, words[0]) if words else []
-        end = '=' if parsed_args.subcommand == 'write' else ''
-        return ([] if words else names) + [
-            f'{name}{end}' for drive in drives or (names if len(names) == 1 else [])
-            for name in source.parameter_names(drive)]
-    return _completed(parsed_args, proposed)
+SHELLS = ('bash', 'zsh', 'fish', 'tcsh')
 
 
-def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
-    """Propose drives; where none begins so, the shell proposes files."""
-    return _completed(parsed_args, lambda source: source.names)
+def define(parser: ArgumentParser) -> None:
+    """Define the words and options of the subcommand."""
+    parser.description = (
+        'Print what lets Tab complete subcommands, options, drives and names of parameters. '
+        'In ~/.bashrc: eval "$(drive_can completion bash)"')
+    parser.add_argument('shell', metavar='SHELL', choices=SHELLS, help=', '.join(SHELLS))
 
 
-def _completed(args: Namespace, proposed: Callable[[Source], Iterable[str]]) -> list[str]:
+def run(args: Namespace) -> int:
+    """
+    Print it.
+
+    :return: 0.
+    :raises DriveCanError: argcomplete is not there.
+    """
     try:
-        with closing(find_source(getattr(args, 'params_file', None),
-                                 namespace=getattr(args, 'namespace', None))) as source:
-            return list(proposed(source))
-    except Exception:  # noqa: BLE001  nothing may be written into the line that is typed
-        return []
+        import argcomplete
+    except ImportError:
+        raise DriveCanError('the Python module argcomplete is not installed: python3-argcomplete, '
+                            "or the extra 'completion' of this package") from None
+    print(argcomplete.shellcode(['drive_can'], shell=args.shell))
+    return 0
+
+
+_MARK = '_ARGCOMPLETE'
+_LINE = 'COMP_LINE'
+
+
+def typed() -> list[str] | None:
+    """Return the words after the program's name that are being completed; None: none are."""
+    return os.environ.get(_LINE, '').split()[1:] if _MARK in os.environ else None
+
+
+def complete(parser: ArgumentParser) -> None:
+    """Answer the shell and end the process, if that is what it was started for."""
+    if _MARK not in os.environ:
+        return
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    argcomplete.autocomplete(parser)

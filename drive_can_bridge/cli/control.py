@@ -11,7 +11,7 @@ from typing import Any
 
 from drive_can_bridge.cli.command import complain, FAILED, say, what_is_missing, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
-from drive_can_bridge.process.presence import bridges, Present, short
+from drive_can_bridge.process.locks import bridges, Present, short
 
 STOP = 'stop'
 _WORDS = {
@@ -53,7 +53,7 @@ def _namespace(text: str) -> str:
 
 
 def _complete(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
-    from drive_can_bridge.cli.completion import complete_drives
+    from drive_can_bridge.cli.drives import complete_drives
     return complete_drives(prefix, parsed_args, **more)
 
 
@@ -67,13 +67,13 @@ def run(args: Namespace) -> int:
     """
     _check(args)
     try:
-        from drive_can_bridge.ros.client.guest import Guest
-        guest = Guest('client')     # is being discovered while the rest is imported
+        from drive_can_bridge.ros.client.client_node import ClientNode
+        client_node = ClientNode('client')     # is being discovered while the rest is imported
         from drive_can_bridge.ros.client import control
-        from drive_can_bridge.ros.client.graph import Graph
+        from drive_can_bridge.ros.client.search import Graph
     except ImportError as error:
         raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
-    graph = Graph(args.clock, guest)
+    graph = Graph(args.clock, client_node)
     try:
         if args.subcommand == STOP:
             return _stop(args, graph)
@@ -101,7 +101,7 @@ def _check(args: Namespace) -> None:
 
 def _stop(args: Namespace, graph: Any) -> int:
     from drive_can_bridge.ros.client.control import Answer, Stop
-    domain = graph.guest.context.get_domain_id()
+    domain = graph.client_node.context.get_domain_id()
     present = [each for each in bridges() if _concerns(each, args.namespace, args.words)]
     stop = Stop(graph, args.namespace, args.words, [
         each.name for each in present if each.domain == domain and '~' not in each.name])
@@ -139,7 +139,7 @@ def _show(args: Namespace, answers: Sequence[Any]) -> int:
     for answer in sorted(answers, key=lambda each: each.ok):
         name = answer.name.lstrip('/')
         if args.json:
-            from drive_can_bridge.cli.tables import print_json
+            from drive_can_bridge.cli.output import print_json
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
                         'message': answer.text})
         else:

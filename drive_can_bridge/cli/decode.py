@@ -10,7 +10,7 @@ import sys
 
 from drive_can_bridge.cli.arguments import add_params_file, add_seconds
 from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
-from drive_can_bridge.cli.listening import Taps
+from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
@@ -18,12 +18,12 @@ from drive_can_bridge.core.record import Record
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.resources import command_that_brings
-from drive_can_bridge.trace import summary
-from drive_can_bridge.trace.files import check_readable, read_records, READABLE, UnknownFormat
+from drive_can_bridge.trace.files import (
+    check_readable, open_text, read_records, READABLE, UnknownFormat,
+)
 from drive_can_bridge.trace.lines import LineWriter, Only, Selection
-from drive_can_bridge.trace.output import open_text
 from drive_can_bridge.trace.series import Plotter, TableWriter
-from drive_can_bridge.trace.tracer import Sink, Tracer
+from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 
 #: complaints about a file that are shown one by one
 _COMPLAINTS_MAX = 5
@@ -199,10 +199,10 @@ def _draw(plotter: Plotter, path: str) -> None:
 
 def _summarise(tracer: Tracer, *, as_json: bool) -> None:
     if as_json:
-        for document in summary.documents(tracer):
+        for document in summary_documents(tracer):
             print(json.dumps(document))
     else:
-        for line in summary.lines(tracer):
+        for line in summary_lines(tracer):
             print(line)
 
 

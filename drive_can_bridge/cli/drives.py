@@ -7,15 +7,16 @@ Positional arguments of such a command are called ``words``; options may stand b
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from drive_can_bridge.cli.arguments import namespace
 from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
-from drive_can_bridge.cli.progress import Bar, waiting
+from drive_can_bridge.cli.output import Bar, waiting
+from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
-from drive_can_bridge.client.opening import find_source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 
@@ -147,3 +148,30 @@ def read_all(drive: Drive, names: Sequence[str], clock: Clock) -> dict[str, Read
     """Read parameters of a drive, none if there are no names; show how far it is."""
     with Bar(f'reading {drive.name}', len(names), clock.now) as bar:
         return drive.read(*names, told=bar.step) if names else {}
+
+
+def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
+    """Propose drives for the first word, and names of their parameters after it."""
+    def proposed(source: Source) -> list[str]:
+        names = list(source.names)
+        words = [word for word in parsed_args.words or () if word != prefix]
+        drives = matching(names, words[0]) if words else []
+        end = '=' if parsed_args.subcommand == 'write' else ''
+        return ([] if words else names) + [
+            f'{name}{end}' for drive in drives or (names if len(names) == 1 else [])
+            for name in source.parameter_names(drive)]
+    return _completed(parsed_args, proposed)
+
+
+def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
+    """Propose drives; where none begins so, the shell proposes files."""
+    return _completed(parsed_args, lambda source: source.names)
+
+
+def _completed(args: Namespace, proposed: Callable[[Source], Iterable[str]]) -> list[str]:
+    try:
+        with closing(find_source(getattr(args, 'params_file', None),
+                                 namespace=getattr(args, 'namespace', None))) as source:
+            return list(proposed(source))
+    except Exception:  # noqa: BLE001  nothing may be written into the line that is typed
+        return []

@@ -84,8 +84,8 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         served = True
         print(f'{COMMAND}: {place}', file=sys.stderr)
         if not is_loopback(args.host):
-            print(f'{COMMAND}: listens on {args.host}: whoever reaches this machine and has a '
-                  f'token gets in, and whoever sees the traffic sees the token (no TLS); '
+            print(f'{COMMAND}: listens on {args.host}: who reaches this machine and has a '
+                  f'token gets in, and who sees the traffic sees the token (no TLS); '
                   f'docs/security.md says how to do better', file=sys.stderr)
         for role in (Role.OPERATOR, Role.VIEWER):
             print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)

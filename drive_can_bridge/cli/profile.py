@@ -6,8 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from drive_can_bridge.cli.arguments import output_path
-from drive_can_bridge.profiles.headings import Column
-from drive_can_bridge.profiles.numerals import DecimalSign
+from drive_can_bridge.cli.atomic_write import differs, write_atomically
+from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage
+from drive_can_bridge.cli.output import print_json, print_table
+from drive_can_bridge.configuration.problems import Problem
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.profiles.build import Built
+from drive_can_bridge.profiles.catalogue import (
+    available, check, Checked, description, find, VERIFIED_WORDS,
+)
+from drive_can_bridge.profiles.csv_import import COLUMNS, WrongColumns
+from drive_can_bridge.profiles.importing import columns_from_option, import_file, WrongOption
 from drive_can_bridge.protocols.families import FAMILIES
 
 _HELP = {
@@ -16,7 +25,7 @@ _HELP = {
     'check': 'whether profiles are right',
     'import': 'make a profile from an EDS, DCF or CSV file',
 }
-_COLUMNS = ', '.join(column.value for column in Column)
+_SIGNS = {'point': '.', 'comma': ','}
 
 
 #: option -> what argparse wants to know, what it is without, and the actions that have it
@@ -36,7 +45,7 @@ _OPTIONS: dict[tuple[str, ...], tuple[dict[str, Any], Any, tuple[str, ...]]] = {
          'help': 'which column of a CSV table holds what; HEADING may be its place, counted from '
                  '1, or empty: there is none'}, '', ('import',)),
     ('--decimal',): (
-        {'choices': [sign.name.lower() for sign in DecimalSign if sign is not DecimalSign.UNKNOWN],
+        {'choices': tuple(_SIGNS),
          'help': 'the decimal sign of a CSV table, where its numbers do not tell'},
         None, ('import',)),
     ('--protocols',): (
@@ -77,9 +86,9 @@ def define(parser: ArgumentParser) -> None:
         'Make a profile from an EDS or DCF file (needs the Python library canopen), or from a\n'
         'table in a CSV file. What cannot be used is named with its line, the rest is imported.')
     made['import'].epilog = (
-        f'Columns: {_COLUMNS}.\nHeadings in English, German and Italian are guessed; --columns '
-        'says it where that is not enough:\n  --columns number=Nr,name=Bezeichnung,"scale=Faktor, '
-        'intern",unit=')
+        f'Columns: {", ".join(COLUMNS)}.\nHeadings in English, German and Italian are guessed; '
+        '--columns says it where that is not enough:\n  --columns number=Nr,name=Bezeichnung,'
+        '"scale=Faktor, intern",unit=')
 
 
 def _add_options(parser: ArgumentParser, action: str = '') -> None:
@@ -105,10 +114,181 @@ def run(args: Namespace) -> int:
     for flags, (_, default, _) in _OPTIONS.items():
         name = flags[-1].removeprefix('--')
         setattr(args, name, getattr(args, name, default))
-    if args.action == 'import':
-        from drive_can_bridge.cli.profile_import import run_import
-        return run_import(args)
-    from drive_can_bridge.cli import profile_show
-    actions = {'list': profile_show.run_list, 'show': profile_show.run_show,
-               'check': profile_show.run_check}
+    actions = {'list': _list, 'show': _show, 'check': _check, 'import': _import}
     return actions[args.action](args)
+
+
+# -- what there is --------------------------------------------------------------------------------
+
+
+def _list(args: Namespace) -> int:
+    """Print which profiles there are."""
+    documents = [_summary(name, check(path)) for name, path in available(args.directory).items()]
+    if args.json:
+        for document in documents:
+            print_json(document)
+        return 0
+    print_table(
+        ('name', 'parameters', 'verified', 'protocols', 'description', 'problems'),
+        [(document['name'], str(document['parameters']),
+          str(document['verified']) if document['verified'] or document['unverified'] else '',
+          ', '.join(document['protocols']), document['description'],
+          f'{document["problems"]}: drive_can profile check {document["path"]}'
+          if document['problems'] else '') for document in documents],
+        numbers=('parameters', 'verified'))
+    return 0
+
+
+def _summary(name: str, checked: Checked) -> dict[str, Any]:
+    profile = checked.loaded.profile
+    return {'name': name, 'path': str(checked.path), 'description': profile.description,
+            'protocols': list(profile.protocols), 'parameters': len(profile.parameters),
+            'verified': checked.count(True), 'unverified': checked.count(False),
+            'problems': len(checked.problems)}
+
+
+def _show(args: Namespace) -> int:
+    """Print what is in a profile."""
+    checked = check(find(args.name, args.directory))
+    if checked.problems:
+        _print_problems(checked.problems)
+        return FAILED
+    profile, entries = checked.loaded.profile, checked.entries
+    if args.json:
+        for name, parameter in profile.parameters.items():
+            print_json(description(name, parameter, entries[name]))
+        return 0
+    say(f'{profile.description or profile.name} ({", ".join(profile.protocols)})')
+    say(str(checked.path))
+    if profile.identity:
+        print(f'identity: {", ".join(profile.identity)}')
+    print()
+    print_table(
+        ('name', 'address', 'type', 'scale', 'unit', 'access', 'storage', 'allowed', 'verified',
+         'description'),
+        [_row(name, parameter) for name, parameter in profile.parameters.items()])
+    return 0
+
+
+def _row(name: str, parameter: Parameter) -> tuple[str, ...]:
+    scale = '' if parameter.scale == 1.0 else f'{parameter.scale:.12g}'
+    offset = f'{parameter.offset:+.12g}' if parameter.offset else ''
+    bounded = parameter.minimum is not None or parameter.maximum is not None
+    return (name, parameter.address, parameter.type.value, scale + offset, parameter.unit,
+            parameter.access.value + (' protected' if parameter.protected else ''),
+            parameter.storage.value if parameter.storage else '',
+            parameter.range_text if bounded else '', VERIFIED_WORDS[parameter.verified],
+            parameter.description)
+
+
+def _check(args: Namespace) -> int:
+    """Print whether profiles are right, or what is wrong with them."""
+    good = True
+    for path in args.files:
+        checked = _checked(path)
+        if checked is None:
+            good = False
+            continue
+        good = good and not checked.problems
+        if args.json:
+            print_json({'file': str(path), 'ok': not checked.problems,
+                        'parameters': len(checked.loaded.profile.parameters),
+                        'problems': [_problem(each) for each in checked.problems],
+                        'warnings': [_problem(each) for each in checked.warnings]})
+            continue
+        _print_problems(checked.problems)
+        for warning in checked.warnings:
+            complain(f'warning: {warning}')
+        if not checked.problems:
+            say(f'{path}: {_size(checked)}')
+    return 0 if good else FAILED
+
+
+def _checked(path: Path) -> Checked | None:
+    try:
+        return check(path)
+    except OSError as error:  # the other files are checked all the same
+        complain(f'{path}: {error.strerror or error}')
+        return None
+
+
+def _size(checked: Checked) -> str:
+    profile = checked.loaded.profile
+    total, sure, unsure = len(profile.parameters), checked.count(True), checked.count(False)
+    trust = f', {sure} verified, {unsure} not' if sure or unsure else ''
+    return f'all right: {total} parameter{"" if total == 1 else "s"}{trust}; ' \
+           f'{", ".join(profile.protocols)}'
+
+
+def _problem(problem: Problem) -> dict[str, Any]:
+    return {'line': problem.line, 'key': problem.key, 'message': problem.message}
+
+
+def _print_problems(problems: tuple[Problem, ...]) -> None:
+    for problem in problems:
+        complain(str(problem))
+
+
+# -- import ---------------------------------------------------------------------------------------
+
+
+def _import(args: Namespace) -> int:
+    """
+    Import a file.
+
+    :raises WrongUsage: an option means nothing, or nobody can be asked.
+    :raises ImportFailed: nothing of it can be used.
+    :raises OSError: a file cannot be read or written.
+    """
+    try:
+        built = import_file(
+            args.file, columns=columns_from_option(args.columns),
+            sign=_SIGNS.get(args.decimal, ''), protocols=_protocols(args.protocols),
+            description=args.description, file_format=args.format)
+        if args.json and args.output is None:
+            raise WrongOption('--json says on standard output what became of the file: say where '
+                              'the profile goes with -o FILE')
+    except (WrongOption, WrongColumns) as error:
+        raise WrongUsage(str(error)) from None
+    if not args.json:
+        for each in (*(f' {note}' for note in built.notes), *built.left_out):
+            complain(f'{args.file}:{each}')
+    if args.output is None:
+        print(built.text, end='')
+        return 0
+    data = built.text.encode('utf-8')
+    if differs(args.output, data) and not agreed(
+            f'{args.output} exists and holds something else. Overwrite it?', yes=args.yes,
+            otherwise='Nothing was written', yes_means='overwrites it'):
+        return FAILED
+    write_atomically(args.output, data)
+    if args.json:
+        print_json({
+            'file': str(args.file), 'output': str(args.output), 'entries': built.entries,
+            'parameters': len(built.names), 'remarks': built.remarks,
+            'protocols': list(built.protocols), 'notes': list(built.notes),
+            'left_out': [{'line': each.line, 'section': each.section, 'what': each.what,
+                          'reason': each.reason} for each in built.left_out]})
+    else:
+        say(f'{args.output}: {_counted(built)}')
+    return 0
+
+
+def _protocols(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(',') if name.strip())
+    for name in names:
+        if name not in FAMILIES:
+            raise WrongOption(f"--protocols: '{name}' is unknown, there are: "
+                              f'{", ".join(FAMILIES)}')
+    if len(set(names)) < len(names):
+        raise WrongOption('--protocols: one of them stands twice')
+    return names
+
+
+def _counted(built: Built) -> str:
+    text = f'{len(built.names)} of {built.entries} entries of the file'
+    if built.left_out:
+        text += f', {len(built.left_out)} left out (see above)'
+    if built.remarks:
+        text += f', {built.remarks} with a remark in the profile'
+    return f'{text}; {", ".join(built.protocols)}'

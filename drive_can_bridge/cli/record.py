@@ -1,27 +1,80 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can record``: everything on the buses of a parameter file, in a trace file."""
+"""``drive_can record``: the frames of buses, written to files; and listening to them."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import closing
+import math
 from pathlib import Path
 import sys
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import (
-    above_zero, add_params_file, add_seconds, output_path,
-)
+from drive_can_bridge.cli.arguments import above_zero, add_params_file, add_seconds, output_path
 from drive_can_bridge.cli.command import complain, WrongUsage
-from drive_can_bridge.cli.listening import Taps
-from drive_can_bridge.cli.tables import print_json
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.cli.output import print_json
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, STUFFING
 from drive_can_bridge.core.record import Record, RecordKind
-from drive_can_bridge.trace.channels import labels
+from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.trace.files import (
-    check_writable, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
+    check_writable, labels, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
 )
+from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
+
+#: s between two looks at the clock while nothing arrives
+_PATIENCE = 0.05
+
+
+class Taps:
+    """
+    All buses of a file, listened to until closed; entries come out in the order they arrived.
+
+    :raises DriveCanError: a bus that cannot be opened.
+    """
+
+    def __init__(self, configuration: BridgeConfiguration, clock: Clock) -> None:
+        self._now = clock.now
+        self._queue: Mailbox[Record] = Mailbox(clock, QUEUE_MAX)
+        self.taps: list[Tap] = []
+        # nothing is sent: only serial ports, which one process can read, are locked
+        self._ownership = Ownership([(bus, ()) for bus in configuration.buses.values()],
+                                    'drive_can listening', END_FIRST)
+        channels = labels(configuration.buses.values())
+        try:
+            for bus in configuration.buses.values():
+                self.taps.append(Tap(bus, channels[bus.name], self._queue, complain,
+                                     clock))
+        except BaseException:
+            self.close()
+            raise
+
+    def records(self, seconds: float) -> Iterator[Record | float]:
+        """Yield entries for so long; now and then, while there are none, until when there are."""
+        end = self._now() + seconds
+        while self._now() < end:
+            # asked before the queue: what was heard until then is in it, or was taken out of it
+            heard_until = min(tap.heard_until for tap in self.taps)
+            try:
+                yield self._queue.get(self._now() + _PATIENCE)
+            except TimeoutError:
+                yield heard_until
+        while True:     # what arrived in time
+            try:
+                yield self._queue.get(-math.inf)
+            except TimeoutError:
+                return
+
+    def close(self) -> None:
+        """Stop listening; say what could not be taken."""
+        for tap in self.taps:
+            tap.close()
+            if tap.lost:
+                complain(f'bus {tap.bus.name}: {tap.lost} frames lost: this machine is too slow '
+                         f'for the traffic')
+        self._ownership.release()
+
 
 #: s between two looks at counts and file size
 _LOOK_PERIOD = 1.0

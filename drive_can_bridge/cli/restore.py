@@ -5,29 +5,26 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from drive_can_bridge.backup.document import Backup
+from drive_can_bridge.backup.document import Backup, is_setting, read_backup
 from drive_can_bridge.backup.plan import (
     Change, LeftAlone, names_to_read, other_type, plan_restore, problems_in, RestorePlan,
     says_nothing, strangers, why_left_alone,
 )
-from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import NotAsInFile, Restorer, RestoreResult
-from drive_can_bridge.backup.settings import is_setting
-from drive_can_bridge.cli.command import complain, FAILED, say, WrongUsage
-from drive_can_bridge.cli.completion import complete_drives
-from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, opened, read_all, source_of, unread,
+from drive_can_bridge.cli.command import (
+    agreed, complain, FAILED, must_be_answerable, say, WrongUsage,
 )
-from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.questions import agreed, must_be_answerable
-from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.cli.drives import (
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
+)
+from drive_can_bridge.cli.output import Bar, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.process.interruption import Interruption, postponed
+from drive_can_bridge.process.signals import Interruption, postponed
 
 #: s that a drive's identity is waited for
 _PATIENCE = 2.0

@@ -1,26 +1,225 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can scan``: which drives are on a bus that nobody has described."""
+"""
+``drive_can scan``: looking for drives on a bus that nobody has described.
+
+Listening first, then asking what nobody can misunderstand. On 11-bit identifiers a read of one
+family is a command of another. So only families whose questions mean nothing to others are asked
+by default; another one only when it is named, and never once a CANopen node was heard or answered.
+What was found is written as a parameter file, with tables of raw parameters where none is known.
+"""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+import json
 from pathlib import Path
+import re
 import shlex
+from typing import Any
 
 from drive_can_bridge.cli.arguments import above_zero, bitrate, output_path
-from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
-from drive_can_bridge.cli.found_file import tables_beside, write_parameter_file
-from drive_can_bridge.cli.questions import agree_to_hazard, agreed
-from drive_can_bridge.cli.survey import Survey
-from drive_can_bridge.cli.tables import print_json
-from drive_can_bridge.cli.whole_file import differs
+from drive_can_bridge.cli.atomic_write import differs, write_atomically
+from drive_can_bridge.cli.command import agree_to_hazard, agreed, complain, FAILED, WrongUsage
+from drive_can_bridge.cli.output import print_json
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import BusUnavailable, TransportError
+from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.scout import Scout, Sighting
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
+
+#: share of the bus that questions and their answers may take at most
+LOAD_MAX = 0.3
+#: s that the last answer is waited for
+LAST_ANSWER = 0.3
+#: s that a receive may block
+_PATIENCE = 0.005
+_SEND_TIMEOUT = 0.05
+#: frames in a row that the bus does not take, until nothing more is sent
+_REFUSED_MAX = 5
+
+
+class Survey:
+    """
+    What is found on one bus.
+
+    :ivar frames: frames heard.
+    :ivar unknown: those that no family recognises an identifier of.
+    :ivar trouble: why nothing can be sent; '': it can.
+    """
+
+    def __init__(self, bus: BusConfiguration, port: EndPoint,
+                 clock: Callable[[], float]) -> None:
+        self._bus = bus
+        self._port = port
+        self._clock = clock
+        self.scouts: dict[str, Scout] = {name: family.make_scout()
+                                         for name, family in FAMILIES.items()}
+        self.frames = 0
+        self.trouble = ''
+
+    @property
+    def master(self) -> str:
+        """What somebody else asks; '': nobody does."""
+        return next((scout.master for scout in self.scouts.values() if scout.master), '')
+
+    @property
+    def nodes(self) -> dict[int, str]:
+        """CANopen nodes, whatever they are."""
+        return {node: text for scout in self.scouts.values()
+                for node, text in scout.nodes.items()}
+
+    @property
+    def sightings(self) -> list[Sighting]:
+        """All drives found, by family and station."""
+        return [scout.sightings[station] for scout in self.scouts.values()
+                for station in sorted(scout.sightings)]
+
+    def forbidden(self, scout: Scout) -> bool:
+        """Tell whether somebody is there who might obey what a scout asks."""
+        return not scout.unmistakable and bool(self.nodes)
+
+    def listen(self, seconds: float) -> None:
+        """
+        Hear what is said.
+
+        :raises BusUnavailable: the bus is lost.
+        """
+        end = self._clock() + seconds
+        while self._clock() < end:
+            self._hear(_PATIENCE)
+
+    def ask(self, protocol: str) -> None:
+        """
+        Ask all stations of a family, and what their answers make worth asking.
+
+        Ends at once when a master is heard, or the bus takes nothing, or when a CANopen node turns
+        up that might take the questions for process data.
+
+        :raises BusUnavailable: the bus is lost.
+        """
+        scout = self.scouts[protocol]
+        scout.begin()
+        due = self._clock()
+        quiet_at = 0.0
+        refused = 0
+        # a node that was asleep may boot meanwhile
+        while not self.master and not self.trouble and not self.forbidden(scout):
+            now = self._clock()
+            if now < due:
+                self._hear(min(_PATIENCE, due - now))
+                continue
+            question = scout.take_question()
+            if question is None:
+                quiet_at = quiet_at or now + LAST_ANSWER
+                if now >= quiet_at:
+                    return
+                self._hear(_PATIENCE)
+                continue
+            quiet_at = 0.0
+            due = now + self._pause(question)
+            scout.asked(question, now)
+            try:
+                self._port.send(question, _SEND_TIMEOUT)
+                refused = 0
+            except (TransportError, BusUnavailable) as error:
+                refused += 1
+                if refused >= _REFUSED_MAX:
+                    self.trouble = f'{error}: no other node acknowledges'
+
+    def _pause(self, frame: Frame) -> float:
+        """Return s from a question to the next: both it and its answer count."""
+        both = 2 * STUFFING * bits_on_bus(8, frame.extended)
+        return both / (LOAD_MAX * self._bus.bitrate)
+
+    def _hear(self, timeout: float) -> None:
+        frame = self._port.receive(timeout)
+        if frame is None:
+            return
+        self.frames += 1
+        now = self._clock() - self._port.age
+        for scout in self.scouts.values():
+            scout.hear(frame, now)
+
+
+#: shipped tables for families of one maker, and an exchange that all their drives know
+_KNOWN = {
+    'cannord': ('inverter', 'nord_sk500e', ['frequency_setpoint'], ['actual_frequency']),
+    'canopen_pkw': ('starter', 'tesys_t_ltmr', [], ['system_status_1']),
+    'cia402': ('axis', 'cia402_servo', ['target_velocity'], ['actual_velocity']),
+}
+_HEAD = """\
+# Found by drive_can scan. Look it over before a bridge runs with it: profiles are the shipped ones
+# where there is one, and otherwise tables of raw numbers beside this file, without units.
+"""
+#: families without a known table -> what their drives are called
+_UNKNOWN = {'datamodel_extended': 'drive', 'datamodel_standard': 'drive_std'}
+
+
+def tables_beside(path: Path) -> list[Path]:
+    """Return the tables there are that a parameter file of this name may be written with."""
+    table = re.compile(rf'{re.escape(path.stem)}_(?:{"|".join(_UNKNOWN.values())})_[0-9]+\.yaml')
+    return sorted(each for each in path.parent.glob('*.yaml') if table.fullmatch(each.name))
+
+
+def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[Sighting],
+                         settings: Sequence[dict[str, Any]]) -> list[Path]:
+    """
+    Write a parameter file that ``validate`` accepts, after the tables that it names.
+
+    :param sightings: at least one.
+    :param settings: for each sighting, what its scout knows.
+    :return: the files written.
+    :raises OSError: they cannot be written.
+    """
+    written = [path]
+    # so slow that all of them fit the bus
+    period = max(0.05, 0.01 * len(sightings))
+    lines = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
+             f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
+             f'        bitrate: {bus.bitrate}', '    drives:']
+    for sighting, keys in zip(sightings, settings):
+        if sighting.protocol in _KNOWN:
+            kind, profile, request, response = _KNOWN[sighting.protocol]
+        else:
+            kind = _UNKNOWN[sighting.protocol]
+            table = path.with_name(f'{path.stem}_{kind}_{sighting.station}.yaml').absolute()
+            request = [f'parameter_{number}' for number in keys['request_numbers']]
+            response = [f'parameter_{number}' for number in keys['response_numbers']]
+            _write_table(table, sighting, keys)
+            written.append(table)
+            profile = str(table)
+            lines += [f'      # {remark}' for remark in keys.get('remarks', ())]
+        lines += [f'      {kind}_{sighting.station}:   # {sighting.text}', '        bus: main',
+                  f'        protocol: {sighting.protocol}',
+                  f'        station: {sighting.station}',
+                  f'        profile: {json.dumps(profile)}',
+                  f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
+                  f'        cyclic_response: [{", ".join(response)}]']
+        lines += [f'        mode: {keys["mode"]}'] if 'mode' in keys else []
+    _write(path, lines)
+    return written
+
+
+def _write_table(path: Path, sighting: Sighting, keys: dict[str, Any]) -> None:
+    lines = [f'description: Raw parameters of station {sighting.station}, found by a scan',
+             f'protocols: [{sighting.protocol}]', 'parameters:']
+    entries = dict.fromkeys(keys['response_numbers'], 'access: ro')
+    entries.update(dict.fromkeys(keys['request_numbers'], 'access: rw, storage: ram'))
+    lines += [f'  parameter_{number}: {{number: {number}, type: uint16, {entry}}}'
+              for number, entry in sorted(entries.items())]
+    if not entries:
+        lines[-1] = 'parameters: {}'
+    _write(path, lines)
+
+
+def _write(path: Path, lines: Sequence[str]) -> None:
+    write_atomically(path, ('\n'.join(lines) + '\n').encode('utf-8'))
+
 
 #: families whose reads may be commands of others: only when named
 _NAMED = tuple(name for name, family in FAMILIES.items() if not family.make_scout().unmistakable)

@@ -47,7 +47,7 @@ def define(parser: argparse.ArgumentParser) -> None:
                                             "file's")
     parser.add_argument('--channel', help="channel for all buses, instead of the file's")
     parser.add_argument('--bitrate', type=bitrate, metavar='B',
-                        help="bit/s of all buses, instead of the file's; whoever sets another one "
+                        help="bit/s of all buses, instead of the file's; who sets another one "
                              'on a pseudo-terminal then hears nothing')
     parser.add_argument('--pty', action='store_true',
                         help='a pseudo-terminal per bus, which behaves like an SLCAN adapter')
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration,
               faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
               link: Path | None, log_frames: Path | None, strict: bool) -> int:
-    # before anything is announced: whoever reads the first line may send the signal at once
+    # before anything is announced: a reader of the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
     if not pty:     # a bridge locks the other end of a pseudo-terminal
         stack.enter_context(Ownership([(bus, ()) for bus in configuration.buses.values()],

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 import re
 
 from drive_can_bridge.cli.command import FAILED, WrongUsage
-from drive_can_bridge.cli.completion import complete_words
-from drive_can_bridge.cli.drives import add_words, opened, source_of, split_words
-from drive_can_bridge.cli.progress import Bar
-from drive_can_bridge.cli.tables import print_json, print_table
+from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
+from drive_can_bridge.cli.output import Bar, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind

@@ -12,12 +12,74 @@ The parameters of drives for people and scripts: directly, or through a running 
     except DriveCanError as error:
         print(error)
 
-See :mod:`drive_can_bridge.client.drive` for what a drive can be asked.
+See :mod:`drive_can_bridge.client.drive` for what a drive can be asked; both ways to it are made of
+that: :mod:`.direct`, and :mod:`drive_can_bridge.ros.client.drives`.
 """
 
-from drive_can_bridge.client.drive import Drive, Drives, Enabled, ReadOutcome, WriteOutcome
-from drive_can_bridge.client.opening import find_source, open_drives
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from drive_can_bridge.client.drive import (
+    Drive, Drives, Enabled, NoDrive, ReadOutcome, Source, WriteOutcome,
+)
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 
 __all__ = ['Drive', 'DriveCanError', 'Drives', 'Enabled', 'ReadOutcome', 'WriteOutcome',
            'find_source', 'open_drives']
+
+
+def find_source(params_file: str | Path | None = None, *, namespace: str | None = None,
+                nmt_start: bool = False, clock: Clock | None = None) -> Source:
+    """
+    Say which drives there are, before anything is sent.
+
+    :param params_file: its drives, directly on its buses; None: those of a running bridge.
+    :param namespace: of the bridge, where several run.
+    :param nmt_start: directly: start CANopen nodes before they are asked.
+    :param clock: what everything waits by; None: that of this machine.
+    :raises ConfigurationError: the file is wrong.
+    :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
+        namespaces; an argument that means nothing to the way that is taken.
+    """
+    clock = clock or SteadyClock()
+    if params_file is not None and namespace is not None:
+        raise DriveCanError('namespace is of a running bridge, params_file goes without one')
+    if params_file is None and nmt_start:
+        raise DriveCanError('nmt_start goes with params_file only: a bridge starts its nodes '
+                            'itself')
+    if params_file is not None:
+        from drive_can_bridge.client.direct import DirectSource
+        try:
+            return DirectSource(params_file, clock, nmt_start=nmt_start)
+        except OSError as error:
+            raise DriveCanError(f'{error.filename or params_file}: '
+                                f'{error.strerror or error}') from error
+    from drive_can_bridge.ros.client.drives import BridgeSource
+    return BridgeSource(namespace, clock)
+
+
+def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),
+                namespace: str | None = None, nmt_start: bool = False) -> Drives:
+    """
+    Open drives.
+
+    :param only: their names, or shell patterns; one, or several.
+    :raises DriveCanError: no drive of such a name, and what :func:`find_source` and
+        :meth:`.Source.open` raise.
+    """
+    source = find_source(params_file, namespace=namespace, nmt_start=nmt_start)
+    try:
+        names: list[str] = []
+        for pattern in [only] if isinstance(only, str) else only:
+            found = [name for name in source.names if fnmatchcase(name, pattern)]
+            if not found:
+                raise NoDrive(pattern, source.names)
+            names += found
+        drives = source.open(names)
+    except BaseException:
+        source.close()
+        raise
+    drives.also_close(source.close)
+    return drives

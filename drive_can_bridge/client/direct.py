@@ -1,17 +1,396 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The direct way to drives: on the buses of a parameter file, while no bridge has them."""
+"""
+The direct way to drives: on the buses of a parameter file, while no bridge has them.
 
-from collections.abc import Sequence
+The sessions only *serve* (see :meth:`.Session.serve`): nothing is sent but the acyclic frames of
+the requests that are handed in. What only a master sends to a drive of these buses, and was not
+sent by this process, ends the conversation. A drive that is not there costs a few time-outs, not
+one for each parameter: while nobody knows whether it is there (at the beginning, and after a
+request of which nothing was answered), it is greeted by single reads before anything else. What
+did not answer when its node was to be started is not greeted again at once.
+"""
+
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 import sys
+import threading
 
-from drive_can_bridge.client.conversation import BusConversation
-from drive_can_bridge.client.direct_drive import DirectDrive
-from drive_can_bridge.client.drive import Drives
+from drive_can_bridge.client.drive import (
+    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome,
+)
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.configuration import (
+    BridgeConfiguration, BusConfiguration, DriveConfiguration,
+)
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
+from drive_can_bridge.core.events import Event, RequestCompleted
+from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.requests import (
+    ABSENT, Failure, is_answer, Outcome, ReadRequest, ReadValue, Request, SILENT, WriteRequest,
+    Written,
+)
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.sentences import no_answer_offline, no_result, Sentence
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.words import value_text
+from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.listeners import DriveListener
 from drive_can_bridge.exchange.one_master import Ownership
+from drive_can_bridge.protocols.families import FAMILIES
+
+#: s that a bus has to open
+_OPEN_TIMEOUT = 5.0
+#: s between two looks whether all is well, however many wait for something
+_PATIENCE = 0.1
+
+
+class AnotherMaster(DriveCanError):
+    """Somebody else talks to one of the drives."""
+
+
+class BusConversation:
+    """
+    One open bus.
+
+    :param drives: those that will be asked.
+    :param neighbours: all drives that are known on the bus: no other master may talk to them.
+    :param ownership: of the bus; kept as long as its threads run, closed or not.
+    :raises DriveCanError: the bus cannot be opened.
+    """
+
+    def __init__(self, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
+                 neighbours: Sequence[DriveConfiguration], ownership: Ownership,
+                 clock: Clock) -> None:
+        self.bus = bus
+        self.now = clock.now
+        self._ownership = ownership
+        self._changed = clock.alarm()
+        self._lock = threading.Lock()
+        self._outcomes: dict[int, tuple[Outcome, ...]] = {}
+        self._trouble: DriveCanError | None = None
+        self._opened = False
+        self._requests: list[tuple[str, Route]] = [
+            (drive.name, route) for drive in neighbours
+            for route in FAMILIES[drive.protocol].make_prober(drive).requests]
+        self.sessions: dict[str, Session] = {
+            drive.name: FAMILIES[drive.protocol].make_session(drive) for drive in drives}
+        self._exchange = BusExchange(
+            bus, list(self.sessions.values()),
+            [[claim.route for claim in FAMILIES[drive.protocol].claims(drive) if claim.heard]
+             for drive in drives],
+            self, clock, counted=[route for _, route in self._requests], note=self._note)
+        for session in self.sessions.values():
+            self._exchange.attach(session, _Ears(self))
+        self._exchange.serve()
+        self._exchange.open()
+        try:
+            self._exchange.link.wait_first_attempt(_OPEN_TIMEOUT)
+            end = self.now() + _OPEN_TIMEOUT
+            while not self._opened and self._trouble is None and self.now() < end:
+                self._changed.wait(end)
+            if not self._opened:
+                self._fail(BusUnavailable(f'bus {bus.name}: it does not open'))
+            self._check()
+        except BaseException:
+            self.close()
+            raise
+
+    def listen(self, seconds: float) -> None:
+        """
+        Do nothing but listen.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost.
+        """
+        end = self.now() + seconds
+        self._check()
+        while self.now() < end:
+            self._changed.wait(min(end, self.now() + _PATIENCE))
+            self._check()
+
+    def submit(self, drive: str, request: Request) -> None:
+        """
+        Hand in a request; :meth:`wait` brings its outcomes.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost or closed.
+        """
+        self._check()
+        self._exchange.submit(self.sessions[drive], request)
+
+    def wait(self, request: Request) -> tuple[Outcome, ...]:
+        """
+        Wait for the outcomes of a request that was handed in.
+
+        :raises DriveCanError: another master talks to a drive, or the bus is lost.
+        """
+        self._check()
+        while id(request) not in self._outcomes:
+            self._changed.wait(self.now() + _PATIENCE)
+            self._check()
+        return self._outcomes.pop(id(request))
+
+    def send(self, frame: Frame) -> None:
+        """
+        Send a frame that is no parameter request.
+
+        :raises BusUnavailable: the bus does not take it.
+        """
+        with self._exchange.lock:
+            if not self._exchange.link.send(frame):
+                raise BusUnavailable(f'bus {self.bus.name}: {self._exchange.link.last_error}')
+
+    def close(self) -> None:
+        """Close the bus; later requests are told so. Idempotent."""
+        self._exchange.close()
+        self._fail(DriveCanError(f'bus {self.bus.name}: is closed already'))
+
+    def _check(self) -> None:
+        if self._trouble is not None:
+            raise self._trouble
+
+    def _fail(self, trouble: DriveCanError) -> None:
+        with self._lock:
+            self._trouble = self._trouble or trouble
+        self._changed.ring()
+
+    # -- from the exchange ------------------------------------------------------------------------
+
+    def completed(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
+        """Take what became of a request."""
+        self._outcomes[id(request)] = outcomes
+        self._changed.ring()
+
+    def _note(self, frame: Frame, now: float, sent: bool) -> None:
+        if sent:
+            return
+        for name, route in self._requests:
+            if route.matches(frame):
+                self._fail(AnotherMaster(f'bus {self.bus.name}: another master talks to drive '
+                                         f'{name} ({frame}); end it first'))
+
+    def bus_opened(self, bus: str) -> None:
+        """Let requests go out: the bus is there."""
+        self._opened = True
+        self._changed.ring()
+
+    def bus_lost(self, bus: str, reason: str) -> None:
+        """End: what the drives do now nobody knows."""
+        self._fail(BusUnavailable(f'bus {bus}: {reason}'))
+
+    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
+        """End likewise."""
+        kind = BusMisconfigured if misconfigured else DriveCanError
+        self._fail(kind(f'bus {bus}: {reason}'))
+
+
+class _Ears(DriveListener):
+    """Listens to one session: only answered requests matter."""
+
+    def __init__(self, conversation: BusConversation) -> None:
+        self._conversation = conversation
+
+    def handle_event(self, event: Event) -> None:
+        """Hand on what became of a request."""
+        if isinstance(event, RequestCompleted):
+            self._conversation.completed(event.request, event.outcomes)
+
+
+#: parameters that are handed to a session at once: two frames where four share one; and how many
+#: such requests wait in it, so that the drive never waits for us
+BLOCK = 8
+AHEAD = 3
+#: parameters that are tried until a drive counts as absent
+TRIES = 3
+#: s for which a drive that did not answer at the beginning counts as absent
+_ABSENT_FOR = 2.0
+#: s between looks whether a node has started, and s until there is no other look
+_START_PAUSE = 0.1
+_START_PATIENCE = 2.5
+_START_HINT = 'a CANopen node that is not operational answers no PKW, --nmt-start starts it'
+
+
+class DirectDrive(Drive):
+    """One drive, asked by this process."""
+
+    def __init__(self, drive: DriveConfiguration, bus: BusConfiguration,
+                 conversation: BusConversation, nmt_start: bool) -> None:
+        self._drive = drive
+        self._family = family = FAMILIES[drive.protocol]
+        super().__init__(DriveFacts(
+            drive.name, bus.name, bus.interface, str(bus.channel), bus.bitrate, drive.protocol,
+            drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
+            drive.profile.restore,
+            persist_writes=getattr(drive.options, 'persist_writes', True)), ParameterDirectory(
+            drive.profile.parameters, lambda name: family.raw_parameter(drive, name)))
+        self._conversation = conversation
+        self._session = conversation.sessions[drive.name]
+        self._absent: tuple[float, Failure] | None = None   # since when, and what it said
+        self._start_frame = family.make_prober(drive).start_frame()
+        self._nmt_start = nmt_start
+
+    def _start(self) -> None:
+        if self._nmt_start and self._start_frame is not None:
+            self._conversation.send(self._start_frame)
+
+    def begin(self) -> Iterator[str]:
+        """Start the node where that is wanted; yield what the user should know."""
+        if self._nmt_start and self._start_frame is not None:
+            self._start()
+            end = self._conversation.now() + _START_PATIENCE
+            while True:     # until its heartbeat, too, says that it has started
+                self._conversation.listen(_START_PAUSE)
+                failure = self._greet()[1]
+                if failure is None or self._conversation.now() >= end:
+                    break
+            if failure is not None:
+                self._absent = self._conversation.now(), failure
+        supervision = self._family.supervision(self._drive)
+        if supervision is not None:
+            outcome, = self._wait_for((supervision,))
+            if isinstance(outcome, ReadValue) and outcome.raw != 0:
+                yield (f'{self.name}: {supervision.address} is not 0: the drive supervises '
+                       'telegrams once it has got one, and faults when they end')
+
+    def role(self, name: str) -> Role | None:
+        parameter = self.find(name)
+        return None if parameter is None else self._session.roles.role(parameter)
+
+    def write_refusal(self, name: str, parameter: Parameter) -> str:
+        if not parameter.writable:
+            return ''   # which its value is told
+        owner = self._session.roles.owner(parameter)
+        if owner is not None and owner[0] is Role.CONTROL:
+            return 'control word: only a running bridge sends it'
+        if owner is not None and owner[0] is Role.CYCLIC:
+            return f'setpoint {owner[1].name}: only a running bridge sends it'
+        return self._session.users.write_refusal(parameter)
+
+    # -- reading ----------------------------------------------------------------------------------
+
+    def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
+        for name, parameter, outcome in self._outcomes(asked):
+            yield self._read_outcome(name, parameter, outcome)
+
+    def _outcomes(self, asked: Sequence[tuple[str, Parameter]],
+                  ) -> Iterator[tuple[str, Parameter, Outcome]]:
+        """Ask in blocks; the next one waits in the session while one is being served."""
+        blocks = [asked[start:start + BLOCK] for start in range(0, len(asked), BLOCK)]
+        waiting: list[tuple[Sequence[tuple[str, Parameter]], ReadRequest]] = []
+        while blocks or waiting:
+            if blocks and not self._session.online:
+                # nobody answered last time, or ever: not a time-out for each parameter
+                known, failure = self._look([each for _, each in blocks[0]])
+                if failure is not None:
+                    for block in blocks:
+                        yield from _paired(block, [failure] * len(block))
+                    return
+                rest = tuple(each for _, each in blocks[0] if each not in known)
+                known.update(zip(rest, self._wait_for(rest)))
+                block = blocks.pop(0)
+                yield from _paired(block, [known[each] for _, each in block])
+                continue
+            while blocks and len(waiting) < AHEAD:
+                request = ReadRequest(tuple(each for _, each in blocks[0]))
+                self._conversation.submit(self.name, request)
+                waiting.append((blocks.pop(0), request))
+            block, request = waiting.pop(0)
+            outcomes = self._conversation.wait(request)
+            if Failure(no_answer_offline()) in outcomes:
+                # the one before had no answer at all, which may have been the fault of its names
+                blocks.insert(0, block)
+            else:
+                yield from _paired(block, outcomes)
+
+    def _look(self, wanted: Sequence[Parameter] = (),
+              ) -> tuple[dict[Parameter, Outcome], Failure | None]:
+        """Greet a drive, which may have restarted, unless that was done just now."""
+        if self._absent is not None and self._conversation.now() - self._absent[0] < _ABSENT_FOR:
+            return {}, self._absent[1]
+        self._absent = None
+        self._start()
+        return self._greet(wanted)
+
+    def _greet(self, wanted: Sequence[Parameter] = (),
+               ) -> tuple[dict[Parameter, Outcome], Failure | None]:
+        """
+        Find out whether the drive is there, preferably by what is wanted anyway.
+
+        :return: what was learnt by that, and why the drive counts as absent; None: it does not.
+        """
+        known: dict[Parameter, Outcome] = {}
+        listed = [each for each in self.parameters.values()
+                  if each.readable and self._session.roles.cells(each)]
+        candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
+        outcome: Outcome = Failure(no_answer_offline())
+        for candidate in list(candidates)[:TRIES]:
+            outcome, = self._wait_for((candidate,))
+            if is_answer(outcome):
+                if candidate in wanted:
+                    known[candidate] = outcome
+                return known, None
+        return known, outcome if isinstance(outcome, Failure) else None
+
+    def _wait_for(self, parameters: tuple[Parameter, ...]) -> tuple[Outcome, ...]:
+        request = ReadRequest(parameters)
+        self._conversation.submit(self.name, request)
+        return self._conversation.wait(request)
+
+    def _read_outcome(self, name: str, parameter: Parameter, outcome: Outcome) -> ReadOutcome:
+        if isinstance(outcome, ReadValue):
+            return ReadOutcome(name, parameter, outcome.raw,
+                               parameter.value_from_raw(outcome.raw))
+        return ReadOutcome(name, parameter, reason=self._explained(
+            outcome.reason if isinstance(outcome, Failure) else no_result()))
+
+    def _explained(self, reason: Sentence) -> str:
+        """Add what may be the matter with a drive that says nothing at all."""
+        silent = reason.code in ABSENT or (
+            reason.code in SILENT and not self._session.online)
+        if silent and self._start_frame is not None and not self._nmt_start:
+            return f'{reason}; {_START_HINT}'
+        return reason
+
+    # -- writing ----------------------------------------------------------------------------------
+
+    def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
+        if not (blind or self._session.online):     # what does not answer is told nothing
+            _, failure = self._look()
+            if failure is not None:
+                return WriteOutcome(name, False, parameter, self._explained(failure.reason))
+        request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),),
+                               blind=blind)
+        self._conversation.submit(self.name, request)
+        outcome, = self._conversation.wait(request)
+        if isinstance(outcome, Written):
+            return WriteOutcome(name, True, parameter, outcome.note)
+        reason = outcome.reason if isinstance(outcome, Failure) else no_result()
+        return WriteOutcome(name, False, parameter, self._explained(reason))
+
+    # -- state ------------------------------------------------------------------------------------
+
+    def enabled(self) -> Enabled:
+        control = self._drive.profile.control
+        if control is None or control.enabled is None or control.status_parameter is None:
+            return Enabled.UNKNOWN
+        outcome = self.read(control.status_parameter)[control.status_parameter]
+        if outcome.raw is None:
+            return Enabled.UNKNOWN
+        return Enabled.YES if control.enabled.matches(outcome.raw) else Enabled.NO
+
+    def identity(self) -> str:
+        names = self._drive.profile.identity
+        outcomes = self.read(*names) if names else {}
+        return ' '.join(f'{name}={value_text(outcome.value)}'
+                        for name, outcome in outcomes.items() if outcome.value is not None)
+
+
+def _paired(block: Sequence[tuple[str, Parameter]], outcomes: Sequence[Outcome],
+            ) -> Iterator[tuple[str, Parameter, Outcome]]:
+    for (name, parameter), outcome in zip(block, outcomes, strict=True):
+        yield name, parameter, outcome
+
 
 #: s to listen for another master before the first request
 LISTEN = 1.2

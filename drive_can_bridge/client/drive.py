@@ -36,7 +36,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.words import hint
-from drive_can_bridge.process.interruption import finish_first
+from drive_can_bridge.process.signals import finish_first
 
 
 class Enabled(Enum):

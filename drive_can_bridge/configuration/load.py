@@ -6,24 +6,25 @@ Both ways run the same checks, and all of them: a user sees every problem at onc
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
-from drive_can_bridge.configuration.bus_check import Adapters, check_buses
-from drive_can_bridge.configuration.declare import check_dynamic, declared_parameters
-from drive_can_bridge.configuration.drive_check import DriveChecker, LISTS
-from drive_can_bridge.configuration.joint_check import check_joint_names
-from drive_can_bridge.configuration.overrides import tree_from_overrides
+import yaml
+
+from drive_can_bridge.configuration.bus_check import (
+    Adapters, check_buses, check_identifiers, check_load, check_neighbours, check_rounds,
+)
+from drive_can_bridge.configuration.declare import (
+    check_dynamic, declared_parameters, tree_from_overrides,
+)
+from drive_can_bridge.configuration.drive_check import check_joint_names, DriveChecker, LISTS
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import (
-    ALL_OPTIONS, complete, definition, parameter_file_schema,
-)
-from drive_can_bridge.configuration.schema_check import check_schema
-from drive_can_bridge.configuration.traffic_check import (
-    check_identifiers, check_load, check_neighbours, check_rounds,
+    ALL_OPTIONS, check_schema, complete, definition, parameter_file_schema,
 )
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -137,7 +138,7 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
 
 
 def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
-    """Say what needs to know more than the schema does, see :data:`schema_check.Override`."""
+    """Say what needs to know more than the schema does, see :data:`.schema.Override`."""
     if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
             'enum', 'type', 'additionalProperties'):
         return None
@@ -155,3 +156,30 @@ def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
     known = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
     return 'unknown key, ' + suggestion(
         str(path[2]), [*known, *(family.options_schema if family else ())])
+
+
+def of_one_bus(configuration: BridgeConfiguration, name: str) -> BridgeConfiguration:
+    """Return what is left of a configuration with one of its buses."""
+    return replace(
+        configuration, buses={name: configuration.buses[name]},
+        drives={drive.name: drive for drive in configuration.drives.values()
+                if drive.bus == name})
+
+
+def write_parameter_file(configuration: BridgeConfiguration, path: FilePath,
+                         node: str = 'drive_can_bridge') -> None:
+    """
+    Write a configuration as a parameter file of a bridge.
+
+    :param node: the bridge's name, in whatever namespace.
+    :raises OSError: it cannot be written.
+    """
+    tree: dict[str, Any] = {}
+    for name, value, *_ in declared_parameters(configuration):
+        *above, key = name.split('.')
+        place = tree
+        for part in above:
+            place = place.setdefault(part, {})
+        place[key] = value
+    path.write_text(yaml.safe_dump(
+        {f'/**/{node}': {'ros__parameters': tree}}, sort_keys=False), encoding='utf-8')

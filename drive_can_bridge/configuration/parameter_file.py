@@ -15,9 +15,8 @@ import re
 from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.configuration.tree_reader import DUPLICATE, Rules, TreeReader
 from drive_can_bridge.configuration.yaml_nodes import (
-    BrokenYaml, Kind, Node, read_documents,
+    BrokenYaml, DUPLICATE, Kind, Node, read_documents, Rules, TreeReader,
 )
 from drive_can_bridge.core.words import nearest, show, suggestion
 

@@ -12,16 +12,12 @@ from pathlib import Path as FilePath
 import re
 from typing import Any
 
-from drive_can_bridge.configuration.control_check import check_control, control_table
-from drive_can_bridge.configuration.names_check import (
-    check_fault, check_values, fault_table, named,
-)
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.configuration.restore_check import (
-    check_identity, check_restore, restore_table,
+from drive_can_bridge.configuration.profile_sections import (
+    check_control, check_fault, check_identity, check_restore, check_values, control_table,
+    fault_table, named, restore_table,
 )
-from drive_can_bridge.configuration.schema import profile_schema
-from drive_can_bridge.configuration.schema_check import check_schema
+from drive_can_bridge.configuration.schema import check_schema, profile_schema
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,

@@ -9,8 +9,9 @@ from pathlib import Path as FilePath
 from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
-from drive_can_bridge.configuration.tree_reader import Rules, TreeReader
-from drive_can_bridge.configuration.yaml_nodes import BrokenYaml, Kind, read_documents
+from drive_can_bridge.configuration.yaml_nodes import (
+    BrokenYaml, Kind, read_documents, Rules, TreeReader,
+)
 from drive_can_bridge.core.words import show, suggestion
 from drive_can_bridge.resources import profiles_directory
 

@@ -7,7 +7,7 @@ then tries C's ``strtoll`` with base 0, then ``strtod``; what is left is a strin
 bool, ``010`` is 8, ``08`` is 8.0, ``1_000``, ``null`` and ``1e400`` are strings, ``inf`` is a
 number. Quotes or the tag ``!!str`` make a string; every other tag is ignored.
 
-Whoever checks a parameter file has to see the values that the node will see, hence this module
+A check of a parameter file has to see the values that the node will see, hence this module
 (compared with the real parser by a test).
 """
 

@@ -3,5 +3,5 @@
 ``drive_can demo``: simulated drives, bridge and live view, each a process of its own.
 
 They are the ones that a user starts by hand, and meet as those do: bridge and drives on
-pseudo-terminals, the view and whoever commands in the ROS graph.
+pseudo-terminals, view and commander in the ROS graph.
 """

@@ -4,11 +4,13 @@ The demo itself: which processes start in which order, and end in the opposite o
 
 First the drives, so that the bridge finds its buses; the view at once, since it takes a while. At
 the end the bridge stops the drives, neutral frames first, and only then do they lose their bus.
+
+The configuration of the demo: any bridge's, with other buses.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import signal
@@ -19,12 +21,31 @@ import termios
 from threading import Event
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.configuration.writing import write_parameter_file
+from drive_can_bridge.configuration.load import write_parameter_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.demo.child import Child
-from drive_can_bridge.demo.terminals import on_terminals
 from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
+
+#: bit/s that SLCAN adapters know; any other is replaced by the next one above
+_BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 750_000, 1_000_000)
+#: s; who looks at the demo wants to see something soon
+_DIAGNOSTICS_PERIOD_MAX = 1.0
+
+
+def on_terminals(configuration: BridgeConfiguration, directory: Path) -> BridgeConfiguration:
+    """
+    Replace every bus by the pseudo-terminal at ``directory/BUS``, and waiting by a start.
+
+    Nothing of a bus that is replaced is kept but its bit rate.
+    """
+    buses = {name: replace(bus, interface='slcan', channel=str(directory / name), options={},
+                           bitrate=next((rate for rate in _BITRATES if rate >= bus.bitrate),
+                                        _BITRATES[-1]))
+             for name, bus in configuration.buses.items()}
+    period = min(configuration.diagnostics_period, _DIAGNOSTICS_PERIOD_MAX)
+    return replace(configuration, buses=buses, autostart=True, diagnostics_period=period)
+
 
 TITLE = 'drive_can demo'
 #: with which the view ends when the user has enough, and not somebody else of the view

@@ -1,12 +1,190 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""How bridges, buses and drives are at one moment: plain values, ready to be shown anywhere."""
+"""
+How bridges, buses and drives are at one moment: plain values, ready to be shown anywhere.
 
+Text from the graph: anybody can put anything there.
+
+Diagnostics of a bridge, read: who says it, about what, and the numbers in it.
+
+What values were a moment ago, and how fast counters count.
+"""
+
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import IntEnum
+from itertools import islice
 import math
+import re
 
-from drive_can_bridge.monitor.reports import Level
+from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.monitor.values import ParameterInfo
+
+#: characters kept of a line of the log, which may tell of several drives
+LOG_LIMIT = 2000
+_ROS_NAME = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
+
+
+def is_ros_name(name: str) -> bool:
+    """Tell whether a full name may stand in front of a topic."""
+    return len(name) <= TEXT_MAX and _ROS_NAME.fullmatch(name) is not None
+
+
+_SUBJECT = re.compile(r'(?P<bridge>\S+): (?P<kind>bus|drive) (?P<name>\S+)')
+#: keys that one status may have
+_FACTS_MAX = 100
+#: by which a status of a bridge is told from others of a similar name
+_MARKS = {'bus': 'load_percent', 'drive': 'missed_exchanges'}
+
+
+class Level(IntEnum):
+    """How bad it is, numbered as in diagnostic_msgs."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One entry of a diagnostic message, as it arrived."""
+
+    name: str
+    level: int
+    message: str
+    facts: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """
+    What a bridge says about a bus or a drive.
+
+    :param bridge: full name of the bridge, ``/cell/drive_can_bridge``.
+    :param is_drive: about a drive; otherwise about a bus.
+    :param name: of the bus or drive, as it is configured.
+    :param facts: all keys, printable.
+    """
+
+    bridge: str
+    is_drive: bool
+    name: str
+    level: Level
+    message: str
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def full_name(self) -> str:
+        """Name of the drive's node: it lives in its bridge's namespace."""
+        return f'{self.bridge.rpartition("/")[0]}/{self.name}'
+
+    @property
+    def state(self) -> str:
+        """State in one word, as the bridge says it."""
+        return self.facts.get('state', '')
+
+    def number(self, key: str) -> float:
+        """Return a number of the facts, NaN where there is none."""
+        try:
+            return float(self.facts.get(key, 'nan'))
+        except ValueError:
+            return math.nan
+
+    def count(self, key: str) -> int:
+        """Return a count of the facts, 0 where there is none."""
+        number = self.number(key)
+        return int(number) if math.isfinite(number) else 0
+
+
+def read_status(status: Status) -> Report | None:
+    """Return the report in a status; None: it is not from a bridge."""
+    match = _SUBJECT.fullmatch(status.name)
+    if match is None or _MARKS[match['kind']] not in status.facts:
+        return None
+    bridge = f'/{match["bridge"]}'
+    report = Report(
+        bridge=bridge, is_drive=match['kind'] == 'drive', name=printable(match['name']),
+        level=Level(status.level) if 0 <= status.level <= 3 else Level.ERROR,
+        message=printable(status.message),
+        facts={printable(key): printable(value)
+               for key, value in islice(status.facts.items(), _FACTS_MAX)})
+    return report if is_ros_name(bridge) and is_ros_name(report.full_name) else None
+
+
+#: s that a history reaches back
+SPAN = 60.0
+_POINTS_MAX = 1200
+
+
+class History:
+    """The last values of one quantity with their times."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, float]] = deque(maxlen=_POINTS_MAX)
+
+    def add(self, value: float, now: float) -> None:
+        """Take a value; what is not finite leaves a gap."""
+        points = self._points
+        while points and now - points[0][0] > SPAN:
+            points.popleft()
+        if math.isfinite(value):
+            points.append((now, value))
+
+    def points(self, now: float) -> tuple[tuple[float, float], ...]:
+        """Return (s ago, value), oldest first."""
+        return tuple((now - at, value) for at, value in self._points if now - at <= SPAN)
+
+
+def columns(points: tuple[tuple[float, float], ...], span: float, count: int,
+            ) -> tuple[float | None, ...]:
+    """
+    Put points into columns of equal time, the newest on the right; None where there is no point.
+
+    A gap of one column between two points is closed: it says no more than that both were looked at
+    a little late.
+    """
+    found: list[float | None] = [None] * count
+    for age, value in points:
+        # the right end is half a column ahead, so that a point of this moment has a place
+        place = count - 1 - int(age / span * count)
+        if 0 <= place < count:
+            found[place] = value
+    for place in range(1, count - 1):
+        if found[place] is None and found[place + 1] is not None:
+            found[place] = found[place - 1]
+    if count > 1 and found[-1] is None:
+        found[-1] = found[-2]
+    return tuple(found)
+
+
+class Rate:
+    """How fast a counter counts, from its last two looks."""
+
+    def __init__(self) -> None:
+        self._last: tuple[float, float] | None = None
+        self.value = 0.0
+
+    def went_back(self, count: float) -> bool:
+        """Tell whether a count is less than the last: counting has begun anew."""
+        return self._last is not None and count < self._last[1]
+
+    def update(self, count: float, at: float) -> None:
+        """
+        Take a count.
+
+        :param at: s, of whatever clock; a clock or a counter that went back begins anew.
+        """
+        if self._last is not None:
+            since, before = self._last
+            if at > since and count >= before:
+                self.value = (count - before) / (at - since)
+            elif at == since:
+                return
+            else:
+                self.value = 0.0
+        self._last = (at, count)
+
 
 Points = tuple[tuple[float, float], ...]
 #: state of a bus whose bridge is silent

@@ -55,7 +55,7 @@ class Operations(Protocol):
     """
     Asks drives for what a person wants; none of it ever moves one.
 
-    Whoever asks is told in a later :meth:`poll`, in its thread.
+    The answer comes in a later :meth:`poll`, in its thread.
     """
 
     def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:

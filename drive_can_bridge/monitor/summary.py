@@ -1,15 +1,25 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Many drives at a glance: colours with one legend for all views, the worst first, and advice."""
+"""
+Many drives at a glance: colours with one legend for all views, the worst first, and advice.
+
+How to talk to a drive from another terminal: command lines that work as they stand.
+
+Drives in lines of text, for pipes and for the end.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+import math
 import re
+from typing import Any
 
-from drive_can_bridge.core.words import counted
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, UNKNOWN
+from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.core.words import counted, seems_limit
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Times, UNKNOWN
+from drive_can_bridge.monitor.values import ParameterInfo
 
 #: drives that one page shows in the order of their configuration, and in full; more are sorted
 FEW = 6
@@ -136,3 +146,135 @@ def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
             lines.append(f'bridge {name}silent since {since}: its drives may still be running; '
                          'stop buttons have no effect')
     return lines
+
+
+_TOPIC_TYPES = {ValueKind.DOUBLE: 'std_msgs/msg/Float64', ValueKind.INTEGER: 'std_msgs/msg/Int64',
+                ValueKind.BOOL: 'std_msgs/msg/Bool'}
+#: a good example
+_TELLING = 'ramp'
+
+
+def hints(drive: DriveSnapshot | None, environment: str) -> list[tuple[str, str]]:
+    """
+    Return commands with what they do.
+
+    :param environment: command that prepares the other terminal; may be ''.
+    """
+    found = [(environment, 'once, so that they meet')] if environment else []
+    if drive is not None:
+        name = drive.name
+        found += [(f'ros2 topic echo {name}/response', 'every sample'),
+                  *_commands(drive),
+                  (f'ros2 param list {name}', "the drive's own parameters")]
+        setting = _setting(drive)
+        if setting is not None:
+            found.append((f'ros2 param get {name} {setting.name}', 'read it over the bus'))
+    return [*found, ('ros2 topic echo /diagnostics', 'buses and drives in words')]
+
+
+def _commands(drive: DriveSnapshot) -> list[tuple[str, str]]:
+    found = []
+    if drive.control:
+        found.append((f'drive_can enable {drive.name}', 'by its control word; or stop, disable'))
+    commanded = [info for info in drive.parameters if info.facts.get('role') == 'cyclic'
+                 and not info.read_only]
+    setpoint = min(commanded, key=lambda info: seems_limit(info.name), default=None)
+    if setpoint is not None:
+        kind = setpoint.kind
+        zero = 'false' if kind is ValueKind.BOOL else '0.0' if kind is ValueKind.DOUBLE else '0'
+        found.append((f'ros2 topic pub -r 10 {drive.name}/command/{setpoint.name} '
+                      f"{_TOPIC_TYPES[kind]} '{{data: {zero}}}'",
+                      'a setpoint, until Ctrl-C: neutral first, then what is wanted'))
+    return found
+
+
+def _setting(drive: DriveSnapshot) -> ParameterInfo | None:
+    """Choose a parameter that may be read by service."""
+    candidates = [info for info in drive.parameters if info.readable
+                  and info.facts.get('role') is None and not info.read_only]
+    return min(candidates, key=lambda info: _TELLING not in info.name, default=None)
+
+
+#: s that a drive which came online may take until it is known what its values mean, and until the
+#: turn of its samples has come
+_PATIENCE = 2.0
+
+
+class Lines:
+    """
+    A line for each drive, again and again.
+
+    That a drive is online is told before its first sample arrives here: on topics of their own, a
+    moment or, on a busy machine, some seconds apart. A line that says ``online`` has the values,
+    so until then it says ``offline``, which is what the model says of samples that stay away, too.
+    Samples that this monitor did not ask for, because there are too many, are not waited for.
+    """
+
+    def __init__(self) -> None:
+        self._online_since: dict[str, float] = {}
+
+    def look(self, snapshot: Snapshot, now: float) -> list[str]:
+        """Return a line for each drive."""
+        return [line(drive) if self._known(drive, now) or not drive.online
+                else f'{drive.label} offline' for drive in snapshot.drives]
+
+    def _known(self, drive: DriveSnapshot, now: float) -> bool:
+        if not drive.online:
+            self._online_since.pop(drive.name, None)
+            return False
+        elapsed = now - self._online_since.setdefault(drive.name, now)
+        if drive.sampled:
+            # without its descriptors a value has no unit, which is better than no value
+            return bool(drive.parameters) or elapsed > _PATIENCE
+        return elapsed > _PATIENCE and drive.asked_for < elapsed
+
+
+def documents(snapshot: Snapshot) -> list[dict[str, Any]]:
+    """Return what programs are told of each drive."""
+    return [{'time': round(snapshot.at, 3), 'drive': drive.name, 'bridge': drive.bridge,
+             'state': drive.state, 'level': drive.level.name, 'online': drive.online,
+             'message': drive.advice, 'control': drive.control,
+             'setpoints': _values(drive.setpoints), 'values': _values(drive.values),
+             'exchanges': drive.exchanges, 'missed': drive.missed} for drive in snapshot.drives]
+
+
+def _values(shown: Sequence[Shown]) -> dict[str, dict[str, Any]]:
+    return {each.name: {'value': _value(each.text), 'unit': each.unit} for each in shown}
+
+
+def _value(text: str) -> float | bool | str | None:
+    """Return a value that is shown as a number where it is one; None: there is none yet."""
+    if text in ('true', 'false'):
+        return text == 'true'
+    try:
+        number = float(text.partition(' ')[0])      # behind it, the name of the value
+    except ValueError:
+        return text or None
+    return number if math.isfinite(number) else text
+
+
+def line(drive: DriveSnapshot) -> str:
+    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or what is wrong."""
+    if not drive.online:
+        why = drive.advice.removeprefix('offline').lstrip(': ')
+        return f'{drive.label} offline' + f' ({why})' * bool(why)
+    known = [shown.assignment for shown in drive.values if shown.assignment]
+    fault = [f'({drive.advice})'] * (drive.state == DriveState.FAULT.value)
+    return ' '.join([drive.label, 'online', *fault, *known])
+
+
+def balance(snapshot: Snapshot) -> list[str]:
+    """Say of each drive how the exchange went."""
+    width = max((len(drive.label) for drive in snapshot.drives), default=0)
+    return [f'{drive.label:{width}}  {_balance(drive)}' for drive in snapshot.drives]
+
+
+def _balance(drive: DriveSnapshot) -> str:
+    if not drive.exchanges:
+        return 'no exchange'
+    return (f'{drive.exchanges} exchanges, {drive.missed} missed, '
+            f'period error {_in_words(drive.period_error)}, latency {_in_words(drive.latency)}')
+
+
+def _in_words(times: Times) -> str:
+    return f'{times.mean:.2f} ms (p99 {times.p99:.2f})'

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Parameters as their descriptors tell of them, and values the way people read them."""
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 
@@ -172,3 +173,45 @@ class ParameterInfo:
                 return decimals
         # no round number: the first digit of a step
         return min(max(0, -math.floor(math.log10(step))), _DECIMALS_MAX)
+
+
+#: messages per second
+BUDGET = 1000.0
+#: s of a turn: discovery, and some samples for a view that looks four times a second
+TURN = 1.5
+
+
+class SamplingPlan:
+    """Chooses drives, anew for every turn."""
+
+    def __init__(self, budget: float = BUDGET) -> None:
+        self._budget = budget
+        self._turn_ends = 0.0
+        self._next = 0
+        self._chosen: frozenset[str] = frozenset()
+
+    def choose(self, rates: Mapping[str, float], focus: Collection[str], now: float,
+               ) -> frozenset[str]:
+        """
+        Return the drives to be sampled.
+
+        :param rates: exchanges per second of all drives; 0 while unknown, or offline.
+        :param focus: drives that are looked at closely.
+        """
+        known = {name for name in rates if name in focus}
+        if now < self._turn_ends and known <= self._chosen <= rates.keys():
+            return self._chosen
+        self._turn_ends = now + TURN
+        chosen = set(known)
+        left = self._budget - sum(rates[name] for name in known)
+        names: Sequence[str] = [name for name in rates if name not in known]
+        for _ in names:
+            name = names[self._next % len(names)]
+            # one in turn at least, or nobody ever would be
+            if rates[name] > left and len(chosen) > len(known):
+                break
+            left -= rates[name]
+            chosen.add(name)
+            self._next += 1
+        self._chosen = frozenset(chosen)
+        return self._chosen

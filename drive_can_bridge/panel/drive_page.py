@@ -1,22 +1,273 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""One drive: its values and bits, a chart, its parameters, what diagnostics say."""
+"""
+One drive: its values and bits, a chart, its parameters, what diagnostics say.
 
-from collections.abc import Mapping
+A chart of values, several in one, of one drive or of several.
+
+The browser keeps the points and draws them; what is sent is what is new. So pausing and zooming
+are the browser's own business, and cost the panel nothing.
+
+The parameters of a drive: searched, read over its bus a page at a time, edited in place.
+"""
+
+from collections.abc import Mapping, Sequence
+import json
 import math
 from typing import Any
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot, Times
+from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Times
 from drive_can_bridge.monitor.summary import tone_of
+from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.access import Role
-from drive_can_bridge.panel.chart import Chart
 from drive_can_bridge.panel.feed import Feed, stops, View
-from drive_can_bridge.panel.parameter_table import ParameterTable
 from drive_can_bridge.panel.parts import (
-    box, button, Changing, in_script, Look, place_in_words, StopButtons, tone_class, Values, words,
+    box, button, Changing, in_script, Look, marked, place_in_words, series_name, StopButtons,
+    tone_class, Values, words,
 )
+
+_SPANS = {'30 s': 30, '1 min': 60, '10 min': 600}
+#: values at first, and at most: more in one chart cannot be told apart
+_AT_FIRST = 2
+_AT_MOST = 8
+
+
+class Chart:
+    """
+    A chart, with what chooses and what holds it.
+
+    :param view: which drives it shows is told to it.
+    :param drive: whose values it shows at first.
+    """
+
+    def __init__(self, view: View, drive: DriveSnapshot) -> None:
+        self._view = view
+        self._own = drive.name
+        self._chosen_once = False
+        self._sent_at: dict[str, float] = {}
+        self._options: list[str] = []
+        with box('row-of'):
+            self._choice = ui.select([], multiple=True, label='values', clearable=True).props(
+                f'dense outlined use-chips max-values={_AT_MOST}').classes('choice')
+        with box('row-of chart-buttons'):
+            self._buttons = box('row-of')
+        self._chart = ui.echart({
+            'animation': False, 'legend': {}, 'tooltip': {'trigger': 'axis'},
+            'xAxis': {'type': 'time', 'axisLine': {'onZero': False}},
+            'yAxis': [{'type': 'value'}], 'series': [],
+            'dataZoom': [{'type': 'inside'}, {'type': 'slider', 'height': 22, 'bottom': 8}],
+        }).classes('chart')
+        number = self._chart.id
+        with self._buttons:
+            button('Pause', 'plain', f'panel.pause({number}, button)')
+            for text, seconds in _SPANS.items():
+                button(text, 'plain', f'panel.span({number}, {seconds})')
+            words('zoom: wheel, pinch, or the bar below', 'dim')
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Send what is new of the chosen values."""
+        found: dict[str, tuple[DriveSnapshot, Shown]] = {
+            series_name(drive, shown): (drive, shown)
+            for drive in sorted(snapshot.drives, key=lambda drive: drive.name != self._own)
+            for shown in (*drive.setpoints, *drive.values)}
+        self._offer(found)
+        chosen = [name for name in self._choice.value or [] if name in found]
+        self._view.focus = frozenset([self._own, *(found[name][0].name for name in chosen)])
+        series = []
+        for name in chosen:
+            shown = found[name][1]
+            since = self._sent_at.get(name, 0.0)
+            points = [(snapshot.at - ago, value) for ago, value in shown.points]
+            fresh = [(round(1e3 * at), value) for at, value in points if at > since]
+            self._sent_at[name] = max([since, *(at for at, _ in points)]) + 1e-3
+            series.append({'name': name, 'unit': shown.unit, 'points': fresh})
+        for name in self._sent_at.keys() - set(chosen):
+            del self._sent_at[name]
+        if series or self._sent_at:
+            self._chart.client.run_javascript(
+                f'panel.plot({self._chart.id}, {round(1e3 * snapshot.at)}, {json.dumps(series)})')
+
+    def _offer(self, found: dict[str, tuple[DriveSnapshot, Shown]]) -> None:
+        """Keep the list of what there is; it grows while drives appear."""
+        missing = [name for name in found if name not in self._options]
+        if missing:
+            self._options += missing
+            self._choice.set_options(self._options)
+        if not self._chosen_once:
+            own = [name for name, (drive, shown) in found.items()
+                   if drive.name == self._own and shown.unit]
+            # what is measured first: a setpoint alone tells little
+            own.sort(key=lambda name: found[name][1] in found[name][0].setpoints)
+            if own:
+                self._chosen_once = True
+                self._choice.set_value(own[:_AT_FIRST])
+
+
+_PAGE = 15
+
+
+class ParameterTable:
+    """
+    The table.
+
+    :param drive: full name.
+    :param writes: values are fields.
+    """
+
+    def __init__(self, feed: Feed, drive: str, *, writes: bool) -> None:
+        self._feed = feed
+        self._drive = drive
+        self._writes = writes
+        self._parameters: Sequence[ParameterInfo] = ()
+        self._seen: Sequence[ParameterInfo] = ()
+        self._page = 0
+        self._looked_at = False
+        self._asked: set[str] = set()
+        with box('section'):
+            with box('row-of'):
+                self._search = ui.input(
+                    placeholder='search name, number, unit, description').classes('search')
+                self._search.props('dense outlined clearable debounce=200')
+                self._search.on_value_change(self._searched)
+                button_row = box('row-of')
+                self._count = words('', 'dim')
+            self._rows = Changing(box('parameters'), self._make_rows)
+            self._nothing = words('This drive has not told of any parameters yet.', 'dim')
+        with button_row:
+            for text, action in (('Read again', self._read_again),
+                                 ('‹', lambda: self._turn(-1)), ('›', lambda: self._turn(1))):
+                with box('plain', 'button').props('type=button').on('click', action):
+                    ui.label(text)
+
+    def look(self, wanted: bool) -> None:
+        """Somebody looks at it now, or no more: what is seen is read."""
+        if wanted and not self._looked_at:
+            self._read_again()
+        self._looked_at = wanted
+
+    def show(self, drive: DriveSnapshot) -> None:
+        """Show a page of it."""
+        self._parameters = drive.parameters
+        found = self._found()
+        pages = max(1, -(-len(found) // _PAGE))
+        self._page = min(self._page, pages - 1)
+        seen = self._seen = found[self._page * _PAGE:(self._page + 1) * _PAGE]
+        self._nothing.set_visibility(not drive.parameters)
+        self._count.set_text(f'{len(found)} of {len(drive.parameters)} parameters, '
+                             f'page {self._page + 1} of {pages}')
+        rows = self._rows.of(tuple(seen))
+        for row in rows:
+            row.show(drive)
+        wanted = [info.name for info in seen if info.readable
+                  and info.name not in drive.readings and info.name not in self._asked]
+        if self._looked_at and drive.online and wanted:
+            self._read(wanted)
+
+    def _read(self, names: Sequence[str]) -> None:
+        async def read() -> None:
+            try:
+                await self._feed.read(self._drive, names)
+            finally:
+                self._asked.difference_update(names)
+        self._asked.update(names)
+        background_tasks.create(read())
+
+    def _read_again(self) -> None:
+        self._again()
+        drive = self._feed.drive(self._drive)
+        if drive is not None and drive.online:
+            self._read([info.name for info in self._seen if info.readable])
+
+    def _turn(self, pages: int) -> None:
+        self._page = max(0, self._page + pages)
+        self._again()
+
+    def _searched(self) -> None:
+        self._page = 0
+        self._again()
+
+    def _again(self) -> None:
+        drive = self._feed.drive(self._drive)
+        if drive is not None:
+            self._looked_at = True
+            self.show(drive)
+
+    def _found(self) -> list[ParameterInfo]:
+        wanted = (self._search.value or '').lower().split()
+        return [info for info in self._parameters
+                if all(word in _searchable(info) for word in wanted)]
+
+    def _make_rows(self, seen: tuple[ParameterInfo, ...]) -> list['_Row']:
+        return [_Row(self._drive, info, writes=self._writes) for info in seen]
+
+
+class _Row:
+    def __init__(self, drive: str, info: ParameterInfo, *, writes: bool) -> None:
+        self._info = info
+        self._text: str | None = None
+        self._field: Any = None
+        with marked(box('parameter'), parameter=info.name):
+            with box():
+                words(info.name, 'name')
+                words(' · '.join(filter(None, (
+                    info.address, info.facts.get('type', ''), info.facts.get('storage', '')))),
+                    'small')
+            with box('value'):
+                if writes and not info.refusal:
+                    script = (f"panel.write({in_script(drive)}, {in_script(info.name)}, "
+                              f"event.target.closest('.parameter'))")
+                    self._field = ui.input().props('dense outlined').on(
+                        'keydown.enter', js_handler=f'(event) => {script}')
+                    words(info.unit, 'dim')
+                    button('Write', 'plain', script)
+                    self._now = words('', 'dim')
+                else:
+                    self._label = words('…' if info.readable else 'cannot be read', 'number')
+            words(_limits(info), 'small number')
+            # its end says once more what stands on the left
+            words(info.description.partition(f' ({info.address}')[0], 'small')
+            box('answer')
+
+    def show(self, drive: DriveSnapshot) -> None:
+        """Show what was read; what somebody types is left alone, and that stands beside it."""
+        reading = drive.readings.get(self._info.name)
+        if reading is None or reading.text == self._text:
+            return
+        before, self._text = self._text or '', reading.text
+        unit = f' {self._info.unit}' if self._info.unit and reading.text else ''
+        text = f'{reading.text}{unit}' if reading.text else 'could not be read'
+        if self._field is None:
+            self._label.set_text(text)
+        elif self._field.value in (before, reading.text) or self._same(reading.text):
+            self._field.set_value(reading.text)
+            self._now.set_text('' if reading.text else text)
+        else:
+            self._now.set_text(f'now {text}')
+
+    def _same(self, text: str) -> bool:
+        """Tell whether what is typed is what was read."""
+        try:
+            return self._info.parse(self._field.value) == self._info.parse(text)
+        except (ValueRefused, AttributeError):  # empty, or nothing that a browser would send
+            return False
+
+
+def _limits(info: ParameterInfo) -> str:
+    if info.kind is ValueKind.BOOL:
+        return 'true, false'
+    return ' · '.join(filter(None, (
+        f'{info.range_text} {info.unit}'.strip() if info.range_text else '',
+        ', '.join(f'{value} {name}' for value, name in info.names.items()),
+        info.refusal.partition(':')[0])))
+
+
+def _searchable(info: ParameterInfo) -> str:
+    return ' '.join((info.name, info.address, info.unit, info.description,
+                     *info.facts.values())).lower()
+
 
 #: bits that are good news when they are not set
 _BAD_BITS = ('fault', 'warning', 'error', 'alarm')

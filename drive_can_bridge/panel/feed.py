@@ -12,8 +12,7 @@ from typing import TypeVar
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.monitor.drive import CONTROL_STATE
-from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.model import CONTROL_STATE, Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
 from drive_can_bridge.monitor.source import Operations, Outcome, Source, Stop
 

@@ -8,8 +8,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import BusSnapshot, DriveSnapshot, Shown, Snapshot
+from drive_can_bridge.monitor.snapshot import BusSnapshot, DriveSnapshot, Level, Shown, Snapshot
 from drive_can_bridge.monitor.summary import (
     counts, FEW, in_order, principal, Tone, tone_of, Trouble, troubles,
 )

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The web server: uvicorn, with an upper limit to everything, and ended by whoever runs it."""
+"""The web server: uvicorn, with an upper limit to everything, and ended by its owner."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.panel.gate import ENTER
+from drive_can_bridge.panel.access import ENTER
 
 #: what is the matter with a port, not with the address
 _OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
@@ -50,9 +50,9 @@ class Connection(H11Protocol):
     """
     A connection. It stands outside until the gate has found its token.
 
-    Outside nobody is turned away: where there are too many, whoever has stood there longest has to
-    leave, so that those who say nothing keep nobody from being heard. Inside there is an upper
-    limit, but not for a stop.
+    Outside nobody is turned away: where there are too many, the one that has stood there longest
+    has to leave, so that those who say nothing keep nobody from being heard. Inside there is an
+    upper limit, but not for a stop.
 
     :param outside: those that have shown no token yet, the oldest first; of all connections.
     """
@@ -124,7 +124,7 @@ class Connection(H11Protocol):
 class _Server(uvicorn.Server):
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave signals to whoever runs this."""
+        """Leave signals to the owner."""
         yield
 
 

@@ -2,8 +2,8 @@
 """
 What an executable does first; it imports nothing that takes time.
 
-Signals that come while a program is still being loaded wait for whoever takes them: as long as
-nobody does, Python answers SIGINT with a traceback. Standard streams that whoever started it has
+Signals that come while a program is still being loaded wait until they are handled: as long as
+nobody does, Python answers SIGINT with a traceback. Standard streams that the starting process has
 closed (``>&-``) go to nobody: else the next file or socket that is opened would be taken for one.
 """
 

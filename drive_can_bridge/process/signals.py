@@ -11,9 +11,12 @@ rclpy's own handlers shut the context down first, so that no neutral frame could
 handlers only run between two bytecodes of the main thread. So the signal is taken from the wake-up
 file descriptor, which the interpreter's C handler writes to, by a thread of its own: a second
 signal works even while the main thread hangs in a library.
+
+Steps that a signal does not break off in the middle.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import os
 import queue
 import signal
@@ -22,7 +25,7 @@ import sys
 import threading
 import time
 from types import TracebackType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
 
@@ -147,7 +150,7 @@ def leave(code: int) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except (OSError, ValueError):  # whoever read it has gone
+        except (OSError, ValueError):  # its reader has gone
             pass
     os._exit(code)
 
@@ -162,3 +165,75 @@ def _attempt(step: Callable[..., object], *arguments: float) -> None:
 
 def _ignore(*_: object) -> None:
     """Take the place of a handler: the wake-up descriptor does the work."""
+
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def finish_first() -> Iterator[None]:
+    """
+    Let SIGINT and SIGTERM take effect only when the step in here is complete.
+
+    Nested steps are one step. In other threads than the main one nothing has to be done: signals
+    are not handled there.
+
+    :raises KeyboardInterrupt: at the end of the step, as after any Ctrl-C.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+
+    def note(number: int, _: Any) -> None:
+        received.append(number)
+    before = {number: signal.signal(number, note) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if received:
+            os.kill(os.getpid(), received[0])   # now by its other handler
+
+
+class Interruption:
+    """
+    Whether somebody wants something to end.
+
+    :ivar number: of the signal; None: nobody does.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+
+    def __bool__(self) -> bool:
+        """Tell whether a signal came."""
+        return self.number is not None
+
+    @property
+    def exit_code(self) -> int:
+        """What the process ends with, as a shell says it; as after Ctrl-C where nobody knows."""
+        return 128 + (signal.SIGINT if self.number is None else self.number)
+
+
+@contextmanager
+def postponed(told: Callable[[], object]) -> Iterator[Interruption]:
+    """
+    Only remember SIGINT, SIGTERM and SIGHUP; the work in here ends where it can.
+
+    :param told: called once, when the first signal comes.
+    """
+    noted = Interruption()
+
+    def note(number: int, _: Any) -> None:
+        if not noted:
+            noted.number = number
+            told()
+
+    before = {number: signal.signal(number, note) for number in (*_SIGNALS, signal.SIGHUP)}
+    try:
+        yield noted
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -2,19 +2,22 @@
 """
 Standard outputs that keep nobody waiting.
 
-Whoever reads them may stop to: Ctrl-S in a terminal, an ssh that hangs, a log reader that was
+Their reader may stop to: Ctrl-S in a terminal, an ssh that hangs, a log reader that was
 stopped. Then a write blocks. rcutils writes while it holds the interpreter, so that one line would
 stop every thread of the process, the exchange and the handling of signals included. It writes to
 standard error, or to standard output where its user says so.
 
-So both descriptors become pipes that never block, for whoever writes to them: rcutils, DDS,
+So both descriptors become pipes that never block their writers: rcutils, DDS,
 Python, libraries of adapters. One thread empties a pipe into a queue of bounded size, another one
 writes the queue to the real output, and waits as long as that takes. What does not fit is
 counted, and said as soon as somebody reads again.
+
+Last words: waited for until they are written, unless nobody takes them.
 """
 
 from array import array
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 import fcntl
 import os
@@ -23,7 +26,38 @@ import termios
 import threading
 import time
 
-from drive_can_bridge.process.taking import MOMENT, Taking
+#: s after which nobody takes what is being written
+PATIENCE = 2.0
+#: s between two looks
+MOMENT = 0.05
+
+
+class Taking:
+    """
+    Whether somebody takes what a thread writes; a context manager around each single write.
+
+    That a thread has not begun to write says nothing: on a busy machine it has to wait for its
+    turn. A write that does not end does.
+
+    :param now: the steady time.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._since: float | None = None
+
+    def __enter__(self) -> None:
+        self._since = self._now()
+
+    def __exit__(self, *_: object) -> None:
+        self._since = None
+
+    @property
+    def nobody(self) -> bool:
+        """What is being written has not been taken for so long that it never will be."""
+        since = self._since
+        return since is not None and self._now() - since > PATIENCE
+
 
 #: bytes that wait for a reader at most
 QUEUE_MAX = 1 << 20

@@ -1,19 +1,27 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which profiles there are, what is in one, and whether it is right."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore, read_profile, SUFFIX
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.profiles.family_check import family_complaints
+from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.family import Complaint, Family
 from drive_can_bridge.resources import profiles_directory
+
+#: how an entry's key ``verified`` is shown
+VERIFIED_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
+_OURS = 'profile.'
+#: a key of a family that changes what it needs of an entry: any value will do
+_CHOICES = {'canopen_pkw': ('addressing', ('register', 'canopen'))}
 
 
 class NoSuchProfile(DriveCanError):
@@ -118,3 +126,31 @@ def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[
         'word_order': parameter.word_order, 'protected': parameter.protected,
         'description': parameter.description, 'source': entry.get('source'),
         'verified': parameter.verified, 'open': entry.get('open')}
+
+
+# -- what families can carry ----------------------------------------------------------------------
+
+
+def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
+    """
+    Return what a family cannot do with a table.
+
+    :param protocol: one of the families; what the table is for beside it does not matter.
+    :return: keys are paths in the profile, ``parameters.speed.type``.
+    """
+    family = FAMILIES[protocol]
+    key, values = _CHOICES.get(protocol, ('', ()))
+    found = [list(_complaints(replace(profile, protocols=(protocol,)), family,
+                              family.make_options(1, given)))
+             for given in [{key: value} for value in values] or [{}]]
+    return min(found, key=len)
+
+
+def _complaints(profile: Profile, family: Family, options: object) -> Iterator[Complaint]:
+    if family.control_built_in:
+        profile = replace(profile, control=None)
+    drive = DriveConfiguration(name='drive', bus='bus', protocol=family.name, station=1,
+                               profile=profile, options=options)
+    for complaint in (*family.check_widths(drive), *family.check(drive)):
+        if complaint.key.startswith(_OURS):
+            yield complaint._replace(key=complaint.key.removeprefix(_OURS))

@@ -1,107 +1,358 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-From a table to the entries of a profile, row by row.
+From a table in a text file to the entries of a profile, row by row.
 
 A row is taken whole or not at all: a limit that cannot be read is no reason to let every value
 through. What a table does not say stays unsaid; only the type has to be decided, and the entry
-says so.
+says so. What each column was taken for is a note; ``--columns`` and ``--decimal`` say it better.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+import csv
 import re
-from typing import Any
+from typing import Any, NamedTuple
+import unicodedata
 
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.profiles.draft import Draft, Found, LeftOut, Place
-from drive_can_bridge.profiles.errors import ImportFailed, Unusable
-from drive_can_bridge.profiles.headings import Column
-from drive_can_bridge.profiles.names import name_of, split_unit
+from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
+from drive_can_bridge.profiles.names import known_unit, name_of, split_unit, unit
 from drive_can_bridge.profiles.numerals import (
-    decimal_sign, DecimalSign, factor, integer, interval, Measure, measure,
+    decimal_sign, factor, integer, interval, is_hexadecimal_only, Measure, measure, rounded,
 )
-from drive_can_bridge.profiles.table import make_table, read_rows, Row, Table
 from drive_can_bridge.profiles.text import one_line
-from drive_can_bridge.profiles.types import access_of, storage_of, type_of
-from drive_can_bridge.profiles.units import known_unit, unit
+
+#: ends the search for headings
+_HEAD_ROWS = 60
+#: characters by which it is found out what separates cells
+_SAMPLE = 8192
+#: separators, the least likely last: decimal commas stand in every row, too
+_DELIMITERS = [';', '\t', '|', ',']
+#: stands behind the last row, where a quote is closed
+_END = '\0end'
 
 #: in front of a number: P102, Pr. 12, par. 7
 _PREFIX = re.compile(r'(?:p|pr|par|param|parameter|pnu|reg|register|%mw|mw)[.:\s_-]*(?=[0-9])',
                      re.IGNORECASE)
-#: an element behind it: P613[-05] counts from 1, 102.1 and 2004h:06 do not
-_ELEMENT = re.compile(r'(.+?)\s*\[-?\s*([0-9]{1,3})\s*\]')
-_PAIR = re.compile(r'([^.:/]+)\s*[.:/]\s*([^.:/]+)')
+#: an address with an element, 102.1 and 2004h:06 counted from 0, P613[-05] from 1
+_ADDRESS = re.compile(r'([^.:/\[\]]*?)\s*(?:[.:/]\s*([^.:/]+)|\[-?\s*([0-9]{1,3})\s*\])')
 _BIT = re.compile(r'(?:bit\s*)?([0-9]{1,2})\s*[=:–-]\s*([^,;|/]+)', re.IGNORECASE)
 #: cells that say nothing
-_NOTHING = frozenset(('', '-', '--', '–', '—', 'n/a', 'na', '/', '?'))
-_NUMERIC = (Column.SCALE, Column.DIVISOR, Column.OFFSET, Column.MINIMUM, Column.MAXIMUM,
-            Column.RANGE, Column.UNIT)
+_NOTHING = frozenset('- -- – — n/a na / ?'.split()) | {''}
 
 
-def read_table(text: str, given: Mapping[Column, str],
-               sign: DecimalSign = DecimalSign.UNKNOWN) -> Found:
+class WrongColumns(DriveCanError):
+    """What ``--columns`` says does not fit the table; the text says why."""
+
+
+#: columns, as ``--columns`` calls them, and their headings in English, German and Italian: without
+#: case, accents, brackets and ``_FILLERS``
+COLUMNS: dict[str, str] = {
+    'number': 'nr|no|n|num|nummer|number|numero|id|pnu|pnr|parameternummer|register|registro|code|'
+              'registernummer|registeradresse|adresse|address|indirizzo|modbus|kennung|codice',
+    'index': 'index|idx|object|objekt|objektindex|indice|oggetto|canopen|od index',
+    'subindex': 'sub|subindex|sub index|sub idx|subidx|sub indice|subindice|sottoindice|element|'
+                'unterindex|array index|ind',
+    'name': 'name|parametername|bezeichnung|benennung|kurzbezeichnung|bezeichner|label|titel|nome|'
+            'parameterbezeichnung|title|text|kurztext|parametertext|signal|variable|variabile|'
+            'titolo|denominazione|designation',
+    'description': 'description|beschreibung|parameterbeschreibung|descrizione|bedeutung|meaning|'
+                   'significato|function|funktion|funzione|bemerkung|bemerkungen|remark|remarks|'
+                   'comment|comments|kommentar|commento|note|notes|nota|hinweis|langtext',
+    'type': 'type|typ|tipo|datatype|datentyp|format|formato|datenformat|variablentyp',
+    'scale': 'scale|scaling|factor|faktor|skalierung|skalierungsfaktor|skal|resolution|aufloesung|'
+             'risoluzione|fattore|scala|multiplier|multiplikator|gain|lsb|normierung|step|'
+             'schrittweite|increment|passo',
+    'divisor': 'divisor|divider|teiler|divisore',
+    'decimals': 'decimals|decimal places|nachkommastellen|kommastellen|dezimalstellen|decimali',
+    'offset': 'offset|versatz|nullpunkt|scostamento',
+    'unit': 'unit|units|einheit|einheiten|unita|misura|u m|um|dimension|dim|eh',
+    'access': 'access|zugriff|zugriffsrecht|zugriffsart|accesso|r w|rw|access type|tipo accesso|'
+              'attribute|attribut|attr|rights|rechte|lesen schreiben|read write|lettura scrittura',
+    'storage': 'storage|speicher|speicherung|speicherort|memory|memoria|eeprom|persistence|retain|'
+               'persistent|memorizzazione|nichtfluechtig|non volatile',
+    'minimum': 'minimum|min|minwert|minimalwert|mindestwert|minimo|lower|low|lowlimit|untergrenze|'
+               'untere grenze|limite inferiore|von|from|da',
+    'maximum': 'maximum|max|maxwert|maximalwert|hoechstwert|massimo|upper|high|highlimit|'
+               'obergrenze|obere grenze|limite superiore|bis|to|a',
+    'range': 'range|wertebereich|bereich|einstellbereich|campo|campo regolazione|intervallo|'
+             'limits|grenzen|limiti|min max',
+    'bits': 'bits|bit|bitbelegung|bit assignment|bitnamen|bit names',
+}
+_BY_HEADING = {word: column for column, words in COLUMNS.items() for word in words.split('|')}
+#: words of headings that say nothing where another one is known
+_FILLERS = frozenset(
+    'parameter param par para parametro value wert valore valori val data daten dati dato of the '
+    'di del dez dec dezimal hex setting adjustment limit location phys physikalische '
+    'engineering'.split())
+#: headings that may stand for numbers as well as for names; the cells tell
+_AMBIGUOUS = frozenset(('parameter', 'param', 'par', 'parametro', 'p'))
+_NUMERIC = ('scale', 'divisor', 'offset', 'minimum', 'maximum',
+            'range', 'unit')
+
+# -- what manuals call types, access and storage --------------------------------------------------
+
+_TYPES = {
+    'bool': 'bool|boolean|bit|flag',
+    'uint8': 'uint8|u8|unsigned8|usint|byte|uchar',
+    'int8': 'int8|i8|s8|sint8|integer8|signed8|sint|char',
+    'int16': 'int16|i16|s16|sint16|integer16|signed16|int|short|sword|int16bit|16bitsigned|'
+             'wordsigned|signedword|signedint',
+    'uint16': 'uint16|u16|unsigned16|word|uint|ushort|unsigned|unsignedword|unsignedint|enum|'
+              '16bitunsigned|unsignedshort|bitset|bitfield|bitfeld|bitfield16',
+    'int32': 'int32|i32|s32|sint32|integer32|signed32|dint|long|32bitsigned|signedlong|'
+             'signeddword',
+    'uint32': 'uint32|u32|unsigned32|dword|udint|ulong|doubleword|doppelwort|unsignedlong|'
+              'unsigneddword|32bitunsigned'}
+_ACCESS = {
+    'ro': 'ro|r|read|readonly|lesen|nurlesen|nurlesbar|l|lettura|solalettura|const',
+    'rw': 'rw|wr|rww|rwr|readwrite|lesenschreiben|schreibbar|ls|les|letturascrittura|'
+          'letturaescrittura',
+    'wo': 'wo|w|write|writeonly|schreiben|nurschreiben|scrittura|solascrittura'}
+_STORAGE = {
+    'ram': 'ram|volatile|volatil|volatilememory|temporary|fluechtig|flüchtig|no|nein|n|false|0',
+    'eeprom': 'eeprom|e2prom|eprom|nvram|fram|flash|nv|nonvolatile|nonvolatil|nichtfluechtig|x|'
+              'nichtflüchtig|remanent|persistent|persist|permanent|retain|yes|ja|si|sì|j|y|true|1'}
+
+
+def word_of(what: str, table: Mapping[str, str], text: str) -> str:
+    """
+    Return the word of a profile for what a manual writes.
+
+    :param what: ``type``, ``access``, ``storage``.
+    :raises Unusable: it is none of those that are known.
+    """
+    plain = re.sub(r'[\s_./,+-]+', '', text.casefold().strip().removesuffix('_t'))
+    for word, others in table.items():
+        if plain in others.split('|'):
+            return word
+    raise Unusable(f"{what} '{text}' is none of those that are known here")
+
+
+def access_of(text: str) -> str:
+    """
+    Return ``ro``, ``rw`` or ``wo``.
+
+    :raises Unusable: it is none of them.
+    """
+    return word_of('access', _ACCESS, text)
+
+
+# -- rows and columns -----------------------------------------------------------------------------
+
+
+class Row(NamedTuple):
+    """
+    A row: the line it begins in, and its cells without space around them.
+
+    :param inside: most separators in a cell over several lines: a quote may be missing.
+    """
+
+    line: int
+    cells: tuple[str, ...]
+    inside: int = 0
+
+    def cell(self, place: int | None) -> str:
+        """Return a cell; '' where the row is too short or the table has no such column."""
+        return self.cells[place] if place is not None and place < len(self.cells) else ''
+
+
+def _read_rows(text: str) -> list[Row]:
+    """
+    Split a text into rows, with what separates its cells.
+
+    :raises ImportFailed: it cannot be split.
+    """
+    sniffer = csv.Sniffer()
+    sniffer.preferred = _DELIMITERS
+    try:
+        delimiter = sniffer.sniff(text[:_SAMPLE], ''.join(_DELIMITERS)).delimiter
+    except csv.Error:
+        delimiter = max(_DELIMITERS, key=text[:_SAMPLE].count)
+    reader = csv.reader((f'{line}\n' for line in (*text.split('\n'), _END)), delimiter=delimiter,
+                        skipinitialspace=True)
+    rows, line = [], 1
+    try:
+        for cells in reader:
+            rows.append(Row(line, tuple(' '.join(cell.split()) for cell in cells),
+                            max((cell.count(delimiter) for cell in cells if '\n' in cell),
+                                default=0)))
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise ImportFailed(f'line {line}: cannot be split into cells: {error}') from None
+    last = rows.pop()
+    if last.cells != (_END,):
+        raise ImportFailed(f'in line {last.line} a quote opens that is never closed')
+    return [row for row in rows if any(row.cells)]
+
+
+def _plain_heading(text: str) -> str:
+    """Return a heading without case, accents, brackets and signs."""
+    text = re.sub(r'[\[(][^\])]*[\])]', ' ', text).casefold().replace('n°', 'nr')
+    for letter, letters in (('ä', 'ae'), ('ö', 'oe'), ('ü', 'ue'), ('ß', 'ss')):
+        text = text.replace(letter, letters)
+    return ' '.join(re.findall(r'[a-z0-9]+', ''.join(
+        letter for letter in unicodedata.normalize('NFKD', text) if not
+        unicodedata.combining(letter))))
+
+
+def _columns_of(heading: str) -> list[str]:
+    """Return what a column may hold; several only where the cells have to tell."""
+    parts = [heading, split_unit(heading)[0], *re.split(r'\s*[/|\n;]\s*', heading)]
+    words = list(filter(None, map(_plain_heading, parts)))
+    for word in words:
+        known = {_BY_HEADING.get(each) for each in word.split() if each not in _FILLERS}
+        column = _BY_HEADING.get(word) or (known.pop() if len(known) == 1 else None)
+        if column is not None:
+            return [column]
+    return ['number', 'name'] if _AMBIGUOUS & set(words) else []
+
+
+def _recognised(row: Row) -> int:
+    """Return how much a row looks like headings: how many of its cells are known ones."""
+    return len({tuple(_columns_of(cell)) for cell in row.cells} - {()})
+
+
+class Table:
+    """
+    A table with what its columns hold.
+
+    :param given: headings, or places counted from 1, of columns; '' for one that is not there.
+    :raises ImportFailed: it cannot be found out which parameter a row is.
+    :raises WrongColumns: something given is not there.
+    """
+
+    def __init__(self, rows: Sequence[Row], given: Mapping[str, str]) -> None:
+        head = _head(rows, [word for word in given.values() if word and not word.isdecimal()])
+        self.headings = head.cells if head is not None else ()
+        below = rows[rows.index(head) + 1:] if head is not None else rows
+        #: below the headings, repeated headings left out
+        self.rows = [row for row in below if row.cells != self.headings]
+        self.columns = {column: self._place(word) for column, word in given.items() if word}
+        for place, heading in enumerate(self.headings):
+            columns = _columns_of(heading) if place not in self.columns.values() else []
+            if len(columns) > 1:
+                columns = columns[:1] if self._mostly_numbers(place) else columns[1:]
+            for column in columns:
+                if column not in given:
+                    self.columns.setdefault(column, place)
+        # beside a number an "Index" is that of an array
+        place = self.columns.get('index', 0)
+        if 'number' in self.columns and 'index' not in given and _plain_heading(
+                Row(0, self.headings).cell(place)) in ('index', 'idx', 'indice'):
+            del self.columns['index']
+            self.columns.setdefault('subindex', place)
+        if not {'number', 'index'} & set(self.columns):
+            shown = ', '.join(filter(None, self.headings))
+            what = f'its headings are: {shown}' if shown else 'no row looks like headings'
+            raise ImportFailed(
+                f'no column with parameter numbers was found; {what}; say which one it is: '
+                '--columns number=HEADING,name=HEADING,... (or their places: number=1)')
+        #: columns whose digits are hexadecimal without a mark
+        self.hexadecimal = {'index', *(
+            column for column in ('number', 'subindex')
+            if 'hex' in self.heading(column).casefold())}
+        if 'index' in self.columns and any(map(is_hexadecimal_only, (
+                self.cell(row, 'subindex') for row in self.rows))):
+            self.hexadecimal.add('subindex')
+
+    def cell(self, row: Row, column: str) -> str:
+        """Return a cell of a row; '' where there is none, or it says nothing."""
+        text = row.cell(self.columns.get(column))
+        return '' if text.casefold() in _NOTHING else text
+
+    def heading(self, column: str) -> str:
+        """Return the heading of a column; '' where there is none."""
+        return Row(0, self.headings).cell(self.columns.get(column))
+
+    def notes(self) -> list[str]:
+        """Say what the columns were taken for."""
+        notes = ['columns: ' + ', '.join(f'{column}={self.heading(column) or place + 1}'
+                                         for column, place in self.columns.items())]
+        unused = [heading for place, heading in enumerate(self.headings)
+                  if heading and place not in self.columns.values()]
+        return [*notes, f'columns not used: {", ".join(unused)}'] if unused else notes
+
+    def _place(self, word: str) -> int:
+        for place, heading in enumerate(self.headings):
+            if heading.casefold() == word.casefold():
+                return place
+        width = max((len(row.cells) for row in self.rows), default=0)
+        if word.isdecimal() and word.isascii() and 1 <= int(word[:9]) <= width:
+            return int(word) - 1
+        raise WrongColumns(f"no column '{word}': the table has {width}")
+
+    def _mostly_numbers(self, place: int) -> bool:
+        cells = [row.cell(place) for row in self.rows if row.cell(place)]
+        return sum(bool(re.search('[0-9]', cell)) and len(cell) <= 12
+                   for cell in cells) > len(cells) / 2
+
+
+def _head(rows: Sequence[Row], given: Sequence[str]) -> Row | None:
+    """
+    Return the row of headings, None without one.
+
+    :raises WrongColumns: a given heading is not there.
+    """
+    candidates = rows[:_HEAD_ROWS]
+    wanted = {word.casefold() for word in given}
+    best = max(candidates, key=_recognised, default=Row(0, ()))
+    if not wanted:
+        return best if _recognised(best) >= 2 else None
+    for row in candidates:
+        if wanted <= {cell.casefold() for cell in row.cells}:
+            return row
+    known = {cell.casefold() for row in candidates for cell in row.cells}
+    missing = [word for word in given if word.casefold() not in known] or given
+    raise WrongColumns('no row has the headings ' + ', '.join(f"'{word}'" for word in missing)
+                       + '; there are: ' + ', '.join(filter(None, best.cells)))
+
+
+# -- entries --------------------------------------------------------------------------------------
+
+
+def read_table(text: str, given: Mapping[str, str], sign: str = '',
+               protocols: Sequence[str] = ()) -> Found:
     """
     Read what a table offers.
 
-    :param given: columns by heading or place, as for :func:`.make_table`.
+    :param given: columns by heading or place, as for :class:`Table`.
     :param sign: the decimal sign, where somebody says it.
+    :param protocols: that the drive speaks; 8-bit types exist for cia402 only.
     :raises ImportFailed: it is no table of parameters.
     :raises WrongColumns: a given column is not there.
     """
-    rows, torn = read_rows(text)
-    try:
-        table = make_table(rows, given)
-    except ImportFailed as error:
-        if not torn:
-            raise
-        raise ImportFailed(f'in line {torn[0].line} a quote opens that is never closed; '
-                           f'{error}') from None
-    if sign is DecimalSign.UNKNOWN:
-        sign = decimal_sign(table.cell(row, column) for row in table.rows for column in _NUMERIC)
-    found = Found(notes=_notes(table), left_out=[
-        LeftOut(Place(each.line), _shortened(each.text), 'a quote opens here that is never closed')
-        for each in torn])
-    reader = _RowReader(table, sign)
-    headings = []
+    table = Table(_read_rows(text), given)
+    reader = _RowReader(table, sign or decimal_sign(
+        table.cell(row, column) for row in table.rows for column in _NUMERIC),
+        bytes_stay=tuple(protocols) == ('cia402',))
+    found = Found(notes=table.notes())
+    sections = []
     for row in table.rows:
         if sum(map(bool, row.cells)) <= 1 and len(table.columns) > 1:
-            headings.append(row.line)
+            sections.append(row.line)
             continue
         try:
             found.drafts.append(reader.draft(row))
         except Unusable as error:
-            found.left_out.append(LeftOut(Place(row.line), _shown(row), str(error)))
-    if headings:
-        lines = ', '.join(map(str, headings[:10])) + (' …' if len(headings) > 10 else '')
-        found.notes.append(f'taken for headings of sections: line {lines}')
+            shown = one_line(' '.join(filter(None, row.cells)))
+            found.left_out.append(LeftOut(
+                row.line, '', shown if len(shown) <= 40 else f'{shown[:39]}…', str(error)))
+    if sections:
+        found.notes.append('taken for headings of sections: line '
+                           + ', '.join(map(str, sections[:10]))
+                           + (' …' if len(sections) > 10 else ''))
     return found
-
-
-def _notes(table: Table) -> list[str]:
-    shown = []
-    for column, place in table.columns.items():
-        heading = table.headings[place] if place < len(table.headings) else ''
-        shown.append(f'{column.value}={heading or place + 1}')
-    notes = [f'columns: {", ".join(shown)}']
-    if table.unused:
-        notes.append(f'columns not used: {", ".join(table.unused)}')
-    return notes
-
-
-def _shown(row: Row) -> str:
-    return _shortened(' '.join(cell for cell in row.cells if cell))
-
-
-def _shortened(text: str) -> str:
-    text = one_line(text)
-    return text if len(text) <= 40 else text[:39] + '…'
 
 
 class _RowReader:
     """Makes a draft of a row."""
 
-    def __init__(self, table: Table, sign: DecimalSign) -> None:
+    def __init__(self, table: Table, sign: str, *, bytes_stay: bool) -> None:
         self._table = table
         self._sign = sign
+        self._bytes_stay = bytes_stay
+        self._row = Row(0, ())
 
     def draft(self, row: Row) -> Draft:
         """
@@ -109,157 +360,128 @@ class _RowReader:
 
         :raises Unusable: something in it has no meaning.
         """
-        entry: dict[str, Any] = self._address(row)
+        self._row = row
+        if row.inside >= max(2, len(self._table.headings) - 1):
+            raise Unusable('a cell over several lines holds as much as a row: is a quote missing?')
+        entry: dict[str, Any] = self._address()
         remarks: list[str] = []
-        title, title_unit = split_unit(self._cell(row, Column.NAME))
-        description = self._cell(row, Column.DESCRIPTION)
-        entry.update(self._scaling(row, title_unit))
-        limits = self._limits(row, str(entry.get('unit', '')))
-        kind, largest = self._type(row, entry, limits, remarks)
-        entry['type'] = kind.value
-        if largest is not None and limits.get('maximum') is None:
-            limits['maximum'] = largest * entry.get('scale', 1.0) + entry.get('offset', 0.0)
-        if kind is ParameterType.BOOL:
-            for key in ('scale', 'offset', 'unit'):
-                if entry.pop(key, None) is not None:
-                    remarks.append(f'{key} left out: a bool has none')
-            limits = {}
-        entry.update({key: value for key, value in limits.items() if value is not None})
-        for column, key, reading in ((Column.ACCESS, 'access', access_of),
-                                     (Column.STORAGE, 'storage', storage_of)):
-            if self._cell(row, column):
-                entry[key] = reading(self._cell(row, column))
-        if self._cell(row, Column.BITS):
-            entry['bits'] = self._bits(row)
+        title, title_unit = split_unit(self._cell('name'))
+        description = self._cell('description')
+        entry.update(self._scaling(title_unit))
+        limits = self._limits(str(entry.get('unit', '')))
+        entry['type'] = self._type(entry, limits, remarks)
+        if entry['type'] == 'bool':
+            for key in entry.keys() & {'scale', 'offset', 'unit'}:
+                del entry[key]
+                remarks.append(f'{key} left out: a bool has none')
+        else:
+            entry.update(limits)
+        if self._cell('access'):
+            entry['access'] = access_of(self._cell('access'))
+        if self._cell('storage'):
+            entry['storage'] = word_of('storage', _STORAGE, self._cell('storage'))
+        if self._cell('bits'):
+            entry['bits'] = self._bits()
         if entry.get('access') == 'ro':
             entry.pop('storage', None)
-        words = [self._cell(row, Column.NAME), description]
-        entry['description'] = one_line('; '.join(dict.fromkeys(filter(None, words))))
-        if not entry['description']:
-            del entry['description']
-        return Draft(Place(row.line), title or description, entry, remarks)
+        words = one_line('; '.join(dict.fromkeys(filter(None, (self._cell('name'),
+                                                               description)))))
+        return Draft(row.line, '', title or description,
+                     {**entry, 'description': words} if words else entry, remarks)
 
-    def _cell(self, row: Row, column: Column) -> str:
-        text = self._table.cell(row, column)
-        return '' if text.casefold() in _NOTHING else text
+    def _cell(self, column: str) -> str:
+        return self._table.cell(self._row, column)
 
-    # -- which one --------------------------------------------------------------------------------
-
-    def _address(self, row: Row) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        index = self._cell(row, Column.INDEX)
-        number = self._cell(row, Column.NUMBER)
-        element = ''
+    def _address(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        hexadecimal = self._table.hexadecimal
+        number, element = _parts(_PREFIX.sub('', self._cell('number')))
+        index, subindex = _parts(self._cell('index'))
         if number:
-            number, element = self._element(_PREFIX.sub('', number))
-            found['number'] = integer(number, hexadecimal=Column.NUMBER in self._table.hexadecimal)
+            found['number'] = integer(number, hexadecimal='number' in hexadecimal)
+            if set(element) == {'0'}:    # what a spreadsheet makes of whole numbers
+                element = ''
         if index:
-            pair = _PAIR.fullmatch(index)
-            if pair is not None:  # 2004:0A, as CANopen writes it
-                index = pair[1]
-                found['subindex'] = integer(pair[2], hexadecimal=True)
             found['index'] = integer(index, hexadecimal=True)
-        subindex = self._cell(row, Column.SUBINDEX)
-        if subindex:
-            bracketed = re.fullmatch(r'\[-?\s*([0-9]{1,3})\s*\]', subindex)
-            element = str(int(bracketed[1]) - 1) if bracketed else subindex
+            found['subindex'] = integer(subindex or '0', hexadecimal=True)
+            if found['index'] < 0x1000:
+                raise Unusable(f"'{index}' is no index of CANopen, which begin at 1000h; if it is "
+                               'a number, say --columns number=HEADING,index=')
         if not found:
             raise Unusable('has no number')
+        element = ''.join(_parts(self._cell('subindex'))) or element
         if element:
-            found['subindex'] = integer(
-                element, hexadecimal=Column.SUBINDEX in self._table.hexadecimal)
-        elif index:
-            found.setdefault('subindex', 0)
+            found['subindex'] = integer(element, hexadecimal='subindex' in hexadecimal)
         for key, largest in (('number', 65535), ('index', 65535), ('subindex', 255)):
             if found.get(key, 0) > largest:
                 raise Unusable(f'{key} {found[key]} is out of range, allowed is 0 to {largest}')
         return found
 
-    def _element(self, text: str) -> tuple[str, str]:
-        bracketed = _ELEMENT.fullmatch(text)
-        if bracketed is not None:
-            if int(bracketed[2]) == 0:
-                raise Unusable(f"'{text}': elements in brackets are counted from 1")
-            return bracketed[1], str(int(bracketed[2]) - 1)
-        pair = _PAIR.fullmatch(text)
-        if pair is not None and set(pair[2]) != {'0'}:
-            return pair[1].strip(), pair[2].strip()
-        return text, ''
-
-    # -- how it is to be read ---------------------------------------------------------------------
-
-    def _scaling(self, row: Row, title_unit: str) -> dict[str, Any]:
+    def _scaling(self, title_unit: str) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        scale = 1.0
-        units = [self._cell(row, Column.UNIT)]
-        leading = re.match(r'(?:[0-9]|[xX×*] ?[0-9])', units[0])
-        if leading and not known_unit(units[0]):   # "0,1 Hz" in the column of units
-            step = factor(units[0], self._sign)
-            scale, units = step.number, [step.unit]
-        if self._cell(row, Column.SCALE):
-            step = factor(self._cell(row, Column.SCALE), self._sign)
+        scale, units = 1.0, [self._cell('unit')]
+        if re.match(r'(?:[0-9]|[xX×*] ?[0-9])', units[0]) and not known_unit(units[0]):
+            scale, units[0] = factor(units[0], self._sign)     # "0,1 Hz" in the column of units
+        if self._cell('scale'):
+            step = factor(self._cell('scale'), self._sign)
             scale *= step.number
             units.append(step.unit)
-        if self._cell(row, Column.DIVISOR):
-            scale /= factor(self._cell(row, Column.DIVISOR), self._sign).number
-        if self._cell(row, Column.DECIMALS):
-            places = integer(self._cell(row, Column.DECIMALS))
-            if places > 9:
-                raise Unusable(f'{places} decimal places are too many')
-            scale *= float(f'1e-{places}')
-        if scale != 1.0:
-            found['scale'] = _tidy(scale)
-        if self._cell(row, Column.OFFSET):
-            offset = measure(self._cell(row, Column.OFFSET), self._sign).number
-            if offset:
-                found['offset'] = _tidy(offset)
+        if self._cell('divisor'):
+            scale /= factor(self._cell('divisor'), self._sign).number
+        if self._cell('decimals'):
+            scale *= 10.0 ** -min(integer(self._cell('decimals')), 99)
+        if rounded(scale) != 1.0:
+            found['scale'] = rounded(scale)
+        if self._cell('offset'):
+            offset = measure(self._cell('offset'), self._sign).number
+            found.update({'offset': offset} if offset else {})
         units.append(title_unit)
-        if Column.UNIT not in self._table.columns:
+        if 'unit' not in self._table.columns:
             units += [split_unit(self._table.heading(column))[1] for column in (
-                Column.SCALE, Column.MINIMUM, Column.MAXIMUM, Column.RANGE)]
-        found_unit = next(filter(None, map(unit, units)), '')
-        if not found_unit and self._cell(row, Column.RANGE):
-            found_unit = unit(self._interval(row)[1].unit)
-        if found_unit:
-            found['unit'] = found_unit
-        return found
+                'scale', 'minimum', 'maximum', 'range')]
+        if self._cell('range'):
+            units.append(interval(self._cell('range'), self._sign)[1].unit)
+        own = next(filter(None, map(unit, units)), '')
+        return {**found, 'unit': own} if own else found
 
-    def _interval(self, row: Row) -> tuple[Measure, Measure]:
-        return interval(self._cell(row, Column.RANGE), self._sign)
-
-    def _limits(self, row: Row, own_unit: str) -> dict[str, float | None]:
+    def _limits(self, own_unit: str) -> dict[str, float]:
         found: dict[str, Measure] = {}
-        if self._cell(row, Column.RANGE):
-            found['minimum'], found['maximum'] = self._interval(row)
-        for column in (Column.MINIMUM, Column.MAXIMUM):
-            if self._cell(row, column):
-                found[column.value] = measure(self._cell(row, column), self._sign)
+        if self._cell('range'):
+            found['minimum'], found['maximum'] = interval(self._cell('range'), self._sign)
+        for column in ('minimum', 'maximum'):
+            if self._cell(column):
+                found[column] = measure(self._cell(column), self._sign)
         for key, limit in found.items():
             if limit.unit and unit(limit.unit) != own_unit:
                 raise Unusable(f"{key} '{limit.number:g} {limit.unit}' is not in "
                                f'{own_unit or "the unit of the parameter, which has none"}')
-        low, high = found.get('minimum'), found.get('maximum')
-        if low is not None and high is not None and low.number > high.number:
-            raise Unusable(f'minimum {low.number:g} is above maximum {high.number:g}')
-        return {key: _tidy(limit.number) for key, limit in found.items()}
+        limits = {key: limit.number for key, limit in found.items()}
+        if len(limits) == 2 and limits['minimum'] > limits['maximum']:
+            raise Unusable(f'minimum {limits["minimum"]:g} is above maximum '
+                           f'{limits["maximum"]:g}')
+        return limits
 
-    def _type(self, row: Row, entry: Mapping[str, Any], limits: Mapping[str, float | None],
-              remarks: list[str]) -> tuple[ParameterType, int | None]:
-        if self._cell(row, Column.TYPE):
-            return type_of(self._cell(row, Column.TYPE))
+    def _type(self, entry: Mapping[str, Any], limits: dict[str, float],
+              remarks: list[str]) -> str:
         scale, offset = entry.get('scale', 1.0), entry.get('offset', 0.0)
-        raws = [(limit - offset) / scale for limit in limits.values() if limit is not None]
-        for kind in (ParameterType.UINT16, ParameterType.INT16, ParameterType.UINT32,
+        if self._cell('type'):
+            kind = word_of('type', _TYPES, self._cell('type'))
+            if kind == 'uint8' and not self._bytes_stay:    # eight bits fit sixteen
+                limits.setdefault('maximum', rounded(255 * scale + offset))
+                return 'uint16'
+            return kind
+        raws = [(limit - offset) / scale for limit in limits.values()]
+        for fits in (ParameterType.UINT16, ParameterType.INT16, ParameterType.UINT32,
                      ParameterType.INT32):
-            low, high = kind.raw_range
+            low, high = fits.raw_range
             if all(low - 0.5 <= raw <= high + 0.5 for raw in raws):
-                remarks.append(f'type {kind.value}: not in the table, '
+                remarks.append(f'type {fits.value}: not in the table, '
                                + ('chosen by the limits' if raws else 'the usual one'))
-                return kind, None
+                return str(fits.value)
         raise Unusable('the limits fit no type of 16 or 32 bits')
 
-    def _bits(self, row: Row) -> dict[str, int]:
-        text = self._cell(row, Column.BITS)
+    def _bits(self) -> dict[str, int]:
+        text = self._cell('bits')
         found: dict[str, int] = {}
         for position, title in _BIT.findall(text):
             found.setdefault(name_of(title, position), int(position))
@@ -268,6 +490,17 @@ class _RowReader:
         return found
 
 
-def _tidy(value: float) -> float:
-    """Take the binary noise from a product: 0.1, not 0.1000000000000002."""
-    return float(f'{value:.12g}')
+def _parts(text: str) -> tuple[str, str]:
+    """
+    Split an address from its element, '' for none.
+
+    :raises Unusable: an element that is counted from 1 is 0.
+    """
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        return text, ''
+    if match[3] is None:
+        return match[1], match[2].strip()
+    if int(match[3]) == 0:
+        raise Unusable(f"'{text}': elements in brackets are counted from 1")
+    return match[1], hex(int(match[3]) - 1)

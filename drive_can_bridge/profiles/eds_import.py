@@ -2,44 +2,61 @@
 """
 From an EDS or DCF file to the entries of a profile, through the library ``canopen``.
 
-What a section means is the library's business: types, access, limits with their signs, compact
-arrays. It gets one object at a time, so that a broken section costs that entry and no other.
+What a section means is the library's business: types, limits with their signs, compact arrays. It
+takes a file as a whole or not at all, and knows no lines. So the file is taken apart here, and
+handed over object by object: a broken section costs that entry and no other.
+
+What a drive of CiA 402 has of the standard is called as in the shipped profile ``cia402_servo``,
+and has its bits, values and units; the units that are every maker's own are taken from the file
+where it says them, and are raw otherwise.
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 import configparser
+from dataclasses import dataclass, field
 import io
 import logging
+import re
 from types import ModuleType
 from typing import Any
 
-from drive_can_bridge.profiles.draft import Draft, Found, LeftOut, Place
-from drive_can_bridge.profiles.eds_sections import Section, Sections, take_apart
-from drive_can_bridge.profiles.errors import ImportFailed, Unusable
+from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
+from drive_can_bridge.profiles.catalogue import check, Checked
+from drive_can_bridge.profiles.csv_import import access_of
+from drive_can_bridge.profiles.names import unit
+from drive_can_bridge.profiles.numerals import rounded
 from drive_can_bridge.profiles.text import one_line
-from drive_can_bridge.profiles.types import access_of
-from drive_can_bridge.profiles.units import unit
-from drive_can_bridge.resources import command_that_brings
+from drive_can_bridge.resources import command_that_brings, profiles_directory
 
-#: what the library needs these keys to be called
+#: how the library needs these keys to be written
 _SPELLINGS = {key.lower(): key for key in (
     'ParameterName', 'ObjectType', 'DataType', 'AccessType', 'DefaultValue', 'PDOMapping',
     'LowLimit', 'HighLimit', 'SubNumber', 'CompactSubObj', 'StorageLocation', 'NrOfEntries',
     'Factor', 'Description', 'Unit')}
+_HEADING = re.compile(r'\s*\[([^\[\]]*)\]\s*(?:;.*)?')
+_OBJECT = re.compile(r'([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?')
 #: the communication area: identifiers, mappings, the node's own settings
 _COMMUNICATION = range(0x1000, 0x2000)
-_TYPES = {0x01: 'bool', 0x03: 'int16', 0x04: 'int32', 0x06: 'uint16', 0x07: 'uint32'}
-_TYPE_NAMES = {
-    0x02: 'INTEGER8', 0x05: 'UNSIGNED8', 0x08: 'REAL32', 0x09: 'VISIBLE_STRING',
-    0x0A: 'OCTET_STRING', 0x0B: 'UNICODE_STRING', 0x0C: 'TIME_OF_DAY', 0x0D: 'TIME_DIFFERENCE',
-    0x0F: 'DOMAIN', 0x10: 'INTEGER24', 0x11: 'REAL64', 0x12: 'INTEGER40', 0x13: 'INTEGER48',
-    0x14: 'INTEGER56', 0x15: 'INTEGER64', 0x16: 'UNSIGNED24', 0x18: 'UNSIGNED40',
-    0x19: 'UNSIGNED48', 0x1A: 'UNSIGNED56', 0x1B: 'UNSIGNED64'}
-#: types of an object's own, defined by sections of these numbers
-_OWN_TYPES = range(0x20, 0x1000)
+#: data types of CiA 301
+_TYPES = {
+    0x01: 'bool', 0x02: 'int8', 0x03: 'int16', 0x04: 'int32', 0x05: 'uint8', 0x06: 'uint16',
+    0x07: 'uint32', 0x08: 'REAL32', 0x09: 'VISIBLE_STRING', 0x0A: 'OCTET_STRING',
+    0x0B: 'UNICODE_STRING', 0x0C: 'TIME_OF_DAY', 0x0D: 'TIME_DIFFERENCE', 0x0F: 'DOMAIN',
+    0x10: 'INTEGER24', 0x11: 'REAL64', 0x15: 'INTEGER64', 0x16: 'UNSIGNED24', 0x1B: 'UNSIGNED64'}
+#: CiA 402: control word and status word, which are built in
+_BUILT_IN = (0x6040, 0x6041)
+#: profile of the objects that CiA 402 knows; entries of it that are not verified have units of
+#: every maker's own, and are placeholders there
+_STANDARD = 'cia402_servo'
+#: what those entries have in common with the one that they stand for
+_MEANING = ('bits', 'values', 'neutral', 'neutral_from', 'limit', 'protected')
+#: numerators and denominators of 60A8h and 60A9h (bits 23 to 8; above them a power of ten) in the
+#: notation of CiA 303-2, as in the files of maxon's EPOS4: unit, and how many of it
+_SI_UNITS = {0xB400: ('rev', 1.0), 0xB500: ('inc', 1.0), 0x4100: ('deg', 1.0),
+             0x1000: ('rad', 1.0), 0xB447: ('rpm', 1.0), 0xB403: ('rpm', 60.0),
+             0xB503: ('inc/s', 1.0), 0x4103: ('deg/s', 1.0), 0x1003: ('rad/s', 1.0)}
 #: everything that the library raises about a section that makes no sense
 _ERRORS = (ValueError, KeyError, AttributeError, TypeError, configparser.Error)
-_ELEMENTS_MAX = 0xFE
 
 
 def canopen_library() -> ModuleType:
@@ -60,133 +77,160 @@ def canopen_library() -> ModuleType:
     return module
 
 
-def read_eds(text: str) -> Found:
+@dataclass(slots=True)
+class Section:
+    """A section with its values as written; keys are compared without case."""
+
+    name: str
+    line: int
+    values: dict[str, str] = field(default_factory=dict)
+
+    def get(self, key: str) -> str:
+        """Return a value; '' where there is none, or an empty one."""
+        return self.values.get(key.lower(), '')
+
+    def text(self) -> str:
+        """Return the section as a file of its own would have it."""
+        return f'[{self.name}]\n' + ''.join(
+            f'{_SPELLINGS.get(key, key)}={value}\n' for key, value in self.values.items())
+
+    def lost(self, reason: str) -> LeftOut:
+        """Say why it is not in the profile."""
+        return LeftOut(self.line, f'[{self.name}]', one_line(self.get('ParameterName')), reason)
+
+
+def _take_apart(text: str, found: Found) -> dict[str, Section]:
+    """Return the sections of a file by name in lower case, and note what is odd."""
+    sections: dict[str, Section] = {}
+    section = Section('', 0)
+    for line, row in enumerate(text.split('\n'), start=1):
+        stripped = row.strip()
+        heading = _HEADING.fullmatch(row)
+        key, sign, value = (each.strip() for each in stripped.partition('='))
+        if not stripped or stripped[0] in ';#':
+            continue
+        if heading is not None:
+            section = Section(heading[1].strip(), line)
+            first = sections.setdefault(section.name.lower(), section)
+            twice = f'stands twice, the first in line {first.line} counts'
+            if first is not section and _OBJECT.fullmatch(section.name.lower()):
+                found.left_out.append(section.lost(twice))
+            elif first is not section:
+                found.notes.append(f'line {line}: [{section.name}] {twice}')
+        elif not sign or not key or not section.line:
+            found.notes.append(f'line {line}: neither a section nor KEY=VALUE')
+        elif key.lower() in section.values:
+            found.notes.append(f'line {line}: {key} stands twice in [{section.name}], the first '
+                               'counts')
+        else:
+            section.values[key.lower()] = re.split(r'(?:^|\s);', value)[0].strip()
+    return sections
+
+
+def read_eds(text: str, protocols: Sequence[str] = ()) -> Found:
     """
     Read what an EDS or DCF file offers.
 
+    :param protocols: that the drive speaks; none: cia402 where the file has its control word and
+        status word, else canopen_pkw.
     :raises ImportFailed: it is none, or the library is missing.
     """
     library = canopen_library()
-    sections = take_apart(text)
-    if not sections.objects:
+    found = Found()
+    sections = _take_apart(text, found)
+    indices = sorted({match[1] for match in map(_OBJECT.fullmatch, sections) if match})
+    if not indices:
         raise ImportFailed('is no EDS or DCF file: it has no section of an object, like [1000]')
-    found = Found(description=_description(sections))
-    found.left_out += sections.doubles
-    found.oddities += sections.broken
-    reader = _ObjectReader(library, sections, found)
-    for index in sorted({index for index, _ in sections.objects}):
+    info = sections.get('deviceinfo', Section('', 0))
+    found.description = one_line(f'{info.get("VendorName")} {info.get("ProductName")}')
+    controlled = {f'{index:04x}' for index in _BUILT_IN} <= sections.keys()
+    found.protocols = ('cia402' if controlled else 'canopen_pkw',)
+    standard = (tuple(protocols) or found.protocols) == ('cia402',)
+    reader = _ObjectReader(library, sections, found, bytes_stay=standard)
+    for index in indices:
         reader.read(index)
-    for index, place in sections.listed():
-        if (index, None) not in sections.objects:
-            found.left_out.append(LeftOut(place, f'{index:04X}h', f'section [{index:04X}] is '
-                                                                  'missing'))
+    for name in ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects'):
+        for key, value in sections.get(name, Section('', 0)).values.items():
+            listed = re.fullmatch('0x([0-9a-f]{1,4})', value.lower())
+            if key.isdecimal() and listed and f'{int(listed[1], 16):04x}' not in sections:
+                found.left_out.append(sections[name].lost(
+                    f'section [{int(listed[1], 16):04X}] is missing'))
     if reader.counts:
         found.notes.append(f'{reader.counts} sub-indices 0 left out: they hold the number of '
                            'entries')
+    if standard:
+        _standardise(found, {index: _si_unit(sections.get(index, info))
+                             for index in ('60a8', '60a9')})
     return found
-
-
-def _description(sections: Sections) -> str:
-    info = sections.others.get('deviceinfo')
-    words = [info.get('VendorName'), info.get('ProductName')] if info is not None else []
-    return one_line(' '.join(filter(None, words)))
 
 
 class _ObjectReader:
     """Reads one object after the other."""
 
-    def __init__(self, library: ModuleType, sections: Sections, found: Found) -> None:
+    def __init__(self, library: ModuleType, sections: dict[str, Section], found: Found, *,
+                 bytes_stay: bool) -> None:
         self._library = library
         self._sections = sections
         self._found = found
+        self._types = tuple(_TYPES[code] for code in (1, 2, 3, 4, 5, 6, 7)
+                            if bytes_stay or code not in (2, 5))
         self.counts = 0
 
-    def read(self, index: int) -> None:
+    def read(self, index: str) -> None:
         """Read an object with all its sub-indices."""
-        head = self._sections.objects.get((index, None))
-        subs = sorted(sub for each, sub in self._sections.objects
-                      if each == index and sub is not None)
+        head = self._sections.get(index)
+        subs = [section for name, section in self._sections.items()
+                if name.startswith(f'{index}sub') and _OBJECT.fullmatch(name)]
         if head is None:
-            for sub in subs:
-                section = self._sections.objects[index, sub]
-                self._leave_out(section, f'section [{index:04X}] is missing')
+            reason = f'section [{index.upper()}] is missing'
+            self._found.left_out += [section.lost(reason) for section in subs]
             return
+        reason = f'[{head.name}] in line {head.line} cannot be understood'
         try:
             entry = self._understood(index, head)
             if not hasattr(entry, 'subindices'):
                 self._take(head, entry)
-                return
+            elif head.get('CompactSubObj'):
+                self._read_compact(index, head)
         except (*_ERRORS, Unusable) as error:
-            self._leave_out(head, _words(error, head))
-            for sub in subs:
-                self._leave_out(self._sections.objects[index, sub],
-                                f'[{index:04X}] in line {head.line} cannot be understood')
+            self._found.left_out.append(head.lost(_words(error)))
+            self._found.left_out += [section.lost(reason) for section in subs]
             return
-        for sub in subs:
-            self._read_sub(index, sub, head)
-        if head.get('CompactSubObj'):
-            self._read_compact(index, head)
-        else:
-            self._check_count(index, head, subs)
+        for section in subs if hasattr(entry, 'subindices') else ():
+            try:
+                record = self._understood(index, head, section)
+                number = int(section.name[7:], 16)
+                if not number and record[0].data_type == 0x05:
+                    self.counts += 1
+                    continue
+                self._take(section, record[number], parent=entry.name)
+            except (*_ERRORS, Unusable) as error:
+                self._found.left_out.append(section.lost(_words(error)))
 
-    def _read_sub(self, index: int, sub: int, head: Section) -> None:
-        section = self._sections.objects[index, sub]
-        try:
-            entry = self._understood(index, head, section)
-            if sub == 0 and entry[0].data_type == 0x05:
-                self.counts += 1
-                return
-            self._take(section, entry[sub], parent=entry.name)
-        except (*_ERRORS, Unusable) as error:
-            self._leave_out(section, _words(error, section))
+    def _read_compact(self, index: str, head: Section) -> None:
+        count = int(head.get('CompactSubObj'), 0)
+        if not 0 <= count <= 0xFE:
+            raise Unusable(f'CompactSubObj {count} is out of range')
+        entry = self._understood(index, head)
+        names = self._sections.get(f'{index}name')
+        # with names the library calls the others after the first one
+        named = self._understood(index, head, *[names] if names is not None else ())
+        for number in range(1, count + 1):
+            self._take(head, (named if number in named.subindices else entry)[number],
+                       parent=entry.name)
 
-    def _read_compact(self, index: int, head: Section) -> None:
-        try:
-            count = int(head.get('CompactSubObj'), 0)
-            if not 0 <= count <= _ELEMENTS_MAX:
-                raise Unusable(f'CompactSubObj {count} is out of range')
-            entry = self._understood(index, head)
-            # with names the library calls the others after the first one
-            named = self._understood(index, head, self._sections.names.get(index))
-            for sub in range(1, count + 1):
-                self._take(head, (named if sub in named.subindices else entry)[sub],
-                           parent=entry.name)
-        except (*_ERRORS, Unusable) as error:
-            self._leave_out(head, _words(error, head))
-
-    def _check_count(self, index: int, head: Section, subs: list[int]) -> None:
-        """Say when there are fewer sub-indices than the object says it has."""
-        try:
-            count = int(head.get('SubNumber') or '0', 0)
-        except ValueError:
-            self._wonder(head, f"SubNumber '{head.get('SubNumber')}' is no number")
-            return
-        if count > len(subs):
-            missing = count - len(subs)
-            self._wonder(head, f'{missing} of {count} sections [{index:04X}sub…] '
-                               f'{"is" if missing == 1 else "are"} missing')
-
-    def _understood(self, index: int, *sections: Section | None) -> Any:
+    def _understood(self, index: str, *sections: Section) -> Any:
         """Let the library read an object."""
         parts = ['[DeviceInfo]\n']
         for section in sections:
-            if section is not None:
-                parts += [part.text(_SPELLINGS) for part in (section, *self._own_type(section))]
-        source = io.StringIO(''.join(parts))
-        return self._library.import_eds(source, node_id=None)[index]
-
-    def _own_type(self, section: Section) -> Iterator[Section]:
-        """Yield what defines the type of a section, where it is not one of the standard."""
-        try:
-            number = int(section.get('DataType') or '0', 0)
-        except ValueError:
-            return
-        if number in _OWN_TYPES:
-            for name in (f'{number:x}', f'{number:x}sub1'):
-                other = self._sections.others.get(name)
-                if other is not None:
-                    yield Section(other.name.upper().replace('SUB', 'sub'), other.line,
-                                  other.values, other.lines)
+            _check_numbers(section)
+            parts.append(section.text())
+            # a type of an object's own, as some editors make for limits
+            own = self._sections.get(f'{int(section.get("DataType") or "0", 0):x}sub1')
+            if own is not None:
+                own.name = own.name.upper().replace('SUB', 'sub')
+                parts.append(own.text())
+        return self._library.import_eds(io.StringIO(''.join(parts)), node_id=None)[int(index, 16)]
 
     def _take(self, section: Section, variable: Any, parent: str = '') -> None:
         """
@@ -194,48 +238,54 @@ class _ObjectReader:
 
         :raises Unusable: it has no place in a profile.
         """
-        kind = _TYPES.get(variable.data_type)
-        if kind is None:
-            name = _TYPE_NAMES.get(variable.data_type, f'data type {variable.data_type:04X}h')
-            raise Unusable(f'{name} is none of the types of 16 or 32 bits')
+        kind = _TYPES.get(variable.data_type, f'data type {variable.data_type:04X}h')
+        if kind not in self._types:
+            raise Unusable(f'{kind} is none of the types of '
+                           f'{"8, " if "uint8" in self._types else ""}16 or 32 bits')
         entry: dict[str, Any] = {
             'index': variable.index, 'subindex': variable.subindex, 'type': kind,
             'access': access_of(variable.access_type)}
-        remarks: list[str] = []
-        scale = self._scale(section, variable)
-        if kind == 'bool':
-            scale = 1.0
-        else:
+        if kind != 'bool':
+            scale = rounded(float(variable.factor))
             entry.update(_limits(section, variable, scale))
-            if unit(str(getattr(variable, 'unit', ''))):
-                entry['unit'] = unit(str(variable.unit))
-            if scale != 1.0:
-                entry['scale'] = scale
-        storage = _storage(str(variable.storage_location or ''))
-        if storage and entry['access'] != 'ro':
-            entry['storage'] = storage
-        if variable.index in _COMMUNICATION and entry['access'] != 'ro':
+            entry.update({'scale': scale} if scale != 1.0 else {})
+            unit_text = unit(str(getattr(variable, 'unit', '')))
+            entry.update({'unit': unit_text} if unit_text else {})
+        writable = entry['access'] != 'ro'
+        storage = str(variable.storage_location or '').upper()
+        if writable and storage.startswith(('RAM', 'PERSIST', 'EEPROM', 'NVM', 'FLASH')):
+            entry['storage'] = 'ram' if storage.startswith('RAM') else 'eeprom'
+        if writable and variable.index in _COMMUNICATION:
             entry['protected'] = True
         # the library calls an element of a record by both names
         own = one_line(str(variable.name).rpartition('.')[2] if parent else str(variable.name))
         title = f'{one_line(parent)} {own}' if parent and parent not in own else own
         extra = one_line(str(getattr(variable, 'description', '') or ''))
         entry['description'] = '; '.join(filter(None, (title, extra)))
-        self._found.drafts.append(Draft(Place(section.line, f'[{section.name}]'), title, entry,
-                                        remarks))
+        self._found.drafts.append(Draft(section.line, f'[{section.name}]', title, entry))
 
-    def _scale(self, section: Section, variable: Any) -> float:
-        if section.get('Factor') and float(section.get('Factor')) != variable.factor:
-            raise Unusable(f"Factor '{section.get('Factor')}' is no number")
-        return float(variable.factor)
 
-    def _leave_out(self, section: Section, reason: str) -> None:
-        self._found.left_out.append(
-            LeftOut(section.place, one_line(section.get('ParameterName')), reason))
+def _check_numbers(section: Section) -> None:
+    """
+    Look at what the library passes over in silence, or has no words for.
 
-    def _wonder(self, section: Section, reason: str) -> None:
-        self._found.oddities.append(
-            LeftOut(section.place, one_line(section.get('ParameterName')), reason))
+    :raises Unusable: a key is missing or no number.
+    """
+    for key in ('ObjectType', 'DataType', 'CompactSubObj', 'PDOMapping', 'Factor'):
+        value = section.get(key)
+        try:
+            if key.lower() in section.values:
+                float(value) if key == 'Factor' else int(value, 0)
+        except ValueError:
+            raise Unusable(f"{key} '{value}' is no number" if value else f'{key} is empty') \
+                from None
+
+
+def _words(error: Exception) -> str:
+    """Say what is wrong with a section, whatever the library called it."""
+    if isinstance(error, configparser.NoOptionError):
+        return f'{error.option} is missing'
+    return str(error) if isinstance(error, Unusable) else 'is no object that can be understood'
 
 
 def _limits(section: Section, variable: Any, scale: float) -> dict[str, float]:
@@ -250,35 +300,83 @@ def _limits(section: Section, variable: Any, scale: float) -> dict[str, float]:
         if section.get(key) and limit is None:
             raise Unusable(f"{key} '{section.get(key)}' is no number")
         if limit is not None:
-            found[name] = float(f'{limit * scale:.12g}')
-    ends = [limit for limit in (variable.min, variable.max) if limit is not None]
-    if len(ends) == 2 and ends[0] > ends[1]:
-        raise Unusable(f'LowLimit {ends[0]} is above HighLimit {ends[1]}')
+            found[name] = rounded(limit * scale)
+    if variable.min is not None and variable.max is not None and variable.min > variable.max:
+        raise Unusable(f'LowLimit {variable.min} is above HighLimit {variable.max}')
     return found
 
 
-def _storage(location: str) -> str:
-    """Return where a value is kept, as far as the names in use say it."""
-    word = location.upper()
-    if word == 'RAM':
-        return 'ram'
-    kept = ('PERSIST', 'EEPROM', 'NVM', 'FLASH')
-    return 'eeprom' if word.startswith(kept) else ''
+# -- CiA 402 --------------------------------------------------------------------------------------
 
 
-def _words(error: Exception, section: Section) -> str:
-    """Say what is wrong with a section, whatever the library called it."""
-    if isinstance(error, Unusable):
-        return str(error)
-    if isinstance(error, configparser.NoOptionError):
-        return f'{error.option} is missing'
-    for key in ('ObjectType', 'DataType', 'SubNumber', 'CompactSubObj', 'PDOMapping', 'Factor'):
-        value = section.get(key)
-        try:
-            if key.lower() in section.values:
-                float(value) if key == 'Factor' else int(value, 0)
-        except ValueError:
-            return f"{key} '{value}' is no number" if value else f'{key} is empty'
-    if isinstance(error, (KeyError, AttributeError, TypeError)):
-        return 'is no object that can be understood'
-    return one_line(str(error)) or 'is no object that can be understood'
+def _si_unit(section: Section) -> tuple[str, float] | None:
+    """Return the unit that 60A8h or 60A9h names in the file, and how many of it a step is."""
+    text = section.get('ParameterValue') or section.get('DefaultValue')
+    try:
+        value = int(text, 0)
+    except ValueError:
+        return None
+    name, count = _SI_UNITS.get(value >> 8 & 0xFFFF, ('', 0.0))
+    exponent = value >> 24 & 0xFF
+    return (name, count * 10.0 ** (exponent - (exponent & 0x80) * 2)) if name else None
+
+
+def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> None:
+    """Call standard objects by their names, and say what is known of them."""
+    shipped = check(profiles_directory() / f'{_STANDARD}.yaml')
+    known = {(entry['index'], entry['subindex']): name for name, entry in shipped.entries.items()}
+    found.drafts = [draft for draft in found.drafts if draft.entry['index'] not in _BUILT_IN]
+    for draft in found.drafts:
+        draft.name = known.get((draft.entry['index'], draft.entry['subindex']), '')
+    names = {draft.name for draft in found.drafts}
+    raw = [draft for draft in found.drafts if not _complete(draft, shipped, units, names)]
+    standard = [draft.name for draft in raw if draft.name]
+    others = sum(not draft.name and draft.entry['index'] not in _COMMUNICATION for draft in raw)
+    found.notes.append(f'CiA 402: {len(names - {""})} standard objects have the names of the '
+                       f'profile {_STANDARD}; control word and status word are built in')
+    if standard:
+        found.notes.append(f'raw, because their unit is the maker\'s own: {", ".join(standard)}; '
+                           'scale and unit stand in the manual')
+    if others:
+        found.notes.append(f'{others} objects of the maker have no unit in the file: they are raw')
+    if 'store_parameters' in names:
+        found.sections['restore'] = shipped.loaded.tree.data['restore']
+    if 'fault_code' in names:
+        found.sections['fault'] = shipped.loaded.tree.data['fault']
+
+
+def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float] | None],
+              names: set[str]) -> bool:
+    """Add to an entry what the standard says of it; return whether its unit is known."""
+    entry, known = draft.entry, shipped.entries.get(draft.name, {})
+    if entry['access'] != 'ro':
+        entry['storage'] = 'ram'    # until 1010h stores it
+    if known.get('access') == 'wo':
+        entry['access'] = 'wo'
+    entry.update({key: known[key] for key in _MEANING if key in known})
+    scale, name = known.get('scale', 1.0), known.get('unit', '')
+    if 'unit' in entry or not name:
+        has_unit = 'unit' in entry or bool(draft.name)
+        name, factor = entry.get('unit', ''), 1.0
+    elif known['verified']:
+        has_unit, factor = True, scale
+    else:
+        said = units['60a9' if name == 'rpm' else '60a8'] if name in ('rev', 'rpm') else None
+        has_unit, (name, factor) = said is not None, said or ('', 1.0)
+        draft.remarks.append(
+            "raw: its unit is the maker's own, and the file does not say it" if said is None else
+            f'scale and unit as {"60A9h" if name.endswith(("rpm", "/s")) else "60A8h"} stands in '
+            'the file')
+    if name:
+        entry['unit'] = name
+        for key in ('minimum', 'maximum'):
+            if key in entry:
+                entry[key] = rounded(entry[key] * factor)
+        if factor != 1.0:
+            entry['scale'] = rounded(entry.get('scale', 1.0) * factor)
+    if known.get('neutral_from') in names:
+        entry['arming_tolerance'] = rounded(known['arming_tolerance'] / scale
+                                            * entry.get('scale', 1.0))
+    elif entry.pop('neutral_from', None) is not None:
+        draft.remarks.append(f'neutral_from left out: the file has no {known["neutral_from"]}')
+    return has_unit

@@ -11,6 +11,9 @@ Names for parameters, made from free text by one rule (docs/profiles.md has it w
    raw parameter, or is a word that YAML takes for something else).
 6. Of several equal names the one with the lowest address keeps it; the others get their number
    behind.
+
+Units that a joint converts get the spelling of :mod:`drive_can_bridge.core.units`, a few others
+the usual one; every other unit stays as it was written.
 """
 
 from collections.abc import Iterable
@@ -18,21 +21,65 @@ import re
 import unicodedata
 
 from drive_can_bridge.configuration.profile_check import RAW_NAME, RESERVED
-from drive_can_bridge.profiles.text import YAML_WORDS
-from drive_can_bridge.profiles.units import known_unit
+from drive_can_bridge.profiles.text import one_line, YAML_WORDS
 
 LENGTH_MAX = 60
 
+#: spelling in the profile, then others, without case and spaces
+_UNITS = """
+rpm r/min rev/min 1/min min-1 min^-1 min⁻¹ u/min umin upm umdr/min umdr./min giri/min giri/minuto
+rpm tr/min
+rad/s rad/sec
+deg/s °/s grad/s gradi/s
+deg ° grad gradi degree degrees
+rev umdr umdr. umdrehungen umdrehung giri turns revolutions
+degC °c ℃ grdc gradc gradcelsius celsius
+% percent prozent percento
+Hz hertz
+s sec sec. sek sek. seconds sekunden secondi
+ms msec millisekunden
+us µs μs
+min min. minuten minutes minuti
+h std std. hours stunden ore
+V volt
+A ampere amp
+W watt
+ohm ω
+inc ink inkr inkremente increments counts
+rpm/s 1/min/s
+"""
+#: those that need no other spelling
+_PLAIN = 'rad kHz mV mA kW kWh kVA kvar kg mm m m/s mm/s bar Hz/s V/Hz'
+_SPELLINGS = {other.lower(): words.split()[0] for words in (
+    *_UNITS.strip().splitlines(), *_PLAIN.split()) for other in words.split()}
+#: where upper and lower case matter: newton metres are no nanometres
+_EXACT = {'Nm': 'N m', 'N·m': 'N m', 'N*m': 'N m', 'Ω': 'ohm', 'kΩ': 'kohm', 'mΩ': 'mohm',
+          **{each: each for each in ('N m', 'N', 'kN', 'K', 'F', 'H', 'mH')}}
+_NO_UNIT = frozenset('- -- – — / 1 n/a na none ohne keine nessuna [-] (-)'.split()) | {''}
+#: a unit at the end: in brackets, behind a comma or "in", or a sign
+_ENDS = (re.compile(r'\s*[\[(]([^\[\]()]{1,20})[\])]\s*$'),
+         re.compile(r'(?:,|\s/|\bin)\s*([^\s,]{1,12})\s*$', re.IGNORECASE),
+         re.compile(r'\s*(°\s?C|℃|°|%)\s*$'))
 _LETTERS = str.maketrans({
     'ä': 'ae', 'ö': 'oe', 'ü': 'ue', 'Ä': 'Ae', 'Ö': 'Oe', 'Ü': 'Ue', 'ß': 'ss', 'ẞ': 'SS',
     'æ': 'ae', 'Æ': 'Ae', 'ø': 'oe', 'Ø': 'Oe', 'å': 'aa', 'Å': 'Aa', 'œ': 'oe', 'Œ': 'Oe',
-    'ð': 'd', 'Ð': 'D', 'þ': 'th', 'Þ': 'Th', 'ł': 'l', 'Ł': 'L', 'đ': 'd', 'Đ': 'D',
-    'ı': 'i', 'µ': 'micro', '²': '2', '³': '3', "'": '', '’': '', '`': '', '´': '',
-})
-_BRACKETED = re.compile(r'\s*[\[(]([^\[\]()]{1,20})[\])]\s*$')
-_TRAILING = re.compile(r'(?:,|\s/|\bin)\s*([^\s,]{1,12})\s*$', re.IGNORECASE)
-_SYMBOL = re.compile(r'\s*(°\s?C|℃|°|%)\s*$')
+    'ł': 'l', 'Ł': 'L', 'ı': 'i', 'µ': 'micro', '²': '2', '³': '3',
+    **dict.fromkeys("'’`´", '')})
 _BOUNDARY = re.compile(r'(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])')
+
+
+def known_unit(text: str) -> str | None:
+    """Return the profile's spelling of a unit; None: it is not known as one."""
+    plain = one_line(text).strip('[]() ')
+    return _EXACT.get(plain) or _SPELLINGS.get(plain.lower().replace(' ', ''))
+
+
+def unit(text: str) -> str:
+    """Return the unit of a cell as it goes into the profile; '' for none."""
+    plain = one_line(text)
+    if plain.lower() in _NO_UNIT:
+        return ''
+    return known_unit(plain) or plain.strip('[]() ')
 
 
 def split_unit(text: str) -> tuple[str, str]:
@@ -42,7 +89,7 @@ def split_unit(text: str) -> tuple[str, str]:
     >>> split_unit('Ramp time [s]'), split_unit('Position (set 2)')
     (('Ramp time', 's'), ('Position (set 2)', ''))
     """
-    for pattern in (_BRACKETED, _TRAILING, _SYMBOL):
+    for pattern in _ENDS:
         match = pattern.search(text)
         found = known_unit(match[1]) if match else None
         if match and found and text[:match.start()].strip():
@@ -60,39 +107,27 @@ def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -
     >>> name_of('Beschleunigungszeit (Rampe 1) [s]')
     'beschleunigungszeit_rampe_1'
     """
-    words = _words(split_unit(text)[0])
-    name = ''
-    for word in words:
-        longer = f'{name}_{word}' if name else word
-        if len(longer) > LENGTH_MAX:
-            break
-        name = longer
-    if not name:
-        name = words[0][:LENGTH_MAX] if words else ''
+    name = '_'.join(_words(split_unit(text)[0]))
+    if len(name) > LENGTH_MAX:
+        cut = name[:LENGTH_MAX + 1]
+        name = cut.rpartition('_')[0] or cut[:LENGTH_MAX]
     if not name or not name[0].isalpha():
-        name = '_'.join(part for part in ('parameter', name or address) if part)
+        name = '_'.join(filter(None, ('parameter', name or address)))
     if name in RESERVED | taken | YAML_WORDS or RAW_NAME.fullmatch(name):
         name += '_value'
     return name
 
 
 def _words(text: str) -> list[str]:
-    plain = []
-    for letter in unicodedata.normalize('NFC', text).translate(_LETTERS):
-        for part in unicodedata.normalize('NFKD', letter):
-            if part.isascii():
-                plain.append(part)
-            elif unicodedata.category(part) == 'Mn':
-                continue
-            else:
-                plain.append(f' {_greek(part)} ')
-    return re.findall('[a-z0-9]+', _BOUNDARY.sub(' ', ''.join(plain)).lower())
-
-
-def _greek(letter: str) -> str:
-    """Return the name of a Greek letter; nothing for any other."""
-    words = unicodedata.name(letter, '').split()
-    return words[3].lower() if words[:1] == ['GREEK'] and len(words) > 3 else ''
+    plain = ''
+    for part in unicodedata.normalize('NFKD', unicodedata.normalize('NFC', text).translate(
+            _LETTERS)):
+        if part.isascii():
+            plain += part
+        elif unicodedata.category(part) != 'Mn':
+            words = unicodedata.name(part, '').split()
+            plain += f' {words[3].lower() if words[:1] == ["GREEK"] and len(words) > 3 else ""} '
+    return re.findall('[a-z0-9]+', _BOUNDARY.sub(' ', plain).lower())
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:
@@ -101,14 +136,10 @@ def unique(names: Iterable[tuple[str, str]]) -> list[str]:
 
     :param names: (name, address), lowest address first; addresses are digits and ``_``.
     """
-    names = list(names)
-    taken: set[str] = set()
-    made = []
+    made: dict[str, None] = {}
     for name, address in names:
         # addresses are unique per number and sub-index; a name may end like one by chance
-        choice = name
-        while choice in taken:
-            choice = f'{choice}_{address or "2"}'
-        taken.add(choice)
-        made.append(choice)
-    return made
+        while name in made:
+            name = f'{name}_{address or "2"}'
+        made[name] = None
+    return list(made)

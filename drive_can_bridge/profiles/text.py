@@ -15,58 +15,39 @@ from drive_can_bridge.configuration.scalars import read_scalar
 
 WIDTH = 99
 #: keys of an entry, in the order in which they are written; each group begins a line
-GROUPS = (
+_GROUPS = (
     ('number', 'index', 'subindex', 'type', 'scale', 'offset', 'unit', 'access', 'storage',
      'minimum', 'maximum', 'neutral', 'neutral_from', 'limit', 'arming_tolerance', 'word_order',
      'protected'),
-    ('description',),
-    ('bits',),
-    ('values',),
-    ('source', 'verified', 'open'),
-)
+    ('description',), ('bits',), ('values',), ('source', 'verified', 'open'))
 _ROOM = WIDTH - 6
 #: keeps name and value of a bit on one line
 _TIED = ':\N{NO-BREAK SPACE}'
-
 _PLAIN = re.compile(r'[A-Za-z](?:[A-Za-z0-9_./() %-]*[A-Za-z0-9_/)%])?', re.ASCII)
 #: plain words that some YAML parser takes for something else than text
-YAML_WORDS = frozenset(('null', 'true', 'false', 'yes', 'no', 'on', 'off', 'y', 'n', 'nan', 'inf',
-                    'infinity'))
+YAML_WORDS = frozenset('null true false yes no on off y n nan inf infinity'.split())
 
 
 def one_line(text: str) -> str:
     """Return a text without line breaks, control characters and superfluous space."""
-    spaced = ''.join(each if each.isprintable() else ' ' for each in text)
-    return ' '.join(spaced.split())
+    return ' '.join(''.join(each if each.isprintable() else ' ' for each in text).split())
 
 
-def scalar(value: Any, key: str = '', *, hexadecimal: bool = False) -> str:
-    """
-    Write a scalar as YAML.
-
-    :param key: index, and the sub-index of an entry with index, are written as CANopen writes
-        them.
-    """
+def scalar(value: Any) -> str:
+    """Write a scalar as YAML."""
     if isinstance(value, bool):
-        return 'true' if value else 'false'
-    if isinstance(value, int):
-        if hexadecimal and key in ('index', 'subindex'):
-            return f'0x{value:04X}' if key == 'index' else f'0x{value:02X}'
-        return str(value)
+        return str(value).lower()
     if isinstance(value, float):
-        return _number(value)
+        if value.is_integer() and abs(value) < 1e15:
+            return str(int(value))
+        mantissa, mark, exponent = repr(value).partition('e')
+        # YAML 1.1 wants a point in front of an exponent
+        return repr(value) if not mark or '.' in mantissa else f'{mantissa}.0e{exponent}'
+    if isinstance(value, int):
+        return str(value)
     text = one_line(str(value))
     plain = _PLAIN.fullmatch(text) and text.lower() not in YAML_WORDS and read_scalar(text) == text
     return text if plain else "'" + text.replace("'", "''") + "'"
-
-
-def _number(value: float) -> str:
-    if value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    text = repr(value)
-    mantissa, mark, exponent = text.partition('e')
-    # YAML 1.1 wants a point in front of an exponent
-    return text if not mark or '.' in mantissa else f'{mantissa}.0e{exponent}'
 
 
 def entry_lines(name: str, entry: Mapping[str, Any], remarks: Iterable[str] = ()) -> list[str]:
@@ -75,22 +56,18 @@ def entry_lines(name: str, entry: Mapping[str, Any], remarks: Iterable[str] = ()
 
     :param remarks: written above it as comments.
     """
-    lines = [line for remark in remarks for line in comment(remark, indent='  ')]
-    hexadecimal = 'index' in entry
-    body: list[str] = []
-    for keys in GROUPS:
-        parts = [f'{key}: {_value(entry[key], key, hexadecimal=hexadecimal)},'
-                 for key in keys if key in entry]
-        body += _packed(parts)
-    body[-1] = body[-1].removesuffix(',')
-    return [*lines, f'  {name}:', f'    {{{body[0]}', *(f'     {line}' for line in body[1:-1]),
-            f'     {body[-1]}}}'] if len(body) > 1 else [*lines, f'  {name}: {{{body[0]}}}']
-
-
-def _value(value: Any, key: str, *, hexadecimal: bool) -> str:
-    if isinstance(value, Mapping):
-        return '{' + ', '.join(f'{name}: {scalar(each)}' for name, each in value.items()) + '}'
-    return scalar(value, key, hexadecimal=hexadecimal)
+    texts = {key: '{' + ', '.join(f'{each}: {scalar(what)}' for each, what in value.items()) + '}'
+             if isinstance(value, Mapping) else scalar(value) for key, value in entry.items()}
+    if 'index' in entry:    # as CANopen writes them
+        texts['index'] = f'0x{entry["index"]:04X}'
+        texts['subindex'] = f'0x{entry.get("subindex", 0):02X}'
+    body = [line for keys in _GROUPS
+            for line in _packed([f'{key}: {texts[key]},' for key in keys if key in texts])]
+    body = '\n     '.join(body).removesuffix(',').split('\n')
+    head = [line for remark in remarks for line in comment(remark, indent='  ')]
+    if len(body) == 1:
+        return [*head, f'  {name}: {{{body[0]}}}']
+    return [*head, f'  {name}:', f'    {{{body[0]}', *body[1:-1], f'{body[-1]}}}']
 
 
 def _packed(parts: list[str]) -> list[str]:
@@ -112,3 +89,11 @@ def comment(text: str, indent: str = '') -> list[str]:
     return textwrap.wrap(one_line(text), WIDTH, initial_indent=f'{indent}# ',
                          subsequent_indent=f'{indent}# ', break_long_words=False,
                          break_on_hyphens=False) or [f'{indent}#']
+
+
+def block(key: object, value: Any, indent: str = '') -> list[str]:
+    """Write nested mappings as YAML, a line a value."""
+    if not isinstance(value, Mapping):
+        return [f'{indent}{key}: {scalar(value)}']
+    lines = [line for name, each in value.items() for line in block(name, each, f'{indent}  ')]
+    return [f'{indent}{key}:', *lines, *[''] * (not indent)]

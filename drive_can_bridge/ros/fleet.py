@@ -18,7 +18,7 @@ from drive_can_bridge.core.words import counted
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.one_master import InUse, Ownership
 from drive_can_bridge.exchange.stop import stop_all
-from drive_can_bridge.process.presence import BRIDGE, Presence
+from drive_can_bridge.process.locks import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.absence import Attendance

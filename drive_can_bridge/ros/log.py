@@ -13,7 +13,7 @@ from typing import Any
 
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.process.taking import MOMENT, Taking
+from drive_can_bridge.process.standard_outputs import MOMENT, Taking
 from drive_can_bridge.ros.log_limit import Level, LogLimit, Speaker
 
 #: lines that may wait

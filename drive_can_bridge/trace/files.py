@@ -4,9 +4,14 @@ Trace files: which formats there are, what each of them loses, reading and writi
 
 Formats are python-can's, by suffix; candump's texts have a reader and writer of their own
 (:mod:`.candump`). What is damaged is told and left out: one line does not cost a trace.
+
+Which bus of a parameter file a trace means by its channel.
+
+Files that traces and tables are written to: whatever goes wrong, it is known with which one.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from errno import EIO
 import gzip
 import io
 import itertools
@@ -17,10 +22,138 @@ from typing import Any, TextIO
 
 import can
 
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.trace import candump
-from drive_can_bridge.trace.output import Database, open_binary, open_text
 from drive_can_bridge.transport.messages import message_of, record_of
+
+
+def labels(buses: Iterable[BusConfiguration]) -> dict[str, str]:
+    """
+    Return what buses, by name, are called in a trace: as candump calls them, or by their names.
+
+    By its name also a bus whose channel would be taken for another one.
+    """
+    known = list(buses)
+    found = {}
+    for bus in known:
+        channel = str(bus.channel)
+        taken = any(channel in (other.name, str(other.channel)) for other in known
+                    if other is not bus)
+        found[bus.name] = channel if bus.interface == 'socketcan' and not taken else bus.name
+    return found
+
+
+class Channels:
+    """
+    Finds buses by the channels of a trace.
+
+    A word is the name of a bus; if none has it, its channel. A number is its place in the file.
+    The one bus of a file that has only one is meant by a trace without channels, too, and by the
+    first channel of another name that turns up.
+    """
+
+    def __init__(self, buses: Sequence[BusConfiguration]) -> None:
+        self._buses = list(buses)
+        self._found: dict[str | int, BusConfiguration | None] = {}
+        self._adopted = False
+
+    def find(self, channel: str | int) -> BusConfiguration | None:
+        """Return the bus; None: it is not in the file."""
+        if channel not in self._found:
+            self._found[channel] = self._look(channel)
+        return self._found[channel]
+
+    def _look(self, channel: str | int) -> BusConfiguration | None:
+        for meant in ('name', 'channel'):
+            for bus in self._buses:
+                if channel == str(getattr(bus, meant)):
+                    self._adopted = True
+                    return bus
+        if len(self._buses) == 1:
+            if self._adopted and channel != '':
+                return None
+            self._adopted = channel != ''
+            return self._buses[0]
+        if isinstance(channel, int) and 0 <= channel < len(self._buses):
+            return self._buses[channel]
+        return None
+
+
+#: s between two looks whether a database is written
+_LOOK_PERIOD = 0.02
+
+
+class _NamedFile(io.FileIO):
+    """Errors of a write have no name, and a write may come late, out of a buffer."""
+
+    def write(self, data: Any) -> int:
+        """Write, or raise an error that says where to."""
+        try:
+            return super().write(data)
+        except OSError as error:
+            error.filename = self.name
+            raise
+
+
+def open_binary(path: Path) -> io.BufferedWriter:
+    """Open a new file for bytes."""
+    return io.BufferedWriter(_NamedFile(str(path), 'w'))
+
+
+def open_text(path: Path, newline: str | None = None) -> io.TextIOWrapper:
+    """Open a new file for text."""
+    return io.TextIOWrapper(open_binary(path), encoding='utf-8', newline=newline)
+
+
+class Database(can.SqliteWriter):
+    """A database as python-can writes it, whose failure is known outside of its thread."""
+
+    _failure: Exception | None = None
+
+    def __init__(self, path: Path) -> None:
+        # else python-can adds to it, and sqlite undoes in it what was under way in the last one
+        for each in (path, path.with_name(f'{path.name}-journal')):
+            each.unlink(missing_ok=True)
+        self._path = path
+        self._taken = 0
+        super().__init__(str(path))
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """Take a frame, to be written later."""
+        self._taken += 1
+        super().on_message_received(msg)
+
+    def check(self) -> None:
+        """
+        Look whether frames can be written.
+
+        :raises OSError: not any more.
+        """
+        if self._failure is not None:
+            raise OSError(EIO, str(self._failure), str(self._path))
+
+    def stop(self) -> None:
+        """
+        Write the rest.
+
+        :raises OSError: not all is written.
+        """
+        # told to stop, the thread writes 500 more frames at most, whatever waits
+        while self.num_frames < self._taken and self._writer_thread.is_alive():
+            self._writer_thread.join(_LOOK_PERIOD)
+        super().stop()
+        self.check()
+        if self.num_frames < self._taken:
+            raise OSError(EIO, f'{self._taken - self.num_frames} frames are not written',
+                          str(self._path))
+
+    def _db_writer_thread(self) -> None:
+        try:
+            super()._db_writer_thread()
+        except Exception as error:  # noqa: BLE001  the outermost of a thread
+            self._failure = error
+
 
 #: suffixes of candump's texts; everything else is python-can's
 _CANDUMP = ('.log', '.txt', '.candump')
@@ -150,7 +283,7 @@ class _Lines:
         raise OSError('a trace is read only')
 
     def close(self) -> None:
-        """Leave the file open: whoever opened it closes it."""
+        """Leave the file open: its opener closes it."""
 
 
 class _Heard(logging.Handler):

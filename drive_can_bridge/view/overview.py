@@ -12,13 +12,10 @@ import math
 from rich.table import Table
 from rich.text import Text
 
-from drive_can_bridge.monitor.reports import Level
 from drive_can_bridge.monitor.snapshot import (
-    BusSnapshot, DriveSnapshot, Shown, Snapshot, UNKNOWN,
+    BusSnapshot, DriveSnapshot, Level, Shown, Snapshot, UNKNOWN,
 )
-from drive_can_bridge.monitor.summary import (
-    counts_in_words, in_order, principal, troubles,
-)
+from drive_can_bridge.monitor.summary import counts_in_words, in_order, principal, troubles
 from drive_can_bridge.view.parts import (
     DIM, GAP, LEVEL_STYLES, Lines, milliseconds, NO_VALUE, plain_table, spark, state, times,
     TONE_STYLES, ValueColumns, wrapped,

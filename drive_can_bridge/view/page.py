@@ -4,10 +4,16 @@ A whole page, as large as the terminal: header, what was chosen, and the keys th
 
 Every part is told how many lines it may have. Drives come first; then what is not well, the buses,
 and as much of the log as there is room for.
+
+What the user has chosen to see, and what keys change about it.
+
+One drive in detail.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
+import math
 
 from rich.console import Group, RenderableType
 from rich.layout import Layout
@@ -15,15 +21,204 @@ from rich.table import Table
 from rich.text import Text
 
 from drive_can_bridge.core.words import counted
-from drive_can_bridge.monitor.hints import hints
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
-from drive_can_bridge.monitor.summary import in_order, silence, Tone
-from drive_can_bridge.view import detail
-from drive_can_bridge.view.keys import Choice, HINTS, Page
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, Times
+from drive_can_bridge.monitor.summary import hints, in_order, silence, Tone, tone_of
 from drive_can_bridge.view.overview import advice_lines, bus_lines, drives_table
 from drive_can_bridge.view.parts import (
-    clock, DIM, flow, Lines, log_lines, section, TONE_STYLES, wrapped,
+    clock, DIM, flow, lamps, Lines, log_lines, milliseconds, section, state, TONE_STYLES,
+    ValueColumns, wrapped,
 )
+
+
+class Page(Enum):
+    """What is shown."""
+
+    DRIVES = 'drives'
+    DRIVE = 'drive'
+    LOG = 'log'
+    HELP = 'help'
+
+
+class Key(Enum):
+    """A key that means something."""
+
+    UP = 'up'
+    DOWN = 'down'
+    NEXT_PAGE = 'next page'
+    PREVIOUS_PAGE = 'previous page'
+    OPEN = 'open'
+    BACK = 'back'
+    LOG = 'log'
+    HELP = 'help'
+    QUIT = 'quit'
+
+
+#: what terminals send
+_SEQUENCES = {
+    '\x1b[A': Key.UP, '\x1bOA': Key.UP, 'k': Key.UP, '\x1b[Z': Key.UP,
+    '\x1b[B': Key.DOWN, '\x1bOB': Key.DOWN, 'j': Key.DOWN, '\t': Key.DOWN,
+    '\x1b[6~': Key.NEXT_PAGE, ' ': Key.NEXT_PAGE, '\x1b[5~': Key.PREVIOUS_PAGE,
+    'b': Key.PREVIOUS_PAGE, '\r': Key.OPEN, '\n': Key.OPEN, '\x1b[C': Key.OPEN,
+    '\x1bOC': Key.OPEN, '\x1b': Key.BACK, '\x7f': Key.BACK, '\x08': Key.BACK,
+    '\x1b[D': Key.BACK, '\x1bOD': Key.BACK, 'l': Key.LOG, '?': Key.HELP,
+    'h': Key.HELP, 'q': Key.QUIT, 'Q': Key.QUIT,
+}
+_LONGEST = max(map(len, _SEQUENCES))
+
+#: the last line: what may be pressed here
+HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
+    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('l', 'log'),
+                  ('?', 'help'), ('q', 'quit')),
+    Page.DRIVE: (('↑↓', 'drive'), ('l', 'log'), ('esc', 'back'),
+                 ('?', 'help'), ('q', 'quit')),
+    Page.LOG: (('space', 'older'), ('b', 'newer'), ('esc', 'back'), ('?', 'help'), ('q', 'quit')),
+    Page.HELP: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
+}
+
+
+def keys_in(text: str) -> list[Key]:
+    """Return the keys in what was typed; what means nothing is left out."""
+    found = []
+    while text:
+        for length in range(min(_LONGEST, len(text)), 0, -1):
+            key = _SEQUENCES.get(text[:length])
+            if key is not None and (key is not Key.BACK or length > 1 or not _unknown(text)):
+                found.append(key)
+                break
+        else:
+            length = _unknown(text) or 1
+        text = text[length:]
+    return found
+
+
+def _unknown(text: str) -> int:
+    """Return how long an escape sequence is that nobody here knows; 0: it is none."""
+    if text[:2] not in ('\x1b[', '\x1bO'):
+        return 0
+    end = next((place for place in range(2, len(text)) if '@' <= text[place] <= '~'), None)
+    return len(text) if end is None else end + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """
+    What the user has chosen.
+
+    :param drive: full name of the drive that is marked, or shown; None before there is any.
+    :param screen: number of the screen of a long page, from 0.
+    """
+
+    page: Page = Page.DRIVES
+    drive: str | None = None
+    screen: int = 0
+
+    def among(self, drives: Sequence[str]) -> 'Choice':
+        """Return the same for these drives: one that has gone cannot be chosen."""
+        if self.drive in drives or (self.drive is None and not drives):
+            return self
+        return replace(self, drive=drives[0] if drives else None)
+
+    def press(self, key: Key, drives: Sequence[str]) -> 'Choice':
+        """Return what is chosen after a key."""
+        if key in (Key.UP, Key.DOWN):
+            if self.drive not in drives:
+                return self.among(drives)
+            step = 1 if key is Key.DOWN else -1
+            place = (drives.index(self.drive) + step) % len(drives)
+            return replace(self, drive=drives[place], screen=0)
+        if key is Key.NEXT_PAGE:
+            return replace(self, screen=self.screen + 1)
+        if key is Key.PREVIOUS_PAGE:
+            return replace(self, screen=max(0, self.screen - 1))
+        if key is Key.BACK:
+            return replace(self, page=Page.DRIVES, screen=0)
+        page = _PAGES.get(key)
+        return self if page is None else replace(self, page=page, screen=0)
+
+
+_PAGES = {Key.OPEN: Page.DRIVE, Key.LOG: Page.LOG, Key.HELP: Page.HELP}
+
+
+_TREND_MAX = 60
+#: of diagnostics, what is shown in other words
+_TOLD = {'state', 'exchanges', 'missed_exchanges', 'command_age_s', 'control_state',
+         *(f'{name}_{kind}_ms' for name in ('latency', 'period_error')
+           for kind in ('mean', 'p99', 'max'))}
+#: in keys of what is bad
+_BAD = ('error', 'failed', 'refused', 'rejected')
+
+
+def identity_lines(drive: DriveSnapshot, width: int) -> Lines:
+    """Say who it is, how it is, where, and what to do."""
+    place = drive.place
+    words = [Text(drive.name, style='bold'), state(drive)]
+    if drive.control:
+        words.append(Text(drive.control))
+    if place.bus:
+        words.append(Text(f'bus {place.bus}, station {place.station}'))
+        words.append(Text(place.protocol, style=DIM))
+    if not math.isnan(place.period):
+        words.append(Text(f'every {1e3 * place.period:g} ms', style=DIM))
+    words.append(Text(f'by {drive.bridge}', style=DIM))
+    lines = flow(words, width, 3)
+    if drive.level is not Level.OK:
+        lines += wrapped(drive.advice, width, TONE_STYLES[tone_of(drive)])
+    return lines
+
+
+def value_lines(drive: DriveSnapshot, width: int) -> Lines:
+    """Write setpoints and actual values with their trends."""
+    columns = ValueColumns([*drive.setpoints, *drive.values])
+    trend = min(_TREND_MAX, width - columns.width - 2)
+    trend = trend if trend >= 8 else 0
+    lines: Lines = []
+    for heading, items in (('setpoint, as sent', drive.setpoints), ('actual value', drive.values)):
+        if items:
+            lines.append(Text(heading, style=DIM))
+            lines += [columns.line(item, trend) for item in items]
+    return lines or [Text('no sample yet', style=DIM)]
+
+
+def bit_lines(drive: DriveSnapshot, width: int) -> Lines:
+    """Write the bits of all words."""
+    several = len(drive.bits) > 1
+    lines: Lines = []
+    for parameter, bits in drive.bits.items():
+        if several:
+            lines.append(Text(parameter, style=DIM))
+        lines += lamps(dict(sorted(bits.items())), width)
+    return lines
+
+
+def exchange_lines(drive: DriveSnapshot, width: int) -> Lines:
+    """Write how the exchange goes, and all else that diagnostics say."""
+    lines = [
+        Text(f'{drive.rate:.1f} exchanges/s, {drive.exchanges} in all, ').append(
+            f'{drive.missed} missed', style='bold yellow' if drive.missed else ''),
+        *_facts(drive, width, bad=True),
+        _times('period error', drive.period_error), _times('latency', drive.latency)]
+    if not math.isnan(drive.command_age):
+        lines.append(Text(f'last command {drive.command_age:.1f} s ago'))
+    return lines + _facts(drive, width, bad=False)
+
+
+def _facts(drive: DriveSnapshot, width: int, *, bad: bool) -> Lines:
+    """Write what has no line of its own: what is bad, or what is not."""
+    lines: Lines = []
+    for key, value in drive.facts.items():
+        if key in _TOLD or value in ('', '0') or bad != any(word in key for word in _BAD):
+            continue
+        label = key.replace('_', ' ')
+        text = wrapped(f'{label}: {value}', width)
+        text[0].stylize('bold yellow' if bad else DIM, 0, len(label) + 1)
+        lines += text
+    return lines
+
+
+def _times(label: str, found: Times) -> Text:
+    return Text(f'{label:12} {milliseconds(found.mean)} ms mean, {milliseconds(found.p99)} p99, '
+                f'{milliseconds(found.maximum)} max')
+
 
 #: from here on there is room for frames
 _BOXED = (100, 30)
@@ -210,15 +405,15 @@ def _cut(lines: Lines, height: int) -> Lines:
 
 
 def _drive(frame: _Frame, snapshot: Snapshot, drive: DriveSnapshot) -> None:
-    identity = detail.identity_lines(drive, frame.inner)
+    identity = identity_lines(drive, frame.inner)
     frame.add(f'drive {drive.label}', identity, len(identity))
     wide = frame.width >= _WIDE
     half = (frame.inner - 3) // 2 if wide else frame.inner
-    left = detail.value_lines(drive, half)
-    bits = detail.bit_lines(drive, half)
+    left = value_lines(drive, half)
+    bits = bit_lines(drive, half)
     if wide and bits:
         left += [Text(), Text('bits', style=DIM), *bits]
-    right = detail.exchange_lines(drive, half)
+    right = exchange_lines(drive, half)
     if wide:
         grid = Table.grid(padding=(0, 3, 0, 0))
         grid.add_column(width=half)

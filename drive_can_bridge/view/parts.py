@@ -17,9 +17,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from drive_can_bridge.monitor.history import columns
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, LogLine, Points, Shown, Times
+from drive_can_bridge.monitor.snapshot import (
+    columns, DriveSnapshot, Level, LogLine, Points, Shown, Times,
+)
 from drive_can_bridge.monitor.summary import Tone, tone_of
 
 DIM = 'bright_black'

@@ -7,9 +7,7 @@ from enum import Enum
 from drive_can_bridge.backup.document import Backup
 from drive_can_bridge.backup.plan import names_to_read, plan_restore
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
-from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome,
-)
+from drive_can_bridge.client.drive import Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Value

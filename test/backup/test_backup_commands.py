@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from backup_builders import BY_HAND, Shop
 import pytest
 
-from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.cli import restore
 from drive_can_bridge.cli.main import main
-from drive_can_bridge.client.direct_drive import DirectDrive
+from drive_can_bridge.client.direct import DirectDrive
 from drive_can_bridge.client.drive import WriteOutcome
 
 

@@ -7,8 +7,7 @@ from hypothesis import given, settings, strategies as st
 import pytest
 import yaml
 
-from drive_can_bridge.backup.document import Backup, Head, head_of, node_of, written
-from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.document import Backup, Head, head_of, node_of, read_backup, written
 from drive_can_bridge.client.drive import DriveFacts
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Parameter, ParameterType

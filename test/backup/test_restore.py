@@ -8,10 +8,10 @@ import time
 from backup_builders import Shop
 import pytest
 
+from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.backup.plan import (
     LeftAlone, names_to_read, plan_restore, problems_in, RestorePlan, strangers,
 )
-from drive_can_bridge.backup.reader import read_backup
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive
 

@@ -8,11 +8,10 @@ import sys
 
 import pytest
 
-from drive_can_bridge.cli import completion_script
+from drive_can_bridge.cli import completion as completion_script
 from drive_can_bridge.cli.arguments import above_zero, bitrate, of_drive, PARAMS_FILE, whole
 from drive_can_bridge.cli.command import WrongUsage
-from drive_can_bridge.cli.help import EXAMPLES, SUBCOMMANDS
-from drive_can_bridge.cli.main import main, understood
+from drive_can_bridge.cli.main import EXAMPLES, main, SUBCOMMANDS, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
 
@@ -110,7 +109,7 @@ def test_the_file_of_the_environment_stands_for_the_option_where_no_bridge_is_as
     ('compare', 'a'), ('restore', 'a', 'b', 'c')])
 def test_wrong_usage_is_told_before_a_bridge_is_looked_for(
         words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'drive_can_bridge.client.bridged.source', None)
+    monkeypatch.setitem(sys.modules, 'drive_can_bridge.ros.client.drives', None)
     try:
         code = main(words)
     except SystemExit as ended:

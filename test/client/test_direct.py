@@ -16,8 +16,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.client import find_source, open_drives
-from drive_can_bridge.client.conversation import AnotherMaster
-from drive_can_bridge.client.direct import LISTEN
+from drive_can_bridge.client.direct import AnotherMaster, LISTEN
 from drive_can_bridge.client.drive import Drives, Enabled
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
 from drive_can_bridge.core.roles import Role

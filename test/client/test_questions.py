@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from drive_can_bridge.cli.questions import answered
+from drive_can_bridge.cli.command import answered
 
 
 @pytest.fixture(name='keyboard')

@@ -14,7 +14,7 @@ import yaml
 from drive_can_bridge.configuration import schema
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.problems import Tree
-from drive_can_bridge.configuration.schema_check import check_schema
+from drive_can_bridge.configuration.schema import check_schema
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import share_directory
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.configuration.writing import of_one_bus, write_parameter_file
+from drive_can_bridge.configuration.load import (
+    configuration_from_file, of_one_bus, write_parameter_file,
+)
 from drive_can_bridge.resources import config_file
 
 TWO_BUSES = """

@@ -6,8 +6,7 @@ import math
 
 from drive_can_bridge.core.parameters import ValueKind
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.reports import Status
-from drive_can_bridge.monitor.snapshot import Place, Snapshot
+from drive_can_bridge.monitor.snapshot import Place, Snapshot, Status
 from drive_can_bridge.monitor.values import ParameterInfo
 
 #: the time at which golden pages are looked at: a steady clock, and 12:34:56 UTC

@@ -11,10 +11,9 @@ from monitor_builders import (
 )
 import pytest
 
-from drive_can_bridge.monitor.lines import balance, line, Lines
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.reports import Level, read_status, Status
-from drive_can_bridge.monitor.snapshot import Place
+from drive_can_bridge.monitor.snapshot import Level, Place, read_status, Status
+from drive_can_bridge.monitor.summary import balance, line, Lines
 
 
 def test_diagnostics_tell_of_bridges_buses_and_drives_in_their_order() -> None:

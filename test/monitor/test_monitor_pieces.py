@@ -10,12 +10,9 @@ import pytest
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.monitor.hints import hints
-from drive_can_bridge.monitor.history import columns, History, Rate
-from drive_can_bridge.monitor.lines import documents
-from drive_can_bridge.monitor.plan import SamplingPlan
-from drive_can_bridge.monitor.values import ParameterInfo
-
+from drive_can_bridge.monitor.snapshot import columns, History, Rate
+from drive_can_bridge.monitor.summary import documents, hints
+from drive_can_bridge.monitor.values import ParameterInfo, SamplingPlan
 
 # -- values ---------------------------------------------------------------------------------------
 

@@ -80,5 +80,5 @@ def test_an_address_of_another_machine(run: Run, host: str) -> None:
 def test_listening_on_the_network_is_explained(run: Run) -> None:
     panel = run('drive_can', 'panel', '--host', '0.0.0.0', '--port', '0')
     assert f'http://{socket.gethostname()}:' in panel.line('^operator: http')
-    assert 'whoever reaches this machine and has a token gets in' in panel.errors
+    assert 'who reaches this machine and has a token gets in' in panel.errors
     assert panel.end(signal.SIGINT) == 0

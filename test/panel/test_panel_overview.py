@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import BridgeSnapshot, DriveSnapshot, LogLine, Snapshot
+from drive_can_bridge.monitor.snapshot import (
+    BridgeSnapshot, DriveSnapshot, Level, LogLine, Snapshot,
+)
 from drive_can_bridge.panel.access import Role
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
@@ -127,7 +128,7 @@ def test_the_banner_says_so_once(page: Any) -> None:
 
 
 def test_the_log_is_filtered_and_stands_still_on_request(page: Any) -> None:
-    from drive_can_bridge.panel.log_page import LogPage
+    from drive_can_bridge.panel.pages import LogPage
     made = LogPage()
 
     def log(count: int) -> Snapshot:

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from drive_can_bridge.core.parameters import ValueKind
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Reading
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Reading
 from drive_can_bridge.monitor.values import ParameterInfo
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
@@ -36,7 +35,7 @@ def drive(text: str, name: str = RAMP.name) -> DriveSnapshot:
 @pytest.mark.parametrize('name', [
     'x onclick="alert(1)"', "x :title='alert(1)'", 'x\n@click=alert(1)', '"', 'x innerHTML=<b>'])
 def test_a_name_stays_one_attribute(page: object, name: str) -> None:
-    from drive_can_bridge.panel.parameter_table import _Row
+    from drive_can_bridge.panel.drive_page import _Row
     _Row('/lift', replace(RAMP, name=name), writes=True)
     marks = [element.props for element in page.elements.values()  # type: ignore[attr-defined]
              if 'data-parameter' in element.props]
@@ -44,7 +43,7 @@ def test_a_name_stays_one_attribute(page: object, name: str) -> None:
 
 
 def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: object) -> None:
-    from drive_can_bridge.panel.parameter_table import _Row
+    from drive_can_bridge.panel.drive_page import _Row
     row = _Row('/lift', RAMP, writes=True)
     row.show(drive('2.50'))
     assert (row._field.value, row._now.text) == ('2.50', '')
@@ -63,7 +62,7 @@ def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: ob
 
 
 def test_what_cannot_be_read_is_said(page: object) -> None:
-    from drive_can_bridge.panel.parameter_table import _Row
+    from drive_can_bridge.panel.drive_page import _Row
     for writes in (False, True):
         row = _Row('/lift', RAMP, writes=writes)
         row.show(drive(''))

@@ -15,8 +15,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.reports import Level
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot
 from drive_can_bridge.monitor.source import Outcome, Stop
 
 pytest.importorskip('rclpy')
@@ -97,7 +96,7 @@ class Some(Asked):
 def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
         names: str, failing: dict[str, str], text: str) -> None:
     from drive_can_bridge.panel.actions import Actions
-    from drive_can_bridge.panel.backups import Backups
+    from drive_can_bridge.panel.actions import Backups
     feed = feed_of(Some(**{name: Outcome(False, each) for name, each in failing.items()}))
     feed.snapshot = Snapshot(drives=tuple(map(seen, names)))
     actions = Actions(feed, Backups(), allow_writes=False)

@@ -3,8 +3,7 @@
 
 import os
 
-from drive_can_bridge.process.locks import HostLock
-from drive_can_bridge.process.presence import BRIDGE, bridges, Presence, Present, short
+from drive_can_bridge.process.locks import BRIDGE, bridges, HostLock, Presence, Present, short
 
 
 def mine() -> list[Present]:

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.profiles.build import Built
 from drive_can_bridge.profiles.catalogue import check
-from drive_can_bridge.profiles.importing import columns_from_option, import_file, Imported
-from drive_can_bridge.profiles.numerals import DecimalSign
+from drive_can_bridge.profiles.importing import columns_from_option, import_file
 
 
 class Outcome(NamedTuple):
     """A profile made from a file, as a bridge reads it."""
 
     profile: Profile
-    imported: Imported
+    built: Built
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -24,23 +24,23 @@ class Outcome(NamedTuple):
 
     @property
     def left_out(self) -> list[str]:
-        return [str(each) for each in self.imported.found.left_out]
+        return [str(each) for each in self.built.left_out]
 
     @property
-    def oddities(self) -> list[str]:
-        return [str(each) for each in self.imported.found.oddities]
+    def notes(self) -> list[str]:
+        return list(self.built.notes)
 
 
 def bring_in(folder: Path, content: str | bytes, name: str = 'table.csv', *, columns: str = '',
-             protocols: Sequence[str] = (), sign: DecimalSign = DecimalSign.UNKNOWN) -> Outcome:
+             protocols: Sequence[str] = (), sign: str = '') -> Outcome:
     """Import a file; what comes out has to pass ``profile check``."""
     source = folder / name
     source.write_bytes(content.encode('utf-8') if isinstance(content, str) else content)
-    imported = import_file(source, columns=columns_from_option(columns), sign=sign,
-                           protocols=protocols)
+    built = import_file(source, columns=columns_from_option(columns), sign=sign,
+                        protocols=protocols)
     made = folder / 'made.yaml'
-    made.write_text(imported.built.text, encoding='utf-8')
+    made.write_text(built.text, encoding='utf-8')
     checked = check(made)
     assert [str(problem) for problem in (*checked.problems, *checked.warnings)] == []
-    assert tuple(checked.loaded.profile.parameters) == imported.built.names
-    return Outcome(checked.loaded.profile, imported)
+    assert tuple(checked.loaded.profile.parameters) == built.names
+    return Outcome(checked.loaded.profile, built)

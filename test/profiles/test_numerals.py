@@ -3,13 +3,11 @@
 
 import pytest
 
-from drive_can_bridge.profiles.errors import Unusable
-from drive_can_bridge.profiles.numerals import (
-    decimal_sign, DecimalSign, factor, integer, interval, measure,
-)
-from drive_can_bridge.profiles.units import unit
+from drive_can_bridge.profiles.build import Unusable
+from drive_can_bridge.profiles.names import unit
+from drive_can_bridge.profiles.numerals import decimal_sign, factor, integer, interval, measure
 
-POINT, COMMA, UNKNOWN = DecimalSign.POINT, DecimalSign.COMMA, DecimalSign.UNKNOWN
+POINT, COMMA, UNKNOWN = '.', ',', ''
 
 
 @pytest.mark.parametrize(('text', 'sign', 'number', 'behind'), [
@@ -24,7 +22,7 @@ POINT, COMMA, UNKNOWN = DecimalSign.POINT, DecimalSign.COMMA, DecimalSign.UNKNOW
     ('0x3FF', UNKNOWN, 1023, ''), ('3FFh', UNKNOWN, 1023, ''), ('16#3FF', UNKNOWN, 1023, ''),
     ('-0x10', UNKNOWN, -16, ''), ('320.00', COMMA, 320, ''),
 ])
-def test_measure(text: str, sign: DecimalSign, number: float, behind: str) -> None:
+def test_measure(text: str, sign: str, number: float, behind: str) -> None:
     assert measure(text, sign) == (number, behind)
 
 
@@ -33,7 +31,7 @@ def test_measure(text: str, sign: DecimalSign, number: float, behind: str) -> No
     ('1.500', "'1.500' may be 1.5 or 1500: say which with --decimal"),
     ('P105', "'P105' is no number"), ('', "'' is no number"), ('1.2.3', "'1.2.3' is no number"),
     ('1,2,3', "'1,2,3' is no number"), ('1.234,567,8', "'1.234,567,8' is no number"),
-    ('1e99', "'1e99' is too large"), ('²', "'²' is no number"),
+    ('1e99', '1e+99 is too large'), ('²', "'²' is no number"),
     ('\uff11', "'\uff11' is no number"),
 ])
 def test_no_measure(text: str, reason: str) -> None:
@@ -47,8 +45,8 @@ def test_no_measure(text: str, reason: str) -> None:
     (['0,5', '0.5'], UNKNOWN), (['1,234,567'], POINT), (['0,1 ... 99,9'], COMMA),
     (['1.234,5'], COMMA), (['0..100', '1…10'], UNKNOWN), (['Hz', '0,01 s'], COMMA),
 ])
-def test_decimal_sign(texts: list[str], sign: DecimalSign) -> None:
-    assert decimal_sign(texts) is sign
+def test_decimal_sign(texts: list[str], sign: str) -> None:
+    assert decimal_sign(texts) == sign
 
 
 @pytest.mark.parametrize(('text', 'ends'), [

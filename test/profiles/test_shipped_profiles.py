@@ -3,13 +3,13 @@
 
 from pathlib import Path
 import re
+import runpy
 
 import pytest
 import yaml
 
 from drive_can_bridge.core.profile import RestoreStep
 from drive_can_bridge.profiles.catalogue import check
-from drive_can_bridge.profiles.trust import PAGE, trust_page
 from drive_can_bridge.protocols.canopen_pkw.object_map import object_of
 from drive_can_bridge.resources import profiles_directory, share_directory
 
@@ -53,9 +53,10 @@ def test_trust_is_in_keys_and_not_in_words(path: Path) -> None:
 
 
 def test_page_is_up_to_date() -> None:
-    """To write it anew: ``python3 -m drive_can_bridge.profiles.trust``."""
-    page = (share_directory() / 'docs' / PAGE).read_text(encoding='utf-8')
-    assert page == trust_page(profiles_directory())
+    """To write it anew: ``.venv/bin/python docs/profile_provenance.py``."""
+    script = runpy.run_path(str(share_directory() / 'docs' / 'profile_provenance.py'))
+    page = (share_directory() / 'docs' / script['PAGE']).read_text(encoding='utf-8')
+    assert page == script['trust_page'](profiles_directory())
 
 
 def test_registers_of_the_ltmr_stand_where_the_vendor_says() -> None:

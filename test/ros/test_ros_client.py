@@ -21,7 +21,7 @@ from drive_can_bridge.client.drive import Drive, Enabled
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.ros.client import calls, graph, search
+from drive_can_bridge.ros.client import calls, search
 
 PUMP: dict[str, Any] = {
     'bus': 'main', 'protocol': 'canopen_pkw', 'station': 5, 'profile': 'tesys_t_ltmr',
@@ -230,12 +230,12 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         client.node.create_service(
             kind, f'/forgetful/{name}', answers(name) if forgets else lambda _, given: given,
             qos_profile=qos_profile_parameters, callback_group=ReentrantCallbackGroup())
-    here = graph.Graph(REAL)
+    here = search.Graph(REAL)
     try:
         here.call('/forgetful', 'list_parameters', ListParameters.Request())
         assert asked['list_parameters'] == 2
         # what changes something is not done twice
-        with pytest.raises(graph.NoAnswer, match='does not answer for 1 s'):
+        with pytest.raises(search.NoAnswer, match='does not answer for 1 s'):
             here.call('/forgetful', 'set_parameters', SetParameters.Request(), 1.0)
         assert asked['set_parameters'] == 1
     finally:

@@ -10,7 +10,7 @@ from processes import Client, Process, Processes, Simulator
 import pytest
 import yaml
 
-from drive_can_bridge.backup.reader import read_backup
+from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.resources import share_directory
 
 BY_HAND = {

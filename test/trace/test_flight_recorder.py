@@ -15,10 +15,9 @@ from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record, RecordKind
-from drive_can_bridge.trace import flight, ring
+from drive_can_bridge.trace import flight
 from drive_can_bridge.trace.files import read_records
-from drive_can_bridge.trace.flight import FlightRecorder
-from drive_can_bridge.trace.ring import BLOCK, Ring
+from drive_can_bridge.trace.flight import BLOCK, FlightRecorder, Ring
 
 REQUEST, ANSWER = frame('003FFFF0#05DC000000000000'), frame('7F1#2211')
 
@@ -50,7 +49,7 @@ def test_a_ring_forgets_what_is_too_old() -> None:
 
 
 def test_a_ring_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ring, '_BLOCKS_MAX', 3)
+    monkeypatch.setattr(flight, '_BLOCKS_MAX', 3)
     kept = Ring(1e9)
     for step in range(10 * BLOCK):
         kept.note(REQUEST, float(step), True)
@@ -70,7 +69,7 @@ def test_what_is_read_stays_while_frames_come() -> None:
 def test_a_frame_leaves_nothing_behind() -> None:
     kept = Ring(60.0)
     kept.note(REQUEST, 0.0, True)
-    ours = [tracemalloc.Filter(True, str(path)) for path in (ring.__file__, __file__)]
+    ours = [tracemalloc.Filter(True, str(path)) for path in (flight.__file__, __file__)]
     tracemalloc.start()
     try:
         for step in range(BLOCK - 10):
@@ -308,4 +307,3 @@ def test_buses_that_are_not_recorded(tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.recorder.trigger('other', 'whatever')
         assert made.recorder.ring('other') is None
-

@@ -15,7 +15,7 @@ from foreign_devices import cannord, canopen, datamodel_extended, datamodel_stan
 import pytest
 
 from drive_can_bridge.cli import main as front_end
-from drive_can_bridge.cli.asking import AnotherMaster, Asker
+from drive_can_bridge.cli.probe import AnotherMaster, Asker
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import TransportError

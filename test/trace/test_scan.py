@@ -13,8 +13,7 @@ import pytest
 from test_trace_agrees import running
 
 from drive_can_bridge.cli import main as front_end
-from drive_can_bridge.cli.found_file import write_parameter_file
-from drive_can_bridge.cli.survey import LOAD_MAX, Survey
+from drive_can_bridge.cli.scan import LOAD_MAX, Survey, write_parameter_file
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import TransportError

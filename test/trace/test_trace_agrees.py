@@ -200,4 +200,3 @@ def test_time_passes_without_frames(conversation: tuple[Bus, list[Record]]) -> N
         tracer.take(record)
         last = record.time
     assert told == lines
-

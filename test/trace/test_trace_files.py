@@ -14,9 +14,8 @@ import pytest
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.trace.candump import format_record, parse_line
-from drive_can_bridge.trace.channels import Channels, labels
 from drive_can_bridge.trace.files import (
-    check_writable, read_records, TraceWriter, UnknownFormat, WRITABLE,
+    Channels, check_writable, labels, read_records, TraceWriter, UnknownFormat, WRITABLE,
 )
 
 DATA, ERROR = RecordKind.DATA, RecordKind.ERROR

@@ -18,7 +18,7 @@ ALLOWED = {
     'trace/candump.py': 1,
     'trace/flight.py': 2,
     'cli/backup.py': 1,
-    'panel/log_page.py': 2,
+    'panel/pages.py': 2,
     'view/parts.py': 2,
     'panel/parts.py': 2,
     'ros/absence.py': 2,
@@ -71,8 +71,8 @@ def test_suspend_counts() -> None:
 
 #: who may wait by himself, or ask for a time that nobody injects: processes, descriptors, signals
 OWN_WAYS = {'clock.py', 'process/locks.py', 'process/scheduling.py', 'process/signals.py',
-            'process/standard_outputs.py', 'process/taking.py', 'ros/demo/commander.py',
-            'view/screen.py'}
+            'process/standard_outputs.py', 'ros/demo/commander.py',
+            'view/live.py'}
 WAYS = {'monotonic', 'monotonic_ns', 'perf_counter', 'sleep', 'thread_time', 'process_time',
         'clock_gettime', 'Thread', 'Event', 'Condition', 'Timer', 'Semaphore', 'SimpleQueue',
         'Queue'}

@@ -16,11 +16,11 @@ from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.ros.client.calls import NodeCalls, OFFER_TIMEOUT, Service
-from drive_can_bridge.ros.client.graph import Graph
-from drive_can_bridge.ros.client.guest import Guest
-from drive_can_bridge.ros.client.inbox import Inbox, latched_quality
-from drive_can_bridge.ros.client.search import find_bridge, nobody, Search
+from drive_can_bridge.ros.client.calls import (
+    Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service,
+)
+from drive_can_bridge.ros.client.client_node import ClientNode
+from drive_can_bridge.ros.client.search import find_bridge, Graph, nobody, Search
 from drive_can_bridge.ros.recognition import namespace_of, sampled_among, stoppable_among
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
@@ -64,15 +64,15 @@ def matches(word: str, node: str) -> bool:
 class _Stopping:
     """One drive that is told to stop."""
 
-    def __init__(self, guest: Guest, node: str, now: float) -> None:
+    def __init__(self, client_node: ClientNode, node: str, now: float) -> None:
         self.node = node
         self.answer: Answer | None = None
-        self._guest = guest
+        self._client_node = client_node
         self._said: Any = None
         self._since = now
         self._online: bool | None = None
         self._inbox: Inbox | None = None
-        self._service = Service(guest, Trigger, f'{node}/quick_stop', STOP_TIMEOUT, _AGAIN)
+        self._service = Service(client_node, Trigger, f'{node}/quick_stop', STOP_TIMEOUT, _AGAIN)
         self._service.send(Trigger.Request(), self._take, now, 2.0 * OFFER_TIMEOUT)
 
     def _take(self, response: Any) -> None:
@@ -88,8 +88,8 @@ class _Stopping:
         self._service.look(now)
         if self._inbox is None:
             if not self._service.unsent:    # first things first
-                self._inbox = Inbox(self._guest, Bool, f'{self.node}/online', latched_quality(),
-                                    self._take_online)
+                self._inbox = Inbox(self._client_node, Bool, f'{self.node}/online',
+                                    latched_quality(), self._take_online)
             return
         self._inbox.look()
         if self._said is None:
@@ -118,11 +118,11 @@ class Stop:
 
     def __init__(self, graph: Graph, namespace: str | None, words: Sequence[str],
                  expected: Iterable[str]) -> None:
-        self._guest = graph.guest
+        self._client_node = graph.client_node
         check_is_valid_srv_type(Trigger)    # takes its time, while the graph is being discovered
         self._words = words
         self._namespace = namespace
-        self._search = Search(graph.guest, namespace, expected)
+        self._search = Search(graph.client_node, namespace, expected)
         self._drives: dict[str, _Stopping] = {}
 
     def look(self, now: float) -> bool:
@@ -131,7 +131,7 @@ class Stop:
         known = [node for each in self._search.found.values() for node in each.nodes]
         for node in (*self._seen(), *known):
             if node not in self._drives and meant(self._words, node):
-                self._drives[node] = _Stopping(self._guest, node, now)
+                self._drives[node] = _Stopping(self._client_node, node, now)
         for drive in self._drives.values():
             drive.look(now)
         return ((self._search.settled or self._search.over(now))
@@ -144,7 +144,7 @@ class Stop:
         places = {namespace_of(name) for name in self._search.found}
         stoppable = [node for node in stoppable_among(self._search.services)
                      if node not in self._drives and namespace_of(node) in places]
-        drives = sampled_among(self._guest.topics()) if stoppable else set[str]()
+        drives = sampled_among(self._client_node.topics()) if stoppable else set[str]()
         return [node for node in stoppable if node in drives]
 
     @property
@@ -211,7 +211,7 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
             there = ', '.join(node.lstrip('/') for node in bridges[place])
             raise UnknownDrive(f'no drive {word!r}; there are: {there}')
         nodes.update(dict.fromkeys(found))
-    calls = NodeCalls(graph.guest, _CONTROL_TIMEOUT)
+    calls = NodeCalls(graph.client_node, _CONTROL_TIMEOUT)
     answers: dict[str, Answer] = {}
     service = ORDERS[order].service
 

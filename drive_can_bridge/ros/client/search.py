@@ -5,19 +5,132 @@ The search for bridges, the same for all commands.
 A process that has just begun does not know the graph, a bridge does. So the first one that answers
 says which others there are (its parameter ``bridges``), and nobody waits for what may still turn
 up. What is in the graph with the services of a bridge counts, whether it answers or not.
+
+A client node that waits for what it asks.
+
+No thread, no executor: everything happens while somebody waits, a little at a time, so that Ctrl-C
+comes through.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+import math
 import os
+from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.qos import QoSProfile
 
-from drive_can_bridge.core.errors import NoBridge, WhichBridge
-from drive_can_bridge.ros.client.calls import NodeCalls
-from drive_can_bridge.ros.client.graph import Graph
-from drive_can_bridge.ros.client.guest import Guest
+from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
+from drive_can_bridge.ros.client.calls import Inbox, NodeCalls
+from drive_can_bridge.ros.client.client_node import ClientNode
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
+
+#: s between two looks at what has arrived
+LOOK_PERIOD = 0.002
+#: s that an answer may take: many reads that nobody answers are slow
+_CALL_TIMEOUT = 120.0
+
+
+class NoAnswer(DriveCanError):
+    """A node does not answer, or has gone."""
+
+
+class Graph:
+    """
+    This process in the ROS graph.
+
+    :param client_node: what it is there; None: a new one.
+    :raises DriveCanError: ROS does not start.
+    """
+
+    def __init__(self, clock: Clock, client_node: ClientNode | None = None) -> None:
+        self._clock = clock
+        self.client_node = client_node or ClientNode('client')
+        self._calls: dict[float, NodeCalls] = {}
+        self._heard: set[str] = set()
+        self._diagnostics: Inbox | None = None
+        self._statuses: dict[str, tuple[float, dict[str, str]]] = {}
+
+    def now(self) -> float:
+        """Return the time."""
+        return self._clock.now()
+
+    def close(self) -> None:
+        """Leave the graph. Idempotent."""
+        self.client_node.leave()
+
+    def wait(self, done: Callable[[float], Any], timeout: float) -> bool:
+        """
+        Wait until something is done; False if it is not in time.
+
+        :param done: is asked again and again with the time, and may look at what has arrived.
+        """
+        deadline = self._clock.now() + timeout
+        while True:
+            now = self._clock.now()
+            if done(now):
+                return True
+            if now >= deadline:
+                return False
+            now = self._clock.now()     # looking took its time
+            self._clock.wait(min(now + LOOK_PERIOD, deadline))
+
+    def call(self, node: str, service: str, request: Any, timeout: float = _CALL_TIMEOUT) -> Any:
+        """
+        Call a parameter service of a node.
+
+        :raises NoAnswer: nobody answers.
+        :raises DriveCanError: it was closed.
+        """
+        self._check()
+        if timeout not in self._calls:
+            self._calls[timeout] = NodeCalls(self.client_node, timeout)
+        calls, answers = self._calls[timeout], list[Any]()
+        calls.ask(node, service, request, answers.append, self._clock.now())
+
+        def look(now: float) -> bool:
+            calls.look(now)
+            return bool(answers)
+        self.wait(look, math.inf)
+        if answers[0] is not None:
+            self._heard.add(node)
+            return answers[0]
+        if calls.offered(node, service):
+            raise NoAnswer(f'{node} does not answer for {timeout:g} s')
+        raise NoAnswer(f'{node} has gone' if node in self._heard
+                       else f'{node} does not offer {service}')
+
+    def newest_status(self, name: str, *, age: float, patience: float) -> dict[str, str]:
+        """
+        Return the facts of the newest diagnostic status of a name; none: there is none.
+
+        :param age: s that it may have; else the next one is waited for, so much longer:
+        :param patience: s.
+        :raises DriveCanError: it was closed.
+        """
+        self._check()
+        if self._diagnostics is None:
+            from diagnostic_msgs.msg import DiagnosticArray
+            self._diagnostics = Inbox(self.client_node, DiagnosticArray, '/diagnostics',
+                                      QoSProfile(depth=50), self._take_statuses)
+        inbox = self._diagnostics
+
+        def look(now: float) -> bool:
+            inbox.look()
+            return name in self._statuses and now - self._statuses[name][0] <= age
+        return self._statuses[name][1] if self.wait(look, age + patience) else {}
+
+    def _take_statuses(self, message: Any) -> None:
+        for status in message.status:
+            self._statuses[status.name] = self._clock.now(), {
+                pair.key: pair.value for pair in status.values}
+
+    def _check(self) -> None:
+        if not self.client_node.open:
+            raise DriveCanError('the way to the bridge is closed already')
+
 
 #: s without anything new in the graph until nobody is there, and how long that may go on
 _QUIET, _LONGEST = 4.0, 12.0
@@ -64,12 +177,12 @@ class Search:
     :ivar services: all that have been discovered.
     """
 
-    def __init__(self, guest: Guest, namespace: str | None,
+    def __init__(self, client_node: ClientNode, namespace: str | None,
                  expected: Iterable[str] = ()) -> None:
-        self._guest = guest
+        self._client_node = client_node
         self._namespace = namespace
         self._expected = list(expected)
-        self._calls = NodeCalls(guest, _ANSWER_TIMEOUT)
+        self._calls = NodeCalls(client_node, _ANSWER_TIMEOUT)
         self.found: dict[str, Found] = {}
         self.services: Entries = ()
         self._looked_at = self._changed_at = self._began = -1.0
@@ -101,7 +214,7 @@ class Search:
         if now < self._looked_at + _GRAPH_PERIOD:
             return False
         self._looked_at = now
-        services = self._guest.services()
+        services = self._client_node.services()
         if services == self.services:
             return False
         self.services, self._changed_at = services, now
@@ -143,7 +256,7 @@ def find_bridge(graph: Graph, namespace: str | None) -> Found:
     :raises WhichBridge: there are several, whether they answer or not.
     :raises NoBridge: there is none, or it does not answer.
     """
-    search = Search(graph.guest, namespace)
+    search = Search(graph.client_node, namespace)
 
     def done(now: float) -> bool:
         search.look(now)

@@ -4,6 +4,8 @@ A hidden node that attaches to whatever bridges there are, and fills the model.
 
 It subscribes and asks, and that is all: no topic, no service, no parameter of its own. Everything
 happens in :meth:`MonitorClient.poll`, in the thread that calls it.
+
+Between messages and the plain values of the model.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,24 +13,57 @@ import math
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Log, ParameterEvent
+from rcl_interfaces.msg import Log, ParameterDescriptor, ParameterEvent, ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 
+from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.plan import BUDGET, SamplingPlan
-from drive_can_bridge.monitor.snapshot import Place
-from drive_can_bridge.monitor.text import is_ros_name
-from drive_can_bridge.monitor.values import ParameterInfo
-from drive_can_bridge.ros.client.calls import NodeCalls
-from drive_can_bridge.ros.client.guest import Guest
-from drive_can_bridge.ros.client.inbox import Inbox, latched_quality, log_quality, newest_quality
-from drive_can_bridge.ros.messages import drive_value, plain
-from drive_can_bridge.ros.monitor.messages import (
-    log_level, parameter_info, stamp_of, statuses, values,
+from drive_can_bridge.monitor.snapshot import is_ros_name, Place, Status
+from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
+from drive_can_bridge.ros.client.calls import (
+    Inbox, latched_quality, log_quality, newest_quality, NodeCalls,
 )
+from drive_can_bridge.ros.client.client_node import ClientNode
+from drive_can_bridge.ros.messages import drive_value, facts_of, limits_of, plain
+
+_KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
+          ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
+_LEVELS = {getattr(Log, name): name
+           for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
+
+
+def stamp_of(message: Any) -> float:
+    """Return the stamp of a message in s."""
+    return float(message.sec + 1e-9 * message.nanosec)
+
+
+def statuses(message: DiagnosticArray) -> list[Status]:
+    """Return the entries of a diagnostic message."""
+    return [Status(status.name, int.from_bytes(status.level, 'little'), status.message,
+                   {pair.key: pair.value for pair in status.values})
+            for status in message.status]
+
+
+def values(message: ParameterEvent) -> list[tuple[str, Value]]:
+    """Return names and values of a sample."""
+    pairs = ((entry.name, drive_value(entry.value)) for entry in message.changed_parameters)
+    return [(name, value) for name, value in pairs if value is not None]
+
+
+def log_level(message: Log) -> str:
+    """Return the level of a line of the log, as ROS names it."""
+    return _LEVELS.get(message.level, str(message.level))
+
+
+def parameter_info(message: ParameterDescriptor) -> ParameterInfo:
+    """Return what a descriptor says."""
+    return ParameterInfo(
+        printable(message.name), _KINDS.get(message.type, ValueKind.DOUBLE), message.read_only,
+        printable(message.description), *limits_of(message), facts_of(message))
+
 
 #: s between two looks at the graph, which are not cheap
 _GRAPH_PERIOD = 2.0
@@ -50,7 +85,7 @@ class MonitorClient:
 
     def __init__(self, model: Model, *, budget: float = BUDGET) -> None:
         self._model = model
-        self._node = Guest('monitor')
+        self._node = ClientNode('monitor')
         self._now = 0.0
         self._plan = SamplingPlan(budget)
         self._inboxes = [
@@ -69,8 +104,8 @@ class MonitorClient:
     # -- for the view -----------------------------------------------------------------------------
 
     @property
-    def node(self) -> Guest:
-        """The node, for whoever asks more of drives than this."""
+    def node(self) -> ClientNode:
+        """The node, for those who ask more of drives than this."""
         return self._node
 
     @property

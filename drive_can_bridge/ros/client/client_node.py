@@ -21,7 +21,7 @@ from drive_can_bridge.core.errors import DriveCanError
 sys.modules.setdefault('rosidl_generator_py.generate_py_impl', None)    # type: ignore[arg-type]
 
 
-class Guest:
+class ClientNode:
     """
     This process in the ROS graph.
 

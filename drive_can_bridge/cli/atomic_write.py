@@ -15,7 +15,7 @@ def differs(path: Path, data: bytes | None = None) -> bool:
     return path.is_file() and (data is None or path.read_bytes() != data)
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes) -> None:
     """
     Write a file. Whatever goes wrong: there is either the whole of it, or what was there before.
 

@@ -3,7 +3,7 @@
 How far each entry of the shipped profiles can be trusted, as a page of the documentation.
 
 The page is made from the profiles; a test compares it. To write it anew:
-``python3 -m drive_can_bridge.profiles.trust``.
+``.venv/bin/python docs/profile_provenance.py``.
 """
 
 from collections.abc import Iterator
@@ -13,9 +13,7 @@ from drive_can_bridge.profiles.catalogue import check, Checked
 from drive_can_bridge.resources import profiles_directory, share_directory
 
 PAGE = 'profile_trust.md'
-#: how an entry's key ``verified`` is shown
-TRUST_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
-#: and how the entries of each kind are headed, in the order of the page
+#: how the entries of each kind are headed, in the order of the page
 TITLES: dict[bool | None, str] = {True: 'verified', False: 'not verified', None: 'not judged'}
 
 _HEAD = """\
@@ -25,7 +23,7 @@ Which entries of the shipped profiles are backed by a document, and by which. *V
 type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. What
 has no number is in process data only.
 
-Made by `python3 -m drive_can_bridge.profiles.trust`; edit the profiles ([keys](profiles.md)).
+Made by `docs/profile_provenance.py`; edit the profiles ([keys](profiles.md)).
 """
 
 

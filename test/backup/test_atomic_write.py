@@ -9,7 +9,7 @@ import resource
 
 import pytest
 
-from drive_can_bridge.cli.whole_file import differs, write_whole
+from drive_can_bridge.cli.atomic_write import differs, write_atomically
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def test_nothing_is_left_of_a_file_that_does_not_fit(tmp_path: Path) -> None:
     path = tmp_path / 'a.yaml'
     path.write_bytes(b'before')
     with room_for(100), pytest.raises(OSError) as error:
-        write_whole(path, bytes(1000))
+        write_atomically(path, bytes(1000))
     assert error.value.filename == str(path)
     assert os.listdir(tmp_path) == ['a.yaml']
     assert path.read_bytes() == b'before'
@@ -37,7 +37,7 @@ def test_replaced_as_a_whole_where_a_link_points(tmp_path: Path) -> None:
     path, link = tmp_path / 'a.yaml', tmp_path / 'latest.yaml'
     path.write_bytes(b'before')
     link.symlink_to(path)
-    write_whole(link, b'after')
+    write_atomically(link, b'after')
     assert link.is_symlink()
     assert path.read_bytes() == b'after'
     assert path.stat().st_mode & 0o777 == 0o666 & ~_umask()

@@ -1,2 +1,0 @@
-# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The way to drives through a running bridge."""

@@ -1,0 +1,295 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""The way to drives through a running bridge."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+import json
+from typing import Any
+
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescriptor
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+
+from drive_can_bridge.client.drive import (
+    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome,
+)
+from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import NoBridge
+from drive_can_bridge.core.parameters import (
+    Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind,
+)
+from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.value_names import taken_apart
+from drive_can_bridge.ros.client.search import find_bridge, Graph
+from drive_can_bridge.ros.messages import (
+    drive_value, facts_of, limits_of, parameter_message, plain,
+)
+
+_TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
+
+
+def parameter_of(message: ParameterDescriptor, *, listed: bool = True) -> Parameter | None:
+    """Return what a descriptor describes; None: no parameter of a drive."""
+    facts = facts_of(message)
+    if 'access' not in facts:
+        return None
+    try:
+        minimum, maximum = limits_of(message) if listed else (None, None)
+        made = Parameter(
+            name=message.name,
+            type=WireType(facts['type']) if 'type' in facts else WireType.UINT32,
+            number=_number(facts, 'number'), scale=float(facts.get('scale', 1.0)),
+            offset=float(facts.get('offset', 0.0)), unit=facts.get('unit', ''),
+            access=Access(facts['access']),
+            storage=Storage(facts['storage']) if 'storage' in facts else None,
+            minimum=minimum, maximum=maximum,
+            subindex=_number(facts, 'subindex'), index=_number(facts, 'index'),
+            scaled='scale' in facts, listed=listed, protected=facts.get('protected') == 'true',
+            width_known='type' in facts, values=taken_apart(facts.get('values', '')))
+    except ValueError:
+        return None
+    text = printable(message.description)
+    end = text.rfind(f' ({made.address}')
+    return replace(made, description=text[:end] if end > 0 and listed else '')
+
+
+def role_of(message: ParameterDescriptor) -> Role | None:
+    """Return what the bridge uses a parameter for."""
+    role = facts_of(message).get('role')
+    return next((each for each in Role if each.value == role), None)
+
+
+def raw_of(parameter: Parameter, value: Value) -> int:
+    """Return the raw integer that a value of the bridge was made of."""
+    if parameter.scaled:
+        return round((value - parameter.offset) / parameter.scale)
+    return int(value)
+
+
+def message_of(name: str, parameter: Parameter, value: Value) -> ParameterMessage:
+    """Return what sets a parameter to a value that fits it."""
+    return parameter_message(name, _TYPES[parameter.kind](value))
+
+
+def _number(facts: dict[str, str], key: str) -> int | None:
+    return int(facts[key], 0) if key in facts else None
+
+
+#: parameters that are read with one call
+BLOCK = 16
+_NO_VALUE = 'no value; the log of the bridge says why'
+#: s beyond its period that a diagnostic message may take
+_DIAGNOSTICS_MARGIN = 5.0
+_ENABLED = {'online': Enabled.YES, 'not armed': Enabled.YES, 'disabled': Enabled.NO,
+            'fault': Enabled.NO}
+
+
+class BridgedDrive(Drive):
+    """
+    One drive.
+
+    :param node: full name of its node.
+    :param table: the parameters that it lists.
+    :param roles: what the bridge uses them for.
+    :param period: s between diagnostic messages of the bridge.
+    :param identity: asks the bridge who a drive is.
+    """
+
+    def __init__(self, graph: Graph, node: str, facts: DriveFacts, table: dict[str, Parameter],
+                 roles: dict[str, Role], period: float, identity: Callable[[str], str]) -> None:
+        super().__init__(facts, ParameterDirectory(table, self._raw_parameter))
+        self._graph = graph
+        self._node = node
+        self._roles = roles
+        self._period = period
+        self._identity = identity
+        self._raw: dict[str, Parameter | None] = {}
+
+    def _raw_parameter(self, name: str) -> Parameter | None:
+        if name not in self._raw:
+            message, = self._describe([name])
+            self._raw[name] = parameter_of(message, listed=False)
+            role = role_of(message)
+            if role is not None:
+                self._roles[name] = role
+        return self._raw[name]
+
+    def role(self, name: str) -> Role | None:
+        return None if self.find(name) is None else self._roles.get(name)
+
+    def write_refusal(self, name: str, parameter: Parameter) -> str:
+        role = self.role(name)
+        if parameter.writable and role is Role.CONTROL:
+            return 'use ~/enable'
+        if parameter.writable and role is Role.CYCLIC:
+            own = next((each.name for each in self._directory.twins(parameter)), name)
+            return f'sent cyclically: publish ~/command/{own}'
+        if role is Role.MAP:
+            return 'mapping parameter: not written while the bridge is active'
+        return ''
+
+    def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
+        for start in range(0, len(asked), BLOCK):
+            yield from self._get(asked[start:start + BLOCK])
+
+    def _get(self, asked: Sequence[tuple[str, Parameter]]) -> list[ReadOutcome]:
+        names = [name for name, _ in asked]
+        answer = self._graph.call(self._node, 'get_parameters',
+                                  GetParameters.Request(names=names))
+        values = dict(zip(names, map(drive_value, answer.values)))
+        missing = [name for name in names if values.get(name) is None]
+        reasons = dict(zip(missing, self._reasons(missing)))
+        made = []
+        for name, parameter in asked:
+            value = values.get(name)
+            if value is None:
+                made.append(ReadOutcome(name, parameter, reason=reasons.get(name, _NO_VALUE)))
+            else:
+                made.append(ReadOutcome(name, parameter, raw_of(parameter, value), value))
+        return made
+
+    def _reasons(self, names: Sequence[str]) -> list[str]:
+        """Ask why there is no value."""
+        if not names:
+            return []
+        return [facts_of(message).get('error') or _NO_VALUE for message in self._describe(names)]
+
+    def _describe(self, names: Sequence[str]) -> list[object]:
+        answer = self._graph.call(self._node, 'describe_parameters',
+                                  DescribeParameters.Request(names=list(names)))
+        return list(answer.descriptors)
+
+    def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
+        # the bridge tries what is offline, too
+        answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
+            parameters=[message_of(name, parameter, value)]))
+        result, = answer.results
+        return WriteOutcome(name, result.successful, parameter, result.reason)
+
+    def enabled(self) -> Enabled:
+        facts = self._graph.newest_status(f'{self.facts.through.lstrip("/")}: drive {self.name}',
+                                          age=self._period, patience=_DIAGNOSTICS_MARGIN)
+        if 'control_state' not in facts:
+            return Enabled.UNKNOWN
+        return _ENABLED.get(facts.get('state', ''), Enabled.UNKNOWN)
+
+    def identity(self) -> str:
+        return self._identity(self.name)
+
+
+#: names in one call
+_BATCH = 200
+_DRIVE_KEYS = ('bus', 'protocol', 'station', 'profile', 'profile_sha256', 'identity', 'restore')
+_BUS_KEYS = ('interface', 'channel', 'bitrate')
+
+
+class BridgeSource:
+    """
+    The drives of a running bridge.
+
+    :param namespace: where it runs; None: anywhere, if there is only one.
+    :raises WhichBridge: there are several.
+    :raises NoBridge: there is none, or it does not answer.
+    """
+
+    def __init__(self, namespace: str | None, clock: Clock) -> None:
+        self._graph = Graph(clock)
+        try:
+            found = find_bridge(
+                self._graph,
+                namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/'))
+            self.bridge, self._names = found.name, found.drives or ()
+        except NoBridge as error:
+            self._graph.close()
+            raise NoBridge(f'{error}: start one, or name its file with --params-file to talk to '
+                           'the drives directly') from None
+        except BaseException:
+            self._graph.close()
+            raise
+
+    @property
+    def names(self) -> Sequence[str]:
+        """All drives, in the order of the configuration."""
+        return self._names
+
+    def parameter_names(self, drive: str) -> Sequence[str]:
+        """Return the names of the listed parameters of a drive."""
+        return list(self._graph.call(self._node_of(drive), 'list_parameters',
+                                     ListParameters.Request()).result.names)
+
+    def open(self, names: Sequence[str]) -> Drives:
+        """Ask for what is known of these drives."""
+        wanted = [name for name in self._names if name in names]
+        period = self._values(['diagnostics_period'])['diagnostics_period']
+        opened = {}
+        for name in wanted:
+            table, roles = self._table(name)
+            opened[name] = BridgedDrive(self._graph, self._node_of(name), self._facts(name),
+                                        table, roles, float(period or 1.0), self._identity)
+        return Drives(opened, self.close)
+
+    def close(self) -> None:
+        """Leave the graph. Idempotent."""
+        self._graph.close()
+
+    def _node_of(self, drive: str) -> str:
+        return f'{self.bridge.rpartition("/")[0]}/{drive}'
+
+    def _values(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return parameters of the bridge; None for those that it does not have."""
+        answer = self._graph.call(self.bridge, 'get_parameters',
+                                  GetParameters.Request(names=list(names)))
+        values = [plain(value) for value in answer.values]
+        if len(values) != len(names):   # rclpy answers nothing where one name is unknown
+            values = [self._values([name])[name] if len(names) > 1 else None for name in names]
+        return dict(zip(names, values))
+
+    def _facts(self, drive: str) -> DriveFacts:
+        prefix = f'drives.{drive}.'
+        values = self._values([prefix + key for key in _DRIVE_KEYS])
+        bus = str(values[f'{prefix}bus'])
+        place = self._values([f'buses.{bus}.{key}' for key in _BUS_KEYS])
+        persist = f'{prefix}persist_writes'     # of one family only
+        return DriveFacts(
+            name=drive, bus=bus, interface=str(place[f'buses.{bus}.interface']),
+            channel=str(place[f'buses.{bus}.channel']),
+            bitrate=int(place[f'buses.{bus}.bitrate'] or 0),
+            protocol=str(values[f'{prefix}protocol']), station=int(values[f'{prefix}station']),
+            profile=str(values[f'{prefix}profile']),
+            profile_sha256=str(values[f'{prefix}profile_sha256']),
+            restore=_restore_table(values[f'{prefix}restore']), through=self.bridge,
+            persist_writes=self._values([persist])[persist] is not False)
+
+    def _identity(self, drive: str) -> str:
+        name = f'drives.{drive}.identity'
+        return str(self._values([name])[name] or '')
+
+    def _table(self, drive: str) -> tuple[dict[str, Parameter], dict[str, Role]]:
+        """Return the parameters that a drive lists, and what the bridge uses them for."""
+        names = list(self.parameter_names(drive))
+        table: dict[str, Parameter] = {}
+        roles: dict[str, Role] = {}
+        for start in range(0, len(names), _BATCH):
+            answer = self._graph.call(
+                self._node_of(drive), 'describe_parameters',
+                DescribeParameters.Request(names=names[start:start + _BATCH]))
+            for message in answer.descriptors:
+                parameter, role = parameter_of(message), role_of(message)
+                if parameter is not None:
+                    table[message.name] = parameter
+                    if role is not None:
+                        roles[message.name] = role
+        return table, roles
+
+
+def _restore_table(text: Any) -> RestoreTable | None:
+    """Read what :func:`..declare.restore_text` has written."""
+    try:
+        read = json.loads(text)
+        return RestoreTable(*(tuple(RestoreStep(str(name), int(bits), int(mask))
+                                    for name, bits, mask in read[phase])
+                              for phase in ('before', 'after')))
+    except (TypeError, ValueError, KeyError):
+        return None
