@@ -19,6 +19,11 @@ of a module stay together, because they may share what is expensive to start; th
 waiting for something of their own are spread. Long ones come first. What measures time has the
 mark ``alone``: nothing else of the test run happens meanwhile.
 
+*The wall clock.* What runs against it has the mark ``real`` (``real.py`` says what that is, and
+which of them ``make test`` tells): these stories are told one after the other, when all others
+have been. One that fails is told again where the machine itself stood still (``told_again.py``).
+Nothing else excuses a stalled machine.
+
 *Seed.* All that is random follows DRIVE_CAN_TEST_SEED, by default another one in each run. Behind
 the failures stand the commands that run each of them alone, with the seed.
 
@@ -43,6 +48,8 @@ from typing import Any
 from hypothesis import core as hypothesis_core, HealthCheck, settings
 from middleware import tell_in_messages
 import pytest
+import real
+from told_again import ToldAgain
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'
@@ -116,6 +123,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(logs.cleanup)
     if config.getoption('--hypothesis-seed') is None:
         hypothesis_core.global_force_seed = int(os.environ[SEED])
+    config.pluginmanager.register(ToldAgain(config))
     if config.getoption('dist', 'no') != 'no':
         return  # only starts those who run the tests
     os.environ['ROS_DOMAIN_ID'] = _domain(False)
@@ -201,17 +209,24 @@ def _unit(nodeid: str) -> str:
     return nodeid if module.startswith(SPREAD) else module
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let begin what takes longest; in the usual order without xdist."""
+    """Mark what is real; let begin what takes longest, in the usual order without xdist."""
+    for item in items:
+        real.mark(item)
     if hasattr(config, 'workerinput'):
         items.sort(key=_place)
 
 
 def _place(item: pytest.Item) -> int:
-    if item.get_closest_marker('alone'):
+    if _alone(item):
         return -1
     return next((place for place, start in enumerate(FIRST) if item.nodeid.startswith(start)),
                 len(FIRST))
+
+
+def _alone(item: pytest.Item) -> bool:
+    return any(map(item.get_closest_marker, ('alone', 'real')))
 
 
 class _Room:
@@ -250,7 +265,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[Any]:
     if _ROOM not in item.config.stash:
         item.config.stash[_ROOM] = _Room(Path(given))
     room = item.config.stash[_ROOM]
-    room.enter(alone=item.get_closest_marker('alone') is not None)
+    room.enter(alone=_alone(item))
     try:
         return (yield)
     finally:

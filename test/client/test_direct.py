@@ -23,6 +23,9 @@ from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.exchange.one_master import InUse
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 #: everything that only a master sends to these drives, but acyclic requests
 CYCLIC_REQUEST = 0x003FFFF0
 MIXER_PROCESS_DATA = 0x260

@@ -9,6 +9,9 @@ import pytest
 
 from drive_can_bridge.cli.main import main
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 PROFILE = """\
 protocols: [datamodel_extended]
 parameters:

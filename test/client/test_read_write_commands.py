@@ -16,6 +16,9 @@ import pytest
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 Run = Callable[..., tuple[int, list[str], str]]
 
 

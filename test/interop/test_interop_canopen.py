@@ -28,6 +28,9 @@ from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 canopen = pytest.importorskip('canopen')
 objectdictionary = pytest.importorskip('canopen.objectdictionary')
 

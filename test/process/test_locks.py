@@ -46,6 +46,7 @@ def test_one_holder_in_a_process() -> None:
     other.release()
 
 
+@pytest.mark.real
 def test_another_process_is_named_and_its_end_frees_at_once() -> None:
     process = elsewhere(key('a'), key('b'))
     try:
@@ -69,6 +70,7 @@ def test_many_who_want_it_do_not_wear_it_out() -> None:
     assert holder(key('a')) is None
 
 
+@pytest.mark.real
 def test_of_many_at_once_one_gets_it() -> None:
     start = threading.Barrier(8)
     won: list[list[HostLock]] = []

@@ -8,6 +8,9 @@ import sys
 
 import pytest
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 #: tells when it is ready, stops for a second after the first signal, says so when that is no
 #: breath any more, and reports its exit code
 PROGRAM = """

@@ -10,6 +10,9 @@ import time
 
 import pytest
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 HEAD = """
 import ctypes, os, sys, threading, time
 from drive_can_bridge.process.standard_outputs import Output, StandardOutputs

@@ -17,6 +17,9 @@ from waiting import wait_for
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 PARAMETERS = """
 /**/drive_can_bridge:
   ros__parameters:

@@ -304,6 +304,7 @@ bus.shutdown()
 """
 
 
+@pytest.mark.real
 def test_client_in_another_process() -> None:
     terminal = SlcanTerminal(REAL.now)
     with Simulation(bridge(), REAL, open_bus=lambda bus: terminal) as simulation:

@@ -29,6 +29,9 @@ from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 POLL = frame('003FFFF0#0000000000000000')
 ANSWER = frame('103FFFF0#000000C80003A5A5')
 

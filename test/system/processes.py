@@ -7,7 +7,6 @@ Whoever waits here waits for a condition, with a deadline that only a hang excee
 
 from collections.abc import Sequence
 from contextlib import suppress
-from functools import cache
 import json
 import os
 from pathlib import Path
@@ -15,15 +14,11 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-import time
 from typing import Any
 
 from middleware import as_users_have_it
 from waiting import DEADLINE, wait_for
 
-#: of a line of the log, s
-_STAMP = re.compile(r'\[(\d+\.\d+)\]')
 ROOT = Path(__file__).resolve().parents[2]
 #: lines of an output that are shown of a process when a test fails
 SHOWN = 40
@@ -46,42 +41,6 @@ def environment() -> dict[str, str]:
     # SIGABRT: what a process that hangs is doing
     return {**as_users_have_it(), 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONUNBUFFERED': '1',
             'PYTHONFAULTHANDLER': '1', 'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
-
-
-class Witness:
-    """
-    Notices when the whole machine stands still, this process with it.
-
-    What a bridge says of itself then ("the bridge stood still") is true, and nobody's fault.
-    """
-
-    #: s between two looks, and that a look has to be late to count
-    PERIOD, LATE = 0.02, 0.3
-    #: s that a line about it may take to be written
-    AFTER = 1.0
-
-    def __init__(self) -> None:
-        self._still: list[tuple[float, float]] = []
-        threading.Thread(target=self._run, name='witness', daemon=True).start()
-
-    def _run(self) -> None:
-        last = time.time()
-        while True:
-            time.sleep(self.PERIOD)
-            now = time.time()
-            if now - last > self.PERIOD + self.LATE:
-                self._still.append((last, now))
-            last = now
-
-    def saw(self, moment: float) -> bool:
-        """Tell whether the machine stood still then, or just before."""
-        return any(begin <= moment <= end + self.AFTER for begin, end in self._still)
-
-
-@cache
-def witness() -> Witness:
-    """Return the witness of this test process, who looks from the first bridge on."""
-    return Witness()
 
 
 class Process:
@@ -146,11 +105,8 @@ class Process:
         return self.line(pattern, errors=True, since=since, timeout=timeout)
 
     def losses(self, pattern: str = 'offline') -> list[str]:
-        """Return what a bridge says of lost drives, but for those that the machine lost."""
-        lines = [line for line in self.errors if re.search(pattern, line)]
-        return [line for line in lines if not (
-            'the bridge stood still' in line and (stamp := _STAMP.search(line))
-            and witness().saw(float(stamp[1])))]
+        """Return what a bridge says of lost drives."""
+        return [line for line in self.errors if re.search(pattern, line)]
 
     def write(self, text: str) -> None:
         """Write a line to standard input."""
@@ -236,7 +192,6 @@ class Processes:
     def bridge(self, file: Path | None, namespace: str = '', *arguments: str,
                **streams: int) -> Process:
         """Start the bridge."""
-        witness()
         options = ['--params-file', str(file)] if file else []
         if namespace:
             options += ['-r', f'__ns:=/{namespace}']

@@ -125,6 +125,7 @@ def recording(folder: Path, **keys: object) -> Iterator[Recording]:
         made.recorder.close()
 
 
+@pytest.mark.real
 def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path / 'traces') as made:
         made.ring.note(frame('111#'), time.monotonic() - 60.0, True)    # too long ago
@@ -141,6 +142,7 @@ def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> 
                              f'{path}']
 
 
+@pytest.mark.real
 def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
@@ -152,6 +154,7 @@ def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
         assert len(made.traces) == 1
 
 
+@pytest.mark.real
 def test_one_trace_in_ten_seconds_for_whoever_asks(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
@@ -164,6 +167,7 @@ def test_one_trace_in_ten_seconds_for_whoever_asks(quick: None, tmp_path: Path) 
         assert len(made.traces) == 1
 
 
+@pytest.mark.real
 def test_a_failure_has_its_trace_whoever_has_asked_for_one(
         quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(flight, 'SPACING', 2.0)
@@ -186,6 +190,7 @@ def test_a_failure_has_its_trace_whoever_has_asked_for_one(
             0x222], 'what came before the failure, however late it is written'
 
 
+@pytest.mark.real
 def test_a_failure_takes_over_a_trace_that_is_asked_for(tmp_path: Path) -> None:
     answers: queue.Queue[tuple[str, str]] = queue.Queue()
     with recording(tmp_path, trace_seconds=0.5) as made:
@@ -209,6 +214,7 @@ def test_a_failure_takes_over_a_trace_that_is_asked_for(tmp_path: Path) -> None:
         assert len(made.traces) == 1
 
 
+@pytest.mark.real
 def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
         quick: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(flight, '_STEP', 1)
@@ -233,6 +239,7 @@ def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
         'bus other: trace of lift fault', 'bus main: trace of asked']
 
 
+@pytest.mark.real
 def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
@@ -243,6 +250,7 @@ def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None
         assert made.traces[0].name.endswith('_bus_lost.log')
 
 
+@pytest.mark.real
 def test_nothing_heard_nothing_written(quick: None, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         assert made.save() == ('', 'bus main: not a single frame in the last 10 s')
@@ -251,6 +259,7 @@ def test_nothing_heard_nothing_written(quick: None, tmp_path: Path) -> None:
         assert made.save()[0]
 
 
+@pytest.mark.real
 def test_first_and_newest_are_kept(quick: None, monkeypatch: pytest.MonkeyPatch,
                                    tmp_path: Path) -> None:
     monkeypatch.setattr(flight, 'SPACING', 0.0)
@@ -272,6 +281,7 @@ def test_first_and_newest_are_kept(quick: None, monkeypatch: pytest.MonkeyPatch,
         assert len(made.traces) == 9
 
 
+@pytest.mark.real
 def test_the_end_of_the_bridge_writes_what_is_wanted(tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
@@ -282,6 +292,7 @@ def test_the_end_of_the_bridge_writes_what_is_wanted(tmp_path: Path) -> None:
         assert len(made.traces) == 1
 
 
+@pytest.mark.real
 def test_a_place_that_cannot_be_written(quick: None, tmp_path: Path) -> None:
     blocked = tmp_path / 'file'
     blocked.write_text('')
@@ -292,6 +303,7 @@ def test_a_place_that_cannot_be_written(quick: None, tmp_path: Path) -> None:
         assert refusal.startswith('bus main: no trace of asked: Not a directory: ')
 
 
+@pytest.mark.real
 def test_buses_that_are_not_recorded(tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.recorder.trigger('other', 'whatever')

@@ -514,6 +514,7 @@ def file_with(tmp_path: Path, name: str, options: str) -> Path:
     return path
 
 
+@pytest.mark.real
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = file_with(tmp_path, 'file.yaml', '')
     other = file_with(tmp_path, 'other.yaml', ', value_order: low_first, index_byte: high')

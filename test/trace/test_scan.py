@@ -314,6 +314,7 @@ def drive_can(*arguments: object) -> int:
     return front_end.main([str(argument) for argument in arguments])
 
 
+@pytest.mark.real
 def test_simulated_drives_are_found_and_written(tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'found.yaml'
@@ -338,6 +339,7 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
             bus.wait_exchanges(name, 3)
 
 
+@pytest.mark.real
 def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     output, beside = tmp_path / 'found.yaml', tmp_path / 'found_drive_std_7.yaml'
@@ -398,6 +400,7 @@ def test_what_is_written_is_valid_whatever_the_maps(
     assert [remark.split(' cannot')[0] for remark in remarks] == [f'# {text}' for text in unfit]
 
 
+@pytest.mark.real
 def test_beside_a_bridge_all_drives_are_found_by_listening(
         capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('all_families.yaml'))
@@ -420,6 +423,7 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
     assert '500000 bit/s, ' in err and 'nothing was asked: --passive' in err
 
 
+@pytest.mark.real
 def test_what_was_not_asked_is_named_with_the_next_command(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('example.yaml'))
@@ -454,6 +458,7 @@ def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
     assert 'no drive found' in capsys.readouterr().out
 
 
+@pytest.mark.real
 def test_named_families_are_not_asked_where_there_is_a_canopen_node(
         capsys: pytest.CaptureFixture[str]) -> None:
     frames: list[Frame] = []

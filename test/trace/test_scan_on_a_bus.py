@@ -39,7 +39,8 @@ NODES = {drive.name: (drive.protocol, drive.station) for drive in SHIPPED
 UNMISTAKABLE = {(protocol, station) for protocol, station in ALL
                 if FAMILIES[protocol].make_scout().unmistakable}
 
-pytestmark = pytest.mark.timeout(5 * DEADLINE)
+#: against the wall clock (test/real.py)
+pytestmark = [pytest.mark.real, pytest.mark.timeout(5 * DEADLINE)]
 on_socketcan = (
     pytest.mark.socketcan,
     pytest.mark.skipif(not Path('/sys/class/net', VCAN).exists(),

@@ -31,6 +31,9 @@ from drive_can_bridge.trace.lines import LineWriter, Selection
 from drive_can_bridge.trace.tracer import Tracer
 from drive_can_bridge.transport.tap import Tap
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 
 class Listener:
     """Listens to drives and bus, and keeps the answers to requests."""

@@ -285,6 +285,7 @@ def understood(lines: list[str]) -> set[str]:
             if not any(word in line for word in ('LATE', 'LOST', 'UNASKED'))}
 
 
+@pytest.mark.real
 def test_record_then_decode(file: Path, tmp_path: Path,
                             capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'out.log'
@@ -301,6 +302,7 @@ def test_record_then_decode(file: Path, tmp_path: Path,
         assert understood(live) == understood(lines)
 
 
+@pytest.mark.real
 def test_record_in_files_of_limited_size(file: Path, tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'out.log'
@@ -314,6 +316,7 @@ def test_record_in_files_of_limited_size(file: Path, tmp_path: Path,
     assert (document['file'], document['files']) == (str(written[-1]), len(written))
 
 
+@pytest.mark.real
 def test_all_parts_of_a_recording_are_replaced(file: Path, tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     for number in (0, 1, 2, 2026):
@@ -327,6 +330,7 @@ def test_all_parts_of_a_recording_are_replaced(file: Path, tmp_path: Path,
     assert 'yesterday' not in (tmp_path / 'out_000.log').read_text()
 
 
+@pytest.mark.real
 def test_no_file_is_begun_for_a_bus_that_fell_silent(
         file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = tmp_path / 'out_000.log'
@@ -346,6 +350,7 @@ def test_no_file_is_begun_for_a_bus_that_fell_silent(
     assert capsys.readouterr().out.endswith(f': {files[-1]} is {said}\n')
 
 
+@pytest.mark.real
 def test_record_says_what_a_format_loses(file: Path, tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     assert drive_can('record', '-o', tmp_path / 'out.csv', '--params-file', file, '--seconds',

@@ -21,6 +21,9 @@ from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import BusError
 from drive_can_bridge.transport.link import Link
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 FRAME = Frame(0x003FFFF0, bytes(8), True)
 ANSWER = Frame(0x103FFFF0, bytes(8), True)
 FULL = 'send: transmit queue full'

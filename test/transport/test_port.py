@@ -288,6 +288,7 @@ def slcan(path: str) -> BusConfiguration:
     return BusConfiguration('main', 'slcan', path, bitrate=125_000)
 
 
+@pytest.mark.real
 def test_opening_an_adapter_that_takes_nothing_does_not_hang(
         monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = FullTerminal()
@@ -372,6 +373,7 @@ def adapter_fixture() -> Iterator[Adapter]:
 STOP = Frame(0x003FFFF0, bytes(8), True)
 
 
+@pytest.mark.real
 def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
     # of a command, before there was a frame; behind it somebody's frame, which tells that it came
     os.write(adapter.terminal.master, b'\at1230\r')
@@ -386,6 +388,7 @@ def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
     assert adapter.port.counts.refused == 3
 
 
+@pytest.mark.real
 def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
     with pytest.raises(BusUnavailable, match='the adapter refuses frames; no other node'):
         for _ in range(20):
@@ -395,6 +398,7 @@ def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
     assert 4 <= adapter.port.counts.refused < 20
 
 
+@pytest.mark.real
 def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
     for _ in range(10):
         for taken in (b'\a', b'\a', b'\a', b'z\r'):

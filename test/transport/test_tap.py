@@ -17,6 +17,9 @@ from drive_can_bridge.core.record import Record
 from drive_can_bridge.transport import tap as module
 from drive_can_bridge.transport.tap import Tap
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 
 @pytest.mark.parametrize(('late', 'believed'), [(0.0, True), (2.5, True), (3600.0, False)])
 def test_a_stamp_is_believed_although_it_was_read_late(

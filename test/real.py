@@ -1,0 +1,99 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Which tests run against the wall clock, and which of them ``make test`` tells.
+
+A test is *real* when its outcome hangs on how long things take: processes that talk to each other,
+what DDS does, signals, threads that wait for a time of this machine's clock. Where that follows
+from what a test uses, its fixtures say so (:data:`FIXTURES`); otherwise the test has the mark
+``real``. All of them are told by ``.ci/run``, one after the other. ``make test`` tells those of
+:data:`TOLD`: each executable and each fact about the machine once; the others have the mark
+``ci``. As a program (``real.py [all]``) it prints in which files those are that are told.
+"""
+
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pytest
+
+#: directory -> fixtures that put a test at the mercy of the wall clock
+FIXTURES = {
+    'test/system/': {'processes', 'client', 'bench'},
+    'test/demo/': {'start', 'demo', 'terminal'},
+    'test/monitor/': {'run'},
+    'test/panel/': {'site', 'run', 'browser', 'phone', 'somebody'},
+    'test/security/': {'run'},
+    'test/ros/': {'_client_context', 'client', 'bridge', 'shared_bridge'},
+    'test/backup/': {'shop'},
+    'test/client/': {'world', 'drives'},
+}
+
+#: what make test tells -> what it shows
+TOLD = {
+    # executables
+    'test/system/test_system_families.py::test_run_write_and_stop':
+        'bridge, simulator and a client over DDS: each family runs, is written to, and is stopped',
+    'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral[2]':
+        'drive_can demo, and SIGINT',
+    'test/demo/test_demo_terminal.py::test_the_view_comes_and_goes':
+        'the live view in a terminal',
+    'test/panel/test_panel_stops.py::test_nothing_with_control_runs_on_when_all_are_stopped':
+        'drive_can panel reaches drives',
+    'test/panel/test_panel_hostile.py::test_a_thousand_connections':
+        'drive_can panel under load',
+    'test/monitor/test_monitor_attach.py::test_it_attaches_to_whatever_comes_and_says_what_went':
+        'drive_can monitor finds bridges',
+    'test/system/test_system_backup.py::TestThroughTheBridge::test_one_drive_of_each_family':
+        'drive_can backup and restore, of each family',
+    'test/system/test_system_ros2_control.py::test_trip_on_the_way':
+        'a trajectory of ros2_control',
+    'test/system/test_system_parameters.py::test_both_ways_show_the_same':
+        'drive_can read and write, directly and through a bridge',
+    # the machine
+    'test/system/test_system_signals.py::test_while_active[SIGTERM]':
+        'signals end a bridge in order',
+    'test/system/test_system_signals.py::test_process_that_stood_still':
+        'a process that was suspended',
+    'test/system/test_system_signals.py::test_killed':
+        'a process that was killed, and locks between processes',
+    'test/system/test_system_stall.py::test_adapter_that_takes_nothing':
+        'an adapter that takes no more data',
+    'test/system/test_system_stuck_output.py::test_a_drive_falls_silent_and_the_bridge_is_stopped'
+    '[stderr]':
+        'standard error that nobody reads',
+    'test/system/test_system_reconnection.py::test_simulator_is_killed_and_restarted':
+        'an adapter that is unplugged',
+    'test/process/test_locks.py':
+        'locks between processes',
+    'test/simulation/test_simulated_slcan.py::test_client_in_another_process':
+        'python-can in another process at a pseudo-terminal',
+    'test/security/test_security_command.py::test_it_fits_what_a_bridge_has':
+        'the policy of drive_can security',
+}
+
+
+def mark(item: 'pytest.Item') -> None:
+    """Give a test the marks ``real`` and ``ci``, if they are due."""
+    fixtures = getattr(item, 'fixturenames', ())
+    for directory, wanted in FIXTURES.items():
+        if item.nodeid.startswith(directory) and wanted.intersection(fixtures):
+            item.add_marker('real')
+    if item.get_closest_marker('real') is not None and not any(
+            item.nodeid == told or item.nodeid.startswith((f'{told}[', f'{told}::'))
+            for told in TOLD):
+        item.add_marker('ci')
+
+
+def files(everything: bool) -> list[str]:
+    """Return where the real tests are that are told."""
+    if not everything:
+        return sorted({told.partition('::')[0] for told in TOLD})
+    elsewhere = (path for path in Path('test').rglob('test_*.py')
+                 if not str(path).startswith(tuple(FIXTURES)))
+    marked = {str(path) for path in elsewhere if 'mark.real' in path.read_text(encoding='utf-8')}
+    return sorted({*FIXTURES, *marked})
+
+
+if __name__ == '__main__':
+    print(*files('all' in sys.argv[1:]), sep='\n')
