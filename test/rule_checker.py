@@ -65,7 +65,7 @@ class Channel(NamedTuple):
     :ivar told: it was told to run since it was last certain to stand.
     :ivar stopped: a stop has left since.
     :ivar silent: the drive has been silent since.
-    :ivar strict: a stop is there when it is acknowledged, or leaves where it is certain to arrive.
+    :ivar strict: a stop is there when it is acknowledged.
     :ivar lost: what left last has not arrived.
     """
 
@@ -129,14 +129,13 @@ def check(table: Table = RULES, depth: int = DEPTH, kinds: Sequence[str] = tuple
 
 def _moves(kind: Kind, state: State) -> Iterator[Move]:
     """Tell what can happen."""
-    for name, channel in zip(kind.channels, state.channels):
+    for name in kind.channels:
         routed = name != CYCLE or state.routed
         if routed:
             yield 'run', name
             yield 'stop', name
-        if not (name == CYCLE and channel.strict and channel.told):     # maps were just read
-            yield 'run in vain', name
-            yield 'stop in vain', name
+        yield 'run in vain', name
+        yield 'stop in vain', name
     if state.routed and not any(channel.lost for channel in state.channels):
         yield 'answers', ''
     yield from (('confirms', ''), ('silent', ''), ('lost', ''), ('unanswered', ''),
@@ -144,7 +143,7 @@ def _moves(kind: Kind, state: State) -> Iterator[Move]:
                 ('bus lost', ''), ('said', ''), ('begins', ''))
     if CYCLE in kind.channels:
         yield ('maps', '') if state.routed else ('maps right', '')
-        yield 'maps differ', ''     # if only the response map
+        yield 'maps differ', ''     # routed: only the response map does
 
 
 def _live(kind: Kind, table: Table, state: State, move: Move) -> State:
@@ -161,6 +160,10 @@ def _live(kind: Kind, table: Table, state: State, move: Move) -> State:
     elif what in ('maps', 'maps right'):
         routed = what == 'maps right'
     else:
+        if what == 'maps differ' and not routed:
+            _is(duty.channel(CYCLE, Happened.MISROUTED), Do.NOTHING)
+            if not channels[0].silent:      # what stopped it by cycles stopped nobody
+                channels[0] = channels[0]._replace(stopped=False)
         channels = _event(duty, channels, what)
     duty._look()
     after = State(tuple(channels), tuple(
@@ -213,11 +216,8 @@ def _event(duty: StopDuty, channels: list[Channel], what: str) -> list[Channel]:
         return _silent(channels)
     elif what == 'maps differ':
         unheard = any(channel.told and channel.silent for channel in channels)
-        _is(duty.channel(CYCLE, Happened.MISROUTED), Do.NOTHING)
         _is(duty.happened(Happened.MAPS_DIFFER),
             Do.STOP_BY_NUMBER if unheard else Do.STOP if told else Do.NOTHING)
-        cycle, *others = channels
-        return [cycle._replace(strict=cycle.told and not cycle.silent), *others]
     elif what == 'given up':        # whoever leaves so has waited for an answer
         _is(duty.happened(Happened.LEFT_ALONE), Do.WARN if owed else Do.NOTHING)
     elif what == 'bus lost':

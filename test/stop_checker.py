@@ -259,7 +259,7 @@ KINDS: dict[str, Kind] = {
 #: what may happen, and how many s pass then
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
           'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
-          'maps', 'end', 'begin')
+          'maps', 'response map', 'maps right', 'end', 'begin')
 PAUSES = (0.013, 0.9)
 Story = tuple[tuple[str, float], ...]
 
@@ -280,6 +280,7 @@ class Partner:
     unwanted_since: float = math.inf
     said: bool = False              # that it may still be running, since it was found
     unseen_until: float = -math.inf     # a restart
+    left_over: bool = False         # it runs since an activation before, which ended with a word
     events: list[Any] = field(default_factory=list)
 
 
@@ -421,8 +422,10 @@ class World:
         """Judge motors that run although they shall not."""
         for partner in self.partners:
             runs = partner.motor.runs
-            if not runs or partner.wanted and self.control or not self.control and (
-                    partner.armed and self.now - self.commanded_at <= COMMAND_TIMEOUT):
+            partner.left_over = partner.left_over and runs and not partner.wanted
+            wanted = partner.wanted if self.control else (
+                partner.armed and self.now - self.commanded_at <= COMMAND_TIMEOUT)
+            if partner.left_over or not runs or wanted:
                 partner.unwanted_since = math.inf
             elif partner.unwanted_since == math.inf or not self.reachable() or not self.active:
                 partner.unwanted_since = self.now
@@ -438,7 +441,7 @@ class World:
 
     def stop_is_honest(self, when: str) -> None:
         for partner in self.partners:
-            if partner.motor.runs and not partner.said:
+            if partner.motor.runs and not (partner.said or partner.left_over):
                 raise Violation(f'{when}: drive {partner.index + 1} runs, and nobody says so')
 
     # -- what happens -----------------------------------------------------------------------------
@@ -567,6 +570,21 @@ class World:
             for partner in self.partners:
                 partner.motor[122] = 209
 
+    def _response_map(self) -> None:
+        """Have somebody change the response map: cycles still reach what they are meant for."""
+        if self.kind.maps:
+            for partner in self.partners:
+                partner.motor[127] = 209
+
+    def _maps_right(self) -> None:
+        """Have somebody put back the maps."""
+        if self.kind.maps:
+            if any(partner.motor[122] != partner.motor.initial[122] for partner in self.partners):
+                self.looked_at = self.now + MAPS_LOOKED_AT
+            for partner in self.partners:
+                for number in range(122, 130):
+                    partner.motor[number] = partner.motor.initial[number]
+
     def _end(self) -> None:
         """End, as the exchange does: wait for the stop, give up at last."""
         if not self.active:
@@ -594,6 +612,7 @@ class World:
             self.active = True
             for partner in self.partners:
                 partner.unwanted_since = math.inf
+                partner.left_over = partner.motor.runs
             for session in self.sessions:
                 session.activate(self.now)
 

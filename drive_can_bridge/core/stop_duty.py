@@ -19,8 +19,8 @@ table changes nothing.
                        RUNS_UNHEARD ─────────► UNHEARD ──────────────┘ that was confirmed
                                     a stop left
 
-``OWED`` is what a stop by cycles does not clear up: it was told to run by a write that the drive
-acknowledges, or by cycles that its maps have misrouted.
+``OWED`` is the only debt of a drive that acknowledges what it is told, until it has acknowledged
+what stops it.
 
 ``test/rule_checker.py`` lives through all sequences of events against a motor that obeys whatever
 arrives, and is red when a single row is changed.
@@ -42,7 +42,7 @@ class Debt(Enum):
     __hash__ = object.__hash__      # in C: looked up with every frame
 
     NONE = 'nothing'
-    OWED = 'told to run; what stops it has to be acknowledged, or to leave once more'
+    OWED = 'told to run by a write that is acknowledged, as what stops it will be'
     RUNS = 'told to run, by something that nobody acknowledges'
     RUNS_UNHEARD = 'told to run, and silent since'
     STOP_SENT = 'told to stop, and nothing has shown that it arrived'
@@ -138,7 +138,7 @@ _THIS = 'A drive that this activation has told anything but neutral and disable'
 ROWS: tuple[Row, ...] = (
     # what leaves
     Row((_NONE,), Happened.RUN_WRITTEN, _OWED, Do.NOTHING, _ACKNOWLEDGED),
-    Row((_NONE, _OWED), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
+    Row((_NONE,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
     Row((_STOP_SENT,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
     Row((_UNHEARD,), Happened.RUN_LEFT, _RUNS_UNHEARD, Do.NOTHING, _THIS),
     Row((_OWED,), Happened.STOP_LEFT, _NONE, Do.NOTHING, _ACKNOWLEDGED),
@@ -155,8 +155,8 @@ ROWS: tuple[Row, ...] = (
     Row(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),
     Row((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
     # what the session turns to is told to stop before
-    Row((_RUNS, _STOP_SENT), Happened.MISROUTED, _OWED, Do.NOTHING, _ROUTE),
-    Row((_OWED, _RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
+    Row((_STOP_SENT,), Happened.MISROUTED, _RUNS, Do.NOTHING, _ROUTE),
+    Row((_RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
     Row((_RUNS_UNHEARD, _UNHEARD), Happened.MAPS_DIFFER, None, Do.STOP_BY_NUMBER, _ROUTE),
     Row(OWING, Happened.STARTED, None, Do.STOP, _BEGUN),
     Row((_OWED, _RUNS_UNHEARD, _UNHEARD), Happened.SHOWED_UP, None, Do.STOP_BY_NUMBER, _WHATEVER),

@@ -62,9 +62,9 @@ class CyclicExchange(Generic[TelegramT]):
     :param in_turn: not each cycle asks this drive: whoever asks it settles the one before.
     :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
         has answered none of its cycles.
-    :param heeded: an answer to a cycle shows that what the drive was told by it has arrived.
     :param timer: says when cycles are due, where others are in step; None: one of its own.
     :ivar book: counts the cycles, and the answers.
+    :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
     :ivar timer: when the next cycle is due.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
@@ -81,7 +81,7 @@ class CyclicExchange(Generic[TelegramT]):
                  left: Callable[[], None] | None = None,
                  in_turn: bool = False,
                  audience: 'Callable[[], Iterable[CyclicExchange[Any]]] | None' = None,
-                 unheard: Callable[[], bool] | None = None, heeded: bool = True,
+                 unheard: Callable[[], bool] | None = None,
                  timer: CycleTimer | None = None) -> None:
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
         self.timer: CycleTimer = self.book.timer
@@ -99,7 +99,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._in_turn = in_turn
         self._audience = audience or (lambda: (self,))
         self._unheard = unheard or self._unanswered
-        self._heeded = heeded
+        self.heeded = True
         self._answer_due = math.inf
         self._telegram: TelegramT | None = None
         self._raws: list[int] | None = None     # in it, until it has left
@@ -303,7 +303,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _heed(self) -> None:
         """Take note that the drive has shown to have heard what it was told last, if it has."""
-        if self._heeded and self._session.duty.unshown and self.book.stop_shown:
+        if self.heeded and self._session.duty.unshown and self.book.stop_shown:
             self._session.duty.happened(Happened.ANSWERED)
         if self.book.stop_shown:
             self._session.neutral_stop.answered()

@@ -22,7 +22,7 @@ BY_CHANCE = 60
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_motor_runs_on(kind: str) -> None:
-    assert check(kind, all_stories(1)) == 40
+    assert check(kind, all_stories(1)) == 44
     assert check(kind, islice(some_stories(1), BY_CHANCE)) == BY_CHANCE
 
 
@@ -34,6 +34,14 @@ def test_short_restarts_are_the_one_exception(kind: str) -> None:
     assert not any(broken(kind, story) for story in stories)
     if '11 bit' not in kind and 'PKW' not in kind:      # which have to be very short
         assert any(broken(kind, story, lenient=False) for story in stories)
+
+
+@pytest.mark.parametrize('kind', [kind for kind, entry in KINDS.items() if entry.maps])
+@pytest.mark.parametrize('end', ['end', 'bus down'])
+def test_drive_that_is_silent_when_its_response_map_differs_is_named(kind: str, end: str) -> None:
+    for place in range(12):
+        assert not broken(kind, (
+            ('response map', 0.1 * place), ('silent', 0.0), ('quick_stop', 0.9), (end, 0.0)))
 
 
 def _nothing(*_: Any, **__: Any) -> None:

@@ -95,8 +95,8 @@ class ExtendedSession(Session):
             silent=self._axes_unknown if self._verify else None)
         self._exchange = CyclicExchange(
             self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
-            silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left,
-            heeded=not self._verify)    # otherwise the maps tell who has heard it
+            silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left)
+        self._exchange.heeded = not self._verify    # otherwise the maps tell who has heard it
         self.look_after(self._exchange, self._maps, self._positions, *self._side.parts,
                         channel=self._channel)
         self._phase = Phase.IDLE
@@ -128,6 +128,7 @@ class ExtendedSession(Session):
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
+        self._exchange.heeded = not self._verify
         self._differs = self._side.shows_up = False
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._side.begin_stop(now, setpoints=self._verify)
@@ -154,16 +155,20 @@ class ExtendedSession(Session):
                 self.duty.happened(Happened.ANSWERED)
         elif verdict is Verdict.DIFFER:
             self._differs = True
-            self.duty.channel(CYCLE, Happened.MISROUTED)
+            routed = self._maps.request_agrees
+            if not routed:
+                self.duty.channel(CYCLE, Happened.MISROUTED)
+            elif self._phase is Phase.DIFFERS:  # its last cycles were not answered, or it runs
+                self.duty.happened(Happened.SILENT)
             do = self.duty.happened(Happened.MAPS_DIFFER)
             self.lose(sentences.mapping_differs(text), now)
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = (
-                do is Do.STOP and self._maps.request_agrees and not self.gate.mute)
+            by_cycles = do is Do.STOP and routed and not self.gate.mute
             if do is not Do.NOTHING:
                 self._side.begin_stop(now, setpoints=not by_cycles)
             if by_cycles:
                 self._exchange.book.expect_nothing()
+                self._exchange.heeded = True    # the request map was read just now
                 if self._phase is not Phase.LEAVING:
                     self._phase = Phase.LEAVING
                     timer = self._exchange.timer
@@ -215,6 +220,7 @@ class ExtendedSession(Session):
 
     def _start_cycling(self, now: float) -> None:
         self._phase = Phase.CYCLIC
+        self._exchange.heeded = not self._verify
         self._exchange.book.forget_asked()
         self._exchange.start(now, in_turn=True)
         self.report.advice = sentences.cycles_unanswered()

@@ -208,6 +208,33 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     assert talk.session.state is DriveState.OFFLINE
 
 
+def neutral_cycles_without_an_answer() -> Conversation:
+    """Return a drive whose response map differs, at 11.9 s."""
+    talk = running()
+    look(talk)
+    talk.hears(REQUEST_MAP, 11.003)
+    talk.hears(OTHER_RESPONSE, 11.004)
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+    return talk
+
+
+def test_response_map_that_differs_and_a_drive_that_falls_silent() -> None:
+    talk = neutral_cycles_without_an_answer()
+    assert warnings(talk) == []
+    talk.bus_down(11.9)
+    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+
+
+def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
+    talk = neutral_cycles_without_an_answer()
+    assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
+    assert talk.hears(REQUEST_MAP, 12.02) == [ASK_RESPONSE_MAP]
+    sent = talk.hears(OTHER_RESPONSE, 12.03) + [text for _, text in talk.until(12.04)]
+    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 12.05) == []
+    assert not talk.session.may_run
+
+
 def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() -> None:
     talk = running()
     look(talk)
