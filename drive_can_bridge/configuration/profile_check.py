@@ -24,7 +24,7 @@ from drive_can_bridge.configuration.schema import profile_schema
 from drive_can_bridge.configuration.schema_check import check_schema
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,
+    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind,
 )
 from drive_can_bridge.core.profile import FaultTable, Profile
 from drive_can_bridge.core.words import show, suggestion
@@ -93,6 +93,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         check_control(tree, parameters, names)
         if tree.is_sound(('control',)):
             control = control_table(tree.data['control'])
+            _name_words(parameters, control.parameter, tree.data['control']['words'])
     fault = None
     if isinstance(tree.data.get('fault'), dict):
         check_fault(tree, parameters, names)
@@ -114,6 +115,15 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         identity=tuple(name for name in tree.data.get('identity', ()) if name in parameters),
         restore=restore_table(tree, parameters), fault=fault)
     return LoadedProfile(profile, tree, names)
+
+
+def _name_words(parameters: dict[str, Parameter], name: str, words: dict[str, int]) -> None:
+    """Let what a control word says stand beside it wherever it is shown."""
+    parameter = parameters.get(name)
+    if parameter is not None and not parameter.values and parameter.kind is ValueKind.INTEGER:
+        parameters[name] = replace(parameter, values=tuple(
+            (parameter.raw_from_word(word), text.replace('_', ' '))
+            for text, word in words.items()))
 
 
 def _name_faults(parameters: dict[str, Parameter], fault: FaultTable) -> None:
