@@ -118,11 +118,11 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
 
 
 def _name_words(parameters: dict[str, Parameter], name: str, words: dict[str, int]) -> None:
-    """Let what a control word says stand beside it wherever it is shown."""
+    """Let what a control word says, in a short word, stand beside it wherever it is shown."""
     parameter = parameters.get(name)
     if parameter is not None and not parameter.values and parameter.kind is ValueKind.INTEGER:
         parameters[name] = replace(parameter, values=tuple(
-            (parameter.raw_from_word(word), text.replace('_', ' '))
+            (parameter.raw_from_word(word), text.removeprefix('quick_').partition('_')[0])
             for text, word in words.items()))
 
 

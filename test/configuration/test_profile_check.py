@@ -295,7 +295,7 @@ def test_good_profile(tmp_path: Path) -> None:
         ready=StatusPattern(1, 1), enabled=StatusPattern(2, 2), fault=StatusPattern(8, 8))
     # what a control word says stands beside it wherever it is shown
     assert profile.parameters['word'].values == (
-        (0, 'disable'), (1, 'enable'), (2, 'quick stop'), (128, 'reset fault'))
+        (0, 'disable'), (1, 'enable'), (2, 'stop'), (128, 'reset'))
 
 
 @pytest.mark.parametrize(('old', 'new'), [
