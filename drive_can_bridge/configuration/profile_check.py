@@ -20,7 +20,7 @@ from drive_can_bridge.configuration.profile_sections import (
 from drive_can_bridge.configuration.schema import check_schema, profile_schema
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value,
+    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind,
 )
 from drive_can_bridge.core.profile import FaultTable, Profile
 from drive_can_bridge.core.words import show, suggestion
@@ -90,6 +90,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         check_control(tree, parameters, names)
         if tree.is_sound(('control',)):
             control = control_table(tree.data['control'])
+            _name_words(parameters, control.parameter, tree.data['control']['words'])
     fault = None
     if isinstance(tree.data.get('fault'), dict):
         check_fault(tree, parameters, names)
@@ -111,6 +112,15 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         identity=tuple(name for name in tree.data.get('identity', ()) if name in parameters),
         restore=restore_table(tree, parameters), fault=fault)
     return LoadedProfile(profile, tree, names)
+
+
+def _name_words(parameters: dict[str, Parameter], name: str, words: dict[str, int]) -> None:
+    """Let what a control word says, in a short word, stand beside it wherever it is shown."""
+    parameter = parameters.get(name)
+    if parameter is not None and not parameter.values and parameter.kind is ValueKind.INTEGER:
+        parameters[name] = replace(parameter, values=tuple(
+            (parameter.raw_from_word(word), text.removeprefix('quick_').partition('_')[0])
+            for text, word in words.items()))
 
 
 def _name_faults(parameters: dict[str, Parameter], fault: FaultTable) -> None:

@@ -95,9 +95,10 @@ class ParameterInfo:
         if isinstance(value, bool):
             return 'true' if value else 'false'
         if isinstance(value, int):
+            text = str(value)
             if self.name.endswith(_WORD_SUFFIX) and value >= 0:
-                return f'0x{value:0{8 if "32" in self.facts.get("type", "") else 4}X}'
-            return f'{value} {name}' if (name := self.names.get(value)) else str(value)
+                text = f'0x{value:0{8 if "32" in self.facts.get("type", "") else 4}X}'
+            return f'{text} {name}' if (name := self.names.get(value)) else text
         if not math.isfinite(value):
             return str(value)
         decimals = self._decimals
@@ -107,9 +108,9 @@ class ParameterInfo:
 
     def assignment(self, value: Value) -> str:
         """Write ``actual_speed=12.3 rpm``; integers as they are, for programs to read."""
-        plain = isinstance(value, int) and not isinstance(value, bool) and (
-            value not in self.names)
-        text = str(value) if plain else self.text(value)
+        text = self.text(value)
+        if isinstance(value, int) and not isinstance(value, bool):
+            text = f'{value} {name}' if (name := self.names.get(value)) else str(value)
         return f'{self.name}={text}{f" {self.unit}" if self.unit else ""}'
 
     def parse(self, text: str) -> Value:

@@ -293,6 +293,9 @@ def test_good_profile(tmp_path: Path) -> None:
     assert profile.control == ControlTable(
         'word', disable=0, enable=1, quick_stop=2, reset_fault=128, status_parameter='status',
         ready=StatusPattern(1, 1), enabled=StatusPattern(2, 2), fault=StatusPattern(8, 8))
+    # what a control word says stands beside it wherever it is shown
+    assert profile.parameters['word'].values == (
+        (0, 'disable'), (1, 'enable'), (2, 'stop'), (128, 'reset'))
 
 
 @pytest.mark.parametrize(('old', 'new'), [

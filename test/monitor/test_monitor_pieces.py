@@ -27,6 +27,8 @@ from drive_can_bridge.monitor.values import ParameterInfo, SamplingPlan
     (info('count'), -7, '-7'),
     (info('status_word', kind='uint16'), 0x1234, '0x1234'),
     (info('control_word', kind='uint32'), 0x1234, '0x00001234'),
+    (ParameterInfo('control_word', ValueKind.INTEGER, facts={'values': '0:disable 1:enable'}), 1,
+     '0x0001 enable'),
     (ParameterInfo('flag', ValueKind.BOOL), True, 'true')])
 def test_values_have_the_digits_of_their_steps(told: ParameterInfo, value: Value,
                                                text: str) -> None:
