@@ -15,6 +15,8 @@ from drive_can_bridge.core.text import printable
 
 FAILED = 1
 WRONG_USAGE = 2
+#: characters of a line of complaint: some name all that there is
+LINE_MAX = 4000
 _NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your installation '
            "(/opt/ros/jazzy/setup.bash), or get it as wheels with the extra 'ros' of this package "
            "(pip install '.[ros]')")
@@ -44,7 +46,7 @@ def say(text: str) -> None:
 
 def complain(text: str) -> None:
     """Write to standard error, a line or more."""
-    print('\n'.join(printable(line, None) for line in text.split('\n')), file=sys.stderr,
+    print('\n'.join(printable(line, LINE_MAX) for line in text.split('\n')), file=sys.stderr,
           flush=True)
 
 

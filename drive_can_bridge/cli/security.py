@@ -10,6 +10,7 @@ import ipaddress
 from pathlib import Path
 
 from drive_can_bridge.cli.arguments import namespace, output_path, whole
+from drive_can_bridge.cli.whole_file import write_whole
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.security.policy import BRIDGE, OPERATOR, policy, VIEWER
 from drive_can_bridge.security.tls import bridge_profile, client_profile, Meeting
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         _TLS_BRIDGE: bridge_profile(meeting), _TLS_CLIENT: client_profile(meeting)}
     args.output.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        (args.output / name).write_text(text, encoding='utf-8')
+        write_whole(args.output / name, text.encode())
         print(args.output / name)
     return 0
 

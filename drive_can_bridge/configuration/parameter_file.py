@@ -182,7 +182,9 @@ def unseen_problems(paths: Iterable[FilePath], node: str,
 
 def _is_for(section: str, node: str) -> bool:
     """Tell whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
-    pattern = re.escape(f'/{section.removeprefix("/")}')
+    # several in a row are one: tried in all ways, they would take for ever
+    section = re.sub(r'(/\*\*)+', '/**', f'/{section.removeprefix("/")}')
+    pattern = re.escape(section)
     pattern = pattern.replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
     return re.fullmatch(pattern, node) is not None
 

@@ -16,6 +16,11 @@ from drive_can_bridge.core.text import printable
 
 Path = tuple[Union[str, int], ...]
 
+#: characters of a message, which names what may be many
+MESSAGE_MAX = 2000
+#: lines that anybody reads; a file of 4 MiB may have a million mistakes
+PROBLEMS_MAX = 1000
+
 
 class Problem(NamedTuple):
     """
@@ -34,8 +39,9 @@ class Problem(NamedTuple):
 
     def __str__(self) -> str:
         """Write the line that users see; it stays one, whatever a key or value contains."""
-        text = f'{self.key}: {self.message}' if self.key else self.message
-        return printable(f'{self.file}:{self.line}: {text}' if self.file else text, None)
+        place = f'{printable(self.file, None)}:{self.line}: ' if self.file else ''
+        key = f'{printable(self.key)}: ' if self.key else ''
+        return f'{place}{key}{printable(self.message, MESSAGE_MAX)}'
 
 
 @dataclass(frozen=True)
@@ -106,8 +112,15 @@ class Tree:
 
 
 def report(problems: Iterable[Problem]) -> list[str]:
-    """Write problems as lines: no line twice, those of one file together and in its order."""
+    """
+    Write problems as lines: no line twice, those of one file together and in its order.
+
+    Of more than :data:`PROBLEMS_MAX` the last line says how many.
+    """
     unique = list(dict.fromkeys(problems))
     order = {file: rank for rank, file in enumerate(dict.fromkeys(p.file for p in unique))}
     unique.sort(key=lambda problem: (order[problem.file], problem.line))
-    return [str(problem) for problem in unique]
+    lines = [str(problem) for problem in unique[:PROBLEMS_MAX]]
+    if len(unique) > PROBLEMS_MAX:
+        lines.append(f'and {len(unique) - PROBLEMS_MAX} more')
+    return lines

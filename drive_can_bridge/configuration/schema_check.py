@@ -124,6 +124,8 @@ def _message(error: ValidationError) -> str:
         return f'a list of {len(value)} values, allowed are {count}'
     if error.validator == 'minProperties':
         return 'an empty mapping, allowed is at least one entry'
+    if error.validator == 'maxProperties':
+        return f'a mapping of {len(value)} entries, allowed are at most {schema["maxProperties"]}'
     return f'{show(value)} is wrong, allowed is {allowed(schema)}'
 
 

@@ -24,6 +24,7 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 #: of what is read at all, in MiB and in levels
 SIZE_MAX = 4
 DEPTH_MAX = 32
+_TOO_DEEP = f'nested too deep, allowed are {DEPTH_MAX} levels'
 #: what is noticed to be wrong much later: where it begins is the line to look at
 _OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scanning a simple key')
 
@@ -109,7 +110,7 @@ def _documents(data: bytes) -> list[Document]:
                 growing[-1].append(node)
                 growing.append(node.items)
                 if len(growing) > DEPTH_MAX + 1:
-                    raise BrokenYaml(line, f'nested too deep, allowed are {DEPTH_MAX} levels')
+                    raise BrokenYaml(line, _TOO_DEEP)
             elif isinstance(event, yaml.CollectionEndEvent):
                 growing.pop()
             elif isinstance(event, yaml.DocumentStartEvent):
@@ -129,6 +130,8 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     if indentation is not None and b'\t' in indentation[0]:
         return BrokenYaml(line, 'a tab in the indentation, allowed are spaces')
     what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
+    if 'nesting' in what:   # libyaml has a limit of its own since PyYAML 6.0.4
+        return BrokenYaml(line, _TOO_DEEP)
     if context.startswith('while parsing a block mapping'):
         what += ' (no key above it is indented like it: is one missing?)'
     return BrokenYaml(line, f'not valid YAML: {what}')

@@ -2,22 +2,12 @@
 """
 What can be asked of a drive beyond parameters: ``~/enable``, ``~/reset_fault``, ``~/quick_stop``.
 
-What a request does:
-
-.. code-block:: text
-
-    request      control word                     goes on, or is answered, when the status says
-    -----------  -------------------------------  ---------------------------------------------
-    ENABLE       disable                          ready, not enabled, no fault: goes on
-                 enable                           enabled: success, the word stays
-    DISABLE      disable                          not enabled: success
-    QUICK_STOP   quick_stop                       not enabled: success, disable (*)
-    RESET_FAULT  disable (sent once: a new edge)  fault: goes on; no fault: success
-                 reset_fault, a pulse             goes on when it has left often enough
-                 disable                          no fault: success
+What a request does, step by step, is a table, :data:`.control_steps.STEPS`: which control word
+is sent, what the status has to say, and what follows then. Which of two requests gives way is
+another, :data:`.control_steps.MEETINGS`. Here stands why they are as they are.
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
-``disable``; but (*) a drive that says that it still brakes when the time is over keeps its quick
+``disable``; but a drive that says that it still brakes when the time is over keeps its quick
 stop until it lets go: ``disable`` may let it coast. So ``enable`` is on the bus only for the sake
 of an ENABLE that nothing has ended since; a fault, or a drive that drops out of ``enabled`` by
 itself, ends it like a stop does.

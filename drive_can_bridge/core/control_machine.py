@@ -13,6 +13,9 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_operation import Answers, Operation
+from drive_can_bridge.core.control_steps import (
+    Meeting, MEETINGS, Seen, STEPS, Then,
+)
 from drive_can_bridge.core.control_texts import (
     disregard_text, state_text, stuck_text, success_text,
 )
@@ -161,7 +164,7 @@ class ControlMachine:
             self._answers.complete(request, False, refusal)
             return
         under_way = self._operation
-        if under_way is None or under_way.action is not action:
+        if under_way is None or MEETINGS[action, under_way.action] is not Meeting.JOINS:
             if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
                     under_way is None or under_way.action in _STOPS):
                 self._answers.complete(
@@ -291,44 +294,65 @@ class ControlMachine:
         if action is ControlAction.ENABLE and self._fault:
             return sentences.reset_first(self.fault_text)
         under_way = self._operation
-        if under_way is None or under_way.action not in _STOPS or action in _STOPS:
-            return None
-        if action is ControlAction.RESET_FAULT and self._fault is False:
+        if under_way is None or (
+                MEETINGS[action, under_way.action] is not Meeting.REFUSED
+                or self._nothing_to_do(action)):
             return None
         return sentences.stop_under_way(under_way.action.value, action.value)
 
     def _advance(self) -> None:
-        """Take the next step of what is under way, if the drive confirms the last one."""
+        """Take the next step of what is under way, if what it waits for is seen."""
         under_way = self._operation
-        if under_way is None:
-            return
+        if under_way is not None:
+            for step in STEPS:
+                if (step.request is under_way.action and step.word is self._sending
+                        and all(self._sees(each, under_way) for each in step.when)):
+                    self._take(step.then, under_way)
+                    return
+
+    def _sees(self, wanted: Seen, under_way: Operation) -> bool:
         table = self._table
-        if under_way.action is ControlAction.ENABLE:
-            if self._sending is ControlAction.DISABLE:
-                if (self._confirmed(table.fault, False) and self._confirmed_off()
-                        and self._confirmed(table.ready, True)):
-                    self._send(ControlAction.ENABLE)
-            elif self._confirmed(table.enabled, True):
-                self._reached = True
-                self._end(True, success_text(table, self._sending, self.state))
-        elif under_way.action is ControlAction.RESET_FAULT:
-            if self.pulsing:
-                if self._pulses_left <= 0:
-                    under_way.pulsed = True
-                    self._send(ControlAction.DISABLE)
-            elif not under_way.pulsed and self._resettable():
+        match wanted:
+            case Seen.NO_FAULT:
+                return self._confirmed(table.fault, False)
+            case Seen.READY:
+                return self._confirmed(table.ready, True)
+            case Seen.ENABLED:
+                return self._confirmed(table.enabled, True)
+            case Seen.OFF:
+                return self._confirmed_off()
+            case Seen.RESETTABLE:
+                return not under_way.pulsed and self._resettable()
+            case Seen.PULSED:
+                return self._pulses_left <= 0
+            case Seen.REPORTS:
+                return table.enabled is not None
+
+    def _take(self, then: Then, under_way: Operation) -> None:
+        match then:
+            case Then.SEND_ENABLE:
+                self._send(ControlAction.ENABLE)
+            case Then.SEND_RESET:
                 self._pulses_left = self._pulse
                 self._send(ControlAction.RESET_FAULT)
-            elif self._confirmed(table.fault, False):
-                self._end(True, sentences.reset_not_reported() if table.fault is None else
-                          sentences.state_reached(self.state))
-        elif self._confirmed_off():
-            message = success_text(table, self._sending, self.state)
-            unheard = self._unheard()
-            if table.enabled is None and self._sending is ControlAction.QUICK_STOP:
-                self._answers.answer(under_way, True, message)      # keeps braking
-            else:
-                self._end(not unheard, unheard or message)
+            case Then.SEND_DISABLE:
+                under_way.pulsed = True
+                self._send(ControlAction.DISABLE)
+            case Then.ANSWER:
+                self._answers.answer(under_way, True, self._success(under_way))
+            case Then.SUCCEED_AND_STAY:
+                self._reached = True
+                self._end(True, self._success(under_way), stays=True)
+            case Then.SUCCEED:
+                unheard = self._unheard() if under_way.action in _STOPS else NOTHING
+                self._end(not unheard, unheard or self._success(under_way))
+
+    def _success(self, under_way: Operation) -> Sentence:
+        """Name what was reached, or say that nobody knows."""
+        if under_way.action is not ControlAction.RESET_FAULT:
+            return success_text(self._table, self._sending, self.state)
+        return (sentences.reset_not_reported() if self._table.fault is None else
+                sentences.state_reached(self.state))
 
     def _watch_fault(self, raw: int) -> None:
         """Note a fault that comes or goes; it ends everything but stops and resets."""
@@ -392,11 +416,10 @@ class ControlMachine:
         self._sending = action
         self._reached = self._reached and action is ControlAction.ENABLE
 
-    def _end(self, success: bool, message: Sentence) -> None:
-        """Answer what is under way, if anything; only a successful ENABLE keeps its word."""
+    def _end(self, success: bool, message: Sentence, *, stays: bool = False) -> None:
+        """Answer what is under way, if anything; unless its word stays, ``disable`` follows."""
         under_way, self._operation = self._operation, None
         if under_way is not None:
             self._answers.answer(under_way, success, message)
-            if success and under_way.action is ControlAction.ENABLE:
-                return
-        self._send(ControlAction.DISABLE)
+        if not stays:
+            self._send(ControlAction.DISABLE)

@@ -50,7 +50,7 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.core.told import Told
+from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty
 from drive_can_bridge.core.users import Users
 
 
@@ -82,7 +82,7 @@ class Session(ABC):
     :ivar roles: what the bridge uses parameters for.
     :ivar sample_parameters: of a sample, in the order of ``ProcessDataReceived.raws``.
     :ivar sent: what the drive was told last.
-    :ivar told: whether the drive may be running by our word.
+    :ivar duty: whether the drive may be running by our word, and was told to stop.
     :ivar retry: how long and how often the drive is asked.
     :ivar users: what they want of the drive; the family says who serves that.
     :ivar report: events, and what is missing while the drive is offline.
@@ -109,7 +109,7 @@ class Session(ABC):
         self.statistics = DriveStatistics()
         self.outbox = Outbox()
         self.report = Reporter(self.statistics, sentences.not_activated())
-        self.told = Told()
+        self.duty = StopDuty()
         self.sent = LastSent(image.request)
         self.sample_parameters = image.sample
         self.setpoints = Setpoints(
@@ -153,7 +153,7 @@ class Session(ABC):
         self.ever_online = False
         self.sent.clear()
         self.setpoints.reset()
-        self.told.stopped()  # what an activation before this one told is not ours to undo
+        self.duty.happened(Happened.ACTIVATED)  # what one before told is not ours to undo
         if self.bus_available:
             self.bus_up(now)
 
@@ -192,7 +192,8 @@ class Session(ABC):
 
     def _begin_end(self, reason: Sentence, now: float) -> None:
         self.active = False
-        unheard = not self.online and self.told.doubt()
+        if not self.online:
+            self.duty.happened(Happened.SILENT)
         owes = self.prepare_stop(now)
         if owes:
             self.stage = Stage.STOPPING
@@ -200,8 +201,7 @@ class Session(ABC):
         self.withdraw(reason, now)
         if owes and self.begin_stop(now):
             return
-        if owes or unheard or not self.bus_available:
-            self._leave_owing(sentences.stop_not_possible())
+        self._leave_owing(sentences.stop_not_possible())
         self.go_idle(sentences.deactivated())
 
     def stop_left(self) -> None:
@@ -235,7 +235,7 @@ class Session(ABC):
         """Handle the loss of the bus: requests fail, the drive is offline."""
         self.bus_available = False
         if self.unshown or not (self.active or self.stopped):
-            self.told.doubt()   # no answer to the stop will come
+            self.duty.happened(Happened.SILENT)     # no answer to the stop will come
         self.users.fail_all(sentences.bus_down())
         down = sentences.bus_is_down(self.configuration.bus, reason)
         self.lose(down, now)
@@ -307,7 +307,7 @@ class Session(ABC):
 
     def _leave_owing(self, why: Sentence) -> None:
         """Say that the drive is left as it is, if it was told to run and not to stop."""
-        if self.told.owed:
+        if self.duty.happened(Happened.LEFT_ALONE) is Do.WARN:
             self.report.warn(why, may_run=True)
 
     # -- what a family fills in -------------------------------------------------------------------
@@ -440,9 +440,14 @@ class Session(ABC):
         return {}
 
     @property
+    def may_run(self) -> bool:
+        """Nothing has shown yet that the drive does not run by our word."""
+        return self.duty.may_run
+
+    @property
     def unshown(self) -> bool:
         """The drive was told to run, and has not shown to have heard that it was told to stop."""
-        return self.told.ran
+        return self.duty.unshown
 
     @property
     def offline_advice(self) -> Sentence:

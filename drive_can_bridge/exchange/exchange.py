@@ -137,23 +137,29 @@ class BusExchange:
 
     def deactivate(self) -> bool:
         """
-        Stop every drive safely and wait until it is done.
+        Stop every drive safely and wait until it is done; somebody else may have begun with it.
 
         :return: False when it could not be completed in time (a bus that blocks).
         """
         with self.lock:
-            now = self._clock()
-            lost = self.active and now - self._last_pass >= LOST_TIME  # nobody has noticed yet
-            self.active = False
-            for member in self._members:
-                member.anew_at = math.inf
-                if lost:
-                    member.take(member.session.time_lost, now)
-                member.take(member.session.deactivate, now)
+            if self.active:
+                self._begin_stop(self._clock())
         self._alarm.ring()
+        return self._wait_for_stop()
+
+    def _begin_stop(self, now: float) -> None:
+        lost = now - self._last_pass >= LOST_TIME   # nobody has noticed yet
+        self.active = False
+        for member in self._members:
+            member.anew_at = math.inf
+            if lost:
+                member.take(member.session.time_lost, now)
+            member.take(member.session.deactivate, now)
+
+    def _wait_for_stop(self) -> bool:
         end = self._clock() + STOP_MARGIN + max(
             (session.longest_stop for session in self._sessions), default=0.0)
-        while not self._stopped():
+        while not self.stopped:
             now = self._clock()
             if now > end:
                 self._give_up()
@@ -191,7 +197,9 @@ class BusExchange:
         self._thread.join(2.0)
         self.link.stop()
 
-    def _stopped(self) -> bool:
+    @property
+    def stopped(self) -> bool:
+        """No drive is exchanged with, or being stopped."""
         with self.lock:
             return all(session.stopped for session in self._sessions)
 

@@ -10,7 +10,7 @@ from drive_can_bridge.exchange.exchange import BusExchange
 
 def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
     """
-    Stop the drives of every exchange that is active, and wait until it is done.
+    Stop the drives of every exchange that is active, or being stopped, and wait until it is done.
 
     :return: why the stop frames could not all be sent, by name of the bus.
     """
@@ -26,7 +26,7 @@ def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
         failures[exchange.bus.name] = reason
 
     threads = [clock.worker(partial(stop, exchange), f'stop {exchange.bus.name}')
-               for exchange in exchanges if exchange.active]
+               for exchange in exchanges if exchange.active or not exchange.stopped]
     for thread in threads:
         thread.start()
     for thread in threads:

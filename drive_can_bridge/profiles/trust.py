@@ -15,15 +15,17 @@ from drive_can_bridge.resources import profiles_directory, share_directory
 PAGE = 'profile_trust.md'
 #: how an entry's key ``verified`` is shown
 TRUST_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
+#: and how the entries of each kind are headed, in the order of the page
+TITLES: dict[bool | None, str] = {True: 'verified', False: 'not verified', None: 'not judged'}
 
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-Made from the profiles by `python3 -m drive_can_bridge.profiles.trust`; edit those, not this page.
+Which entries of the shipped profiles are backed by a document, and by which. *Verified*: address,
+type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. What
+has no number is in process data only.
 
-*Verified* means that address, type, scale and unit of an entry are backed by its source. *Open* is
-what of it nothing backs. A verified entry has been compared with what is written somewhere; none
-has been compared with a device. [profiles.md](profiles.md) says what the keys mean.
+Made by `python3 -m drive_can_bridge.profiles.trust`; edit the profiles ([keys](profiles.md)).
 """
 
 
@@ -44,17 +46,28 @@ def _section(checked: Checked) -> Iterator[str]:
     yield f'{profile.description}. {len(profile.parameters)} entries, {checked.count(True)} of ' \
           'them verified.'
     yield ''
-    yield '| entry | address | verified | open | source |'
-    yield '|---|---|---|---|---|'
-    for name, entry in checked.entries.items():
-        parameter = profile.parameters[name]
-        yield f'| `{name}` | {parameter.address} | {TRUST_WORDS[parameter.verified]} ' \
-              f'| {_cell(entry.get("open", ""))} | {_cell(entry.get("source", ""))} |'
-    yield ''
-    yield '| source | what it is |'
-    yield '|---|---|'
+    for verified, title in TITLES.items():
+        if rows := _rows(checked, verified):
+            yield f'| {title} | open | source |'
+            yield '|---|---|---|'
+            for row, names in rows.items():
+                yield f'| {", ".join(names)} | {" | ".join(row)} |'
+            yield ''
     for key, text in checked.sources.items():
-        yield f'| {key} | {_cell(text)} |'
+        yield f'* **{key}**: {text}'
+
+
+def _rows(checked: Checked, verified: bool | None) -> dict[tuple[str, ...], list[str]]:
+    """Return the entries, with their addresses, by what is open of them and their sources."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for name, entry in checked.entries.items():
+        parameter = checked.loaded.profile.parameters[name]
+        if parameter.verified is not verified:
+            continue
+        row = _cell(entry.get('open', '')), _cell(entry.get('source', ''))
+        address = '' if parameter.number is parameter.index is None else f' {parameter.address}'
+        rows.setdefault(row, []).append(f'`{name}`{address}')
+    return rows
 
 
 def _cell(text: str) -> str:

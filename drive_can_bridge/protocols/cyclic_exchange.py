@@ -24,6 +24,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -34,8 +35,6 @@ MORE_CYCLES = 3
 LAST_ANSWER = 0.1
 #: s between a cycle and one that is brought forward because commands are too old
 EXPIRY_SPACING = 0.05
-#: what the drive is told by cycles, for the books of what it was told
-CYCLE = 'cycle'
 
 TelegramT = TypeVar('TelegramT')
 
@@ -222,12 +221,12 @@ class CyclicExchange(Generic[TelegramT]):
             self._whole = False
         elif self.runs:
             for each in to:
-                each._session.told.note_unacknowledged(CYCLE, runs=True)
+                each._session.duty.channel(CYCLE, Happened.RUN_LEFT)
         if self._frames_out or not self._whole:
             return
         if not self.runs:
             for each in self._audience():
-                each._session.told.note(CYCLE, runs=False)
+                each._session.duty.channel(CYCLE, Happened.STOP_LEFT)
             session.neutral_stop.all_left()
         if self._raws is not None:      # the first time that it left
             session.sent.take(self._raws)
@@ -295,8 +294,8 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _heed(self) -> None:
         """Take note that the drive has shown to have heard what it was told last, if it has."""
-        if self._heeded and self._session.told.ran and self.book.stop_shown:
-            self._session.told.answered()
+        if self._heeded and self._session.duty.unshown and self.book.stop_shown:
+            self._session.duty.happened(Happened.ANSWERED)
         if self.book.stop_shown:
             self._session.neutral_stop.answered()
 
@@ -323,7 +322,7 @@ class CyclicExchange(Generic[TelegramT]):
             session = self._session
             if session.online:
                 session.lose(reason, now)
-            elif not session.told.owed and session.told.doubt():
+            elif session.duty.happened(Happened.UNANSWERED) is Do.STOP_BY_NUMBER:
                 session.report.warn(sentences.stop_not_answered(), may_run=True)
             session.report.advice = sentences.silent(self._silence, self._advice)
 
@@ -391,9 +390,9 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _unanswered(self) -> bool:
         """Tell whether a drive that ran has not shown to have heard one of the last cycles."""
-        return self._session.told.ran and not self.book.stop_shown
+        return self._session.duty.unshown and not self.book.stop_shown
 
     def doubt_the_end(self) -> None:
         """Take note of a drive that ran, and has answered none of its last cycles."""
         if self._unanswered():
-            self._session.told.doubt()
+            self._session.duty.happened(Happened.SILENT)

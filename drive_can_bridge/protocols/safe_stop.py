@@ -17,7 +17,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import CONTROL_WORD
+from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.courier import ReplyT, StepT
 
@@ -99,7 +99,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         """
         session = self._session
         self.running = True
-        self._owed, self._insisting = session.told.owed and not again, insist
+        self._owed, self._insisting = session.duty.owed and not again, insist
         self._again = again
         self._whole = setpoints and not session.gate.mute
         self._channel.run(self._then_look(procedure), self._done, now, Lane.STOP)
@@ -139,15 +139,15 @@ class SafeStop(Generic[StepT, ReplyT]):
             self.again_at = self._channel.now
         if not failed:
             if self._whole:
-                session.told.stopped()
+                session.duty.happened(Happened.STOPPED)
             else:
-                session.told.note(CONTROL_WORD, runs=False)
+                session.duty.channel(CONTROL_WORD, Happened.STOP_LEFT)
                 if not session.active:  # in its end, to be disabled is enough
-                    session.told.answered()
-            if self._again and not session.told.owed:
+                    session.duty.happened(Happened.ANSWERED)
+            if self._again and not session.duty.owed:
                 session.report.note(Noted(sentences.stopped_again()))
         elif self._owed or self._insisting:
             session.report.warn(sentences.stop_failed(failed), may_run=self._owed)
             if not session.active:      # which ends with it: there is no more to be said
-                session.told.stopped()
+                session.duty.happened(Happened.SAID)
         self._ended()

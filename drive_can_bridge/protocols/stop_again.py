@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
@@ -60,8 +61,8 @@ class StopAgain:
 
     @property
     def _wanted(self) -> bool:
-        session, told = self._session, self._session.told
-        return not session.online and session.stage is Stage.RUNNING and (told.owed or told.ran)
+        session = self._session
+        return not session.online and session.stage is Stage.RUNNING and session.duty.may_run
 
     def _begin(self) -> Generator[Any, Any, None]:
         """Begin when the exchange under way has ended, unless that has found the drive."""
@@ -71,5 +72,5 @@ class StopAgain:
 
     def _again(self, now: float) -> None:
         self._pause = min(2 * self._pause, self._longest)
-        self._session.told.doubt()
+        self._session.duty.happened(Happened.SHOWED_UP)
         self._tell(now)

@@ -15,6 +15,7 @@ shutdown   deactivate and cleanup as far as needed
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+import gc
 from pathlib import Path
 import shlex
 from typing import Any
@@ -232,6 +233,7 @@ class BridgeNode(LifecycleNode):
         fleet, self._fleet = self._fleet, None
         if fleet is not None:
             fleet.close()
+            gc.collect()    # see scheduling.PASSES
 
     def _dismiss(self, drives: Iterable[DriveNode] = ()) -> None:
         """Take drives out of the graph, each as soon as its last caller has an answer."""
@@ -255,12 +257,14 @@ class BridgeNode(LifecycleNode):
     def stop(self) -> None:
         """Stop the drives and publish a last diagnostic message; for the end of the process."""
         self._ending = True
-        if self._transition_lock.acquire(timeout=5.0):
-            try:
-                self._stop_drives()
-                if self._fleet is not None:
-                    self._fleet.diagnostics.conclude()
-            finally:
+        # a transition under way may take longer, such as a stop by writes that nobody answers
+        alone = self._transition_lock.acquire(timeout=5.0)
+        try:
+            self._stop_drives()
+            if self._fleet is not None:
+                self._fleet.diagnostics.conclude()
+        finally:
+            if alone:
                 self._transition_lock.release()
 
     def close(self) -> None:

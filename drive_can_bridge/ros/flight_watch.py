@@ -100,6 +100,7 @@ class FlightWatch:
         occasions = self._occasions = Occasions(self._recorder.trigger)
         #: what else is worth a trace: a bus that is gone, and a diagnostic status
         self.bus_lost, self.reported = occasions.bus_lost, occasions.reported
+        self._calls = 0     # that wait for their answer
         self._service = node.create_service(TriggerService, '~/save_trace', self._save,
                                             callback_group=ReentrantCallbackGroup())
 
@@ -124,11 +125,29 @@ class FlightWatch:
     def close(self) -> None:
         """Write what is still to be written. The exchanges must be closed."""
         self._recorder.close()
-        self._node.destroy_service(self._service)
+        self._leave()
+
+    def _leave(self) -> None:
+        """Let go of the service, as soon as its last caller has an answer."""
+        if self._calls:
+            self._thread.later(self._leave)
+        else:
+            self._node.destroy_service(self._service)
 
     # -- ~/save_trace -----------------------------------------------------------------------------
 
     async def _save(self, _: Any, response: Any) -> Any:
+        self._calls += 1
+        try:
+            return await self._saved(response)
+        finally:
+            # it is sent when this has ended
+            self._thread.later(self._end_call)
+
+    def _end_call(self) -> None:
+        self._calls -= 1
+
+    async def _saved(self, response: Any) -> Any:
         buses = self._recorder.buses
         if not buses:
             response.success, response.message = False, NOT_RECORDING

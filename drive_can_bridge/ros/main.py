@@ -148,7 +148,7 @@ def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
     """Say whose stop is cut short by a second signal."""
     for name, drive in list(bridge.drives.items()):
         session = drive.session
-        if not session.stopped and (session.told.owed or session.told.ran):
+        if not session.stopped and session.may_run:
             print(f'{name}: {may_still_be_running(ends_before_stop())}',
                   file=sys.stderr, flush=True)
 

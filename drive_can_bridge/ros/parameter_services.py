@@ -30,9 +30,10 @@ from drive_can_bridge.core.requests import (
     Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import bridge_inactive
+from drive_can_bridge.core.sentences import bridge_inactive, Sentence
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
+from drive_can_bridge.ros.log_limit import BURST
 from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
@@ -128,6 +129,7 @@ class ParameterServices:
             if wanted:
                 outcomes = await self._submit(
                     ReadRequest(tuple(parameter for _, parameter in wanted)))
+                failed: list[tuple[Parameter, Sentence]] = []
                 for (place, parameter), outcome in zip(wanted, outcomes):
                     if isinstance(outcome, ReadValue):
                         values[place] = parameter_value(
@@ -138,8 +140,9 @@ class ParameterServices:
                         if parameter.listed and (
                                 outcome.reason.code not in _NOT_ITS_FAULT):
                             self._unreadable.add(parameter.name)
-                        self._failed(f'read {_title(parameter)}', outcome.reason, 0)
+                        failed.append((parameter, outcome.reason))
                         self._remember(request.names[place], outcome.reason)
+                self._tell_outcomes('read', failed)
         elif request.names:
             for name, known in zip(request.names, found):
                 if known is not None:
@@ -213,11 +216,15 @@ class ParameterServices:
                 blind=all(self._restore.ends_mode(parameter.name, parameter.word_from_raw(raw))
                           for _, parameter, raw in items)))
             written = []
+            failed: list[tuple[Parameter, Sentence]] = []
             for (place, parameter, raw), outcome in zip(items, outcomes):
                 name = request.parameters[place].name
-                results[place] = self._result(parameter, name, outcome)
+                results[place] = _result(outcome)
+                if isinstance(outcome, Failure):
+                    failed.append((parameter, outcome.reason))
                 if isinstance(outcome, Written):
                     written.append((name, parameter, raw))
+            self._tell_outcomes('set', failed)
             self._announce(written)
         response.results = results
         return response
@@ -243,8 +250,10 @@ class ParameterServices:
             return response
         outcomes = await self._submit(WriteRequest(tuple(items), atomic=True))
         names = [message.name for message in request.parameters]
-        results = [self._result(parameter, name, outcome)
-                   for (parameter, _), name, outcome in zip(items, names, outcomes)]
+        results = list(map(_result, outcomes))
+        self._tell_outcomes('set', [
+            (parameter, outcome.reason) for (parameter, _), outcome in zip(items, outcomes)
+            if isinstance(outcome, Failure)])
         self._announce([(name, parameter, raw) for name, (parameter, raw), outcome
                         in zip(names, items, outcomes) if isinstance(outcome, Written)])
         # one reason when all parameters share it, else each with its name
@@ -281,12 +290,16 @@ class ParameterServices:
         if more > 0:
             self._failed(f'{what} parameters', f'{more} more names of the same call failed', more)
 
-    def _result(self, parameter: Parameter, name: str, outcome: Outcome) -> SetParametersResult:
-        if isinstance(outcome, Written):
-            return SetParametersResult(successful=True, reason=outcome.note)
-        reason = outcome.reason if isinstance(outcome, Failure) else 'no result'
-        self._failed(f'set {_title(parameter)}', reason, 0)
-        return SetParametersResult(successful=False, reason=reason)
+    def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Sentence]]) -> None:
+        """Log what became of a call's names: of what is no fault of theirs what a log takes."""
+        alike = 0
+        for parameter, reason in failures:
+            alike += reason.code in _NOT_ITS_FAULT
+            if alike <= BURST or reason.code not in _NOT_ITS_FAULT:
+                self._failed(f'{what} {_title(parameter)}', reason, 0)
+        if alike > BURST:
+            self._failed(f'{what} parameters',
+                         f'{alike - BURST} more names of the same call failed', 0)
 
     def _announce(self, written: list[tuple[str, Parameter, int]]) -> None:
         if not written:
@@ -323,6 +336,13 @@ def list_parameters(names: list[str], prefixes: list[str], depth: int) -> ListPa
                 found_prefixes.add(name.rsplit(SEPARATOR, 1)[0])
     result.prefixes = sorted(found_prefixes)
     return result
+
+
+def _result(outcome: Outcome) -> SetParametersResult:
+    if isinstance(outcome, Written):
+        return SetParametersResult(successful=True, reason=outcome.note)
+    return SetParametersResult(
+        successful=False, reason=outcome.reason if isinstance(outcome, Failure) else 'no result')
 
 
 def _title(parameter: Parameter) -> str:

@@ -11,10 +11,14 @@ import errno
 from drive_can_bridge.core.text import printable
 
 _GONE = 'is gone: unplugged?'
+_NO_SOCKETCAN = ('this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one (some '
+                 'containers and virtual machines have none)')
 
 
 def in_words(error: BaseException) -> str:
     """Return one readable line for any exception."""
+    if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
+        return _NO_SOCKETCAN
     text = printable(' '.join(str(error).split()))
     return text or type(error).__name__
 

@@ -2,6 +2,7 @@
 """What the words of a command line may be, and how columns stand."""
 
 from argparse import ArgumentTypeError
+from pathlib import Path
 import shlex
 import sys
 
@@ -41,6 +42,19 @@ def test_a_bit_rate() -> None:
 def test_an_argument_of_a_drive_that_is_not_there() -> None:
     with pytest.raises(WrongUsage, match="--fault x:late: no drive 'x'; drives: none"):
         of_drive('--fault', 'x:late', BridgeConfiguration(buses={}, drives={}), str)
+
+
+def test_no_line_has_all_that_a_file_has(tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    sections, table = tmp_path / 'many.yaml', tmp_path / 'wide.csv'
+    sections.write_text(''.join(f'/drive_{number}:\n  ros__parameters: {{a: 1}}\n'
+                                for number in range(2000)), encoding='utf-8')
+    assert main(['compare', str(sections), str(sections)]) == 2
+    columns = ';'.join(f'column {number}' for number in range(2000))
+    table.write_text(f'Nr;Name;{columns}\n1;a\n', encoding='utf-8')
+    assert main(['profile', 'import', str(table), '-o', str(tmp_path / 'p.yaml')]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 1 and max(map(len, lines)) <= 4000
 
 
 def test_columns() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.parameter_file import read_parameter_file, unseen_problems
+from drive_can_bridge.configuration.problems import PROBLEMS_MAX
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.errors import ConfigurationError
 
@@ -407,3 +408,35 @@ def test_section_that_stands_twice(tmp_path: Path) -> None:
     found, _ = unseen_problems([file], '/drive_can_bridge')
     assert [(problem.line, problem.key) for problem in found] == [(3, '/**/drive_can_bridge')]
     assert unseen_problems([file], '/other') == ([], [])
+
+
+def test_a_million_mistakes_are_told_in_as_many_lines_as_anybody_reads(tmp_path: Path) -> None:
+    file = tmp_path / 'f.yaml'
+    file.write_text('---\n' * 3000, encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(file)
+    assert len(caught.value.problems) == PROBLEMS_MAX + 1
+    assert caught.value.problems[-1].startswith('and ')
+
+
+@pytest.mark.parametrize('text', [
+    ''.join(f'/**/n{number}: {{ros__parameters: {{a: 1}}}}\n' for number in range(3000)),
+    f'{"k" * 100_000}: 1\n', f'{HEAD}    buses: {{}}\n    ? {"k" * 100_000}\n    : 1\n',
+    HEAD + BUSES.replace('virtual', 'virtual, bitrate: 125000') + '    drives:\n' + ''.join(
+        f'      d{number}: {{bus: m, protocol: datamodel_extended, station: {number % 127 + 1}, '
+        'profile: datamodel_example, cyclic_request: [speed_setpoint], '
+        'cyclic_response: [actual_speed]}\n' for number in range(600))],
+    ids=['sections', 'name', 'key', 'drives'])
+def test_no_line_has_all_that_a_file_has(tmp_path: Path, text: str) -> None:
+    file = tmp_path / 'f.yaml'
+    file.write_text(text, encoding='utf-8')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(file)
+    assert max(map(len, caught.value.problems)) < len(str(file)) + 3000
+
+
+def test_names_of_any_nodes_are_not_tried_in_all_ways(tmp_path: Path) -> None:
+    file = tmp_path / 'f.yaml'
+    file.write_text(f'{"/**" * 300}/x:\n  ros__parameters: {{a: 1, a: 2}}\n', encoding='utf-8')
+    assert unseen_problems([file], '/a/b/c/d/y')[0] == []
+    assert unseen_problems([file], '/a/b/c/d/x')[0] != []

@@ -243,6 +243,10 @@ CASES = [
     ('storage: ram}', 'storage: ram, limit: true, neutral: 0}', []),
     ('storage: ram}', 'storage: ram, values: {0: terminals, 3: bus, 0x10: "on", -1: other}}',
      ['table.yaml:6: parameters.word.values.-1: -1 does not fit, allowed is 0 to 65535']),
+    ('storage: ram}', 'storage: ram, values: {%s}}' % ', '.join(
+        f'{number}: name {number}' for number in range(1001)),
+     ['table.yaml:6: parameters.word.values: a mapping of 1001 entries, allowed are at most '
+      '1000']),
     ('storage: ram}', 'storage: ram, values: {0: off, 1: on}}',
      ['table.yaml:6: parameters.word.values.0: false, off or no without quotes is a bool, allowed '
       'is text: write it in quotes',

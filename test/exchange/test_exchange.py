@@ -7,7 +7,7 @@ import time
 from builders import (
     CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write,
 )
-from clocks import REAL
+from clocks import HandClock, REAL
 from exchange_builders import all_routes, Bench, BusNotes
 import pytest
 from saying import says
@@ -21,6 +21,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
 from drive_can_bridge.exchange.exchange import BusExchange, LOOK_PERIOD, PASS_PERIOD
+from drive_can_bridge.exchange.stop import stop_all
 
 ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
@@ -276,14 +277,29 @@ def test_deactivate_with_the_timer_thread() -> None:
     assert bench.bus_notes.told == [('opened', 'main')]
 
 
-def test_deactivate_gives_up_in_the_end() -> None:
+def test_deactivate_gives_up_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(drive())
     bench.online()
     bench.step = 0.01
-    bench.exchange._stopped = lambda: False  # type: ignore[method-assign]
+    monkeypatch.setattr(BusExchange, 'stopped', False)
     started = bench.now
     assert bench.exchange.deactivate() is False
     assert 0.5 < bench.now - started < 1.0
+
+
+def test_a_stop_that_somebody_else_has_begun_is_waited_for() -> None:
+    bench = Bench(drive(rearm_immediate=True))
+    bench.online()
+    bench.notes[0].commands.append((0, 100.0))
+    assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+    bench.step = 0.001
+    with bench.exchange.lock:
+        bench.exchange._begin_stop(bench.now)
+    assert not bench.exchange.active
+    assert stop_all([bench.exchange], HandClock(bench.clock)) == {}
+    assert bench.link.take() == [NEUTRAL] * 6   # nobody answers; and not begun anew
+    assert stop_all([bench.exchange], HandClock(bench.clock)) == {}
+    assert bench.link.take() == []
 
 
 def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:

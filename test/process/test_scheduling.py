@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """No thread keeps the interpreter for long; those of an exchange go first."""
 
+import gc
 import os
 from pathlib import Path
 import sys
@@ -28,13 +29,20 @@ def test_be_punctual(monkeypatch: pytest.MonkeyPatch, handover: float, interval:
             raise PermissionError(13, 'Permission denied')
     monkeypatch.setattr(os, 'setpriority', set_priority)
     monkeypatch.setattr(scheduling, 'handover_time', lambda: handover)
-    before = sys.getswitchinterval()
+    before, thresholds = sys.getswitchinterval(), gc.get_threshold()
     try:
         scheduling.be_punctual()
         assert sys.getswitchinterval() == pytest.approx(interval)
         assert asked == [(os.PRIO_PROCESS, 0, -10)]
+        # whatever anybody keeps the bridge busy with, nobody stops to look at all of it
+        passes: list[int] = []
+        gc.callbacks.append(lambda phase, found: passes.append(found['generation']))
+        assert len([[] for _ in range(300_000)]) == 300_000
+        gc.callbacks.pop()
+        assert set(passes) == {0, 1}
     finally:
         sys.setswitchinterval(before)
+        gc.set_threshold(*thresholds)
 
 
 def test_a_handover_is_measured_there_and_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from stop_checker import (
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.setpoints import Setpoint
-from drive_can_bridge.core.told import Told
+from drive_can_bridge.core.stop_duty import Do, StopDuty
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
@@ -48,9 +48,10 @@ def _heard(self: ExchangeBook, received_at: float) -> None:
 HEARD, DONE = ExchangeBook.heard, SafeStop._done
 #: what is broken, and a story of a kind in which that shows
 DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
-    (Told, 'note', _nothing, 'CANnord', (('bus down', 0.013),)),
-    (Told, 'note', _nothing, 'PKW, no word', (('bus down', 0.013),)),
-    (Told, 'doubt', lambda self: False, '29 bit, no word', (('silent', 0.0), ('end', 0.0))),
+    (StopDuty, 'channel', _nothing, 'CANnord', (('bus down', 0.013),)),
+    (StopDuty, 'channel', _nothing, 'PKW, no word', (('bus down', 0.013),)),
+    (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word',
+     (('silent', 0.0), ('end', 0.0))),
     (ExchangeBook, 'heard', _heard, 'CANnord', (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
     (SafeStop, '_done', lambda self, failed: DONE(self, []), '11 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
@@ -68,7 +69,7 @@ def test_what_is_broken_is_seen(owner: type, name: str, instead: Callable[..., A
 
 
 def test_the_shortest_story_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Told, 'note', _nothing)
+    monkeypatch.setattr(StopDuty, 'channel', _nothing)
     story: Story = (('late', 0.1), ('bus down', 0.013), ('stall', 0.1))
     assert shortest('CANnord', story)[0] == (('bus down', 0.013),)
     with pytest.raises(Violation, match=r"CANnord: the bus is lost: .*\('bus down', 0.013\)"):

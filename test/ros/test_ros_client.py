@@ -2,7 +2,7 @@
 """The way to drives through a running bridge: the same answers as directly."""
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
@@ -131,17 +131,23 @@ def test_after_the_end(bridge: StartBridge) -> None:
             ask()
 
 
-def test_several_bridges_and_none(bridge: StartBridge, tmp_path: Path) -> None:
+def test_several_bridges_and_none(bridge: StartBridge, client: Client) -> None:
     with pytest.raises(DriveCanError, match='^no configured bridge is running in namespace /no'):
         open_drives(namespace='no')
     for one in (bridge(parameters(), arguments=('-r', '__ns:=/a')), bridge(
             parameters(), arguments=('-r', '__ns:=/b', '-r', '__node:=other'), key='/**')):
         one.online()    # before it is configured it has no drives
+    for name in ('/a/drive_can_bridge', '/b/other'):    # who has begun a moment ago is not known
+        wait_until(partial(_sees, client, name, '/a/drive_can_bridge', '/b/other'))
     with pytest.raises(WhichBridge, match='/a/drive_can_bridge, /b/other; choose one with'):
         open_drives()
     with open_drives(namespace='b') as drives:
         assert list(drives) == ['conveyor']
         assert drives['conveyor'].facts.through == '/b/other'
+
+
+def _sees(client: Client, bridge: str, *others: str) -> bool:
+    return client.get(bridge, 'bridges') == [list(others)]
 
 
 def test_services_that_are_found_one_by_one(client: Client) -> None:
@@ -163,7 +169,7 @@ def test_a_bridge_says_which_others_there_are(bridge: StartBridge, client: Clien
     assert client.get(own, 'bridges') == [[own]]
     hang(client, '/a/bridge')
     offer(client, '/robot/controller', 'change_state', ChangeState)     # hangs, but is no bridge
-    wait_until(lambda: client.get(own, 'bridges') == [['/a/bridge', own]])
+    wait_until(partial(_sees, client, own, '/a/bridge', own))
     (changed, _), = client.set(own, bridges=['/c'])
     assert not changed
     one.node.trigger_deactivate()
@@ -175,6 +181,7 @@ def test_one_that_hangs_counts(bridge: StartBridge, client: Client) -> None:
     """Which of two drives of one name is meant, nobody knows."""
     bridge(parameters()).online()
     hang(client, '/other/bridge')
+    wait_until(partial(_sees, client, '/drive_can_bridge', '/drive_can_bridge', '/other/bridge'))
     with pytest.raises(WhichBridge, match='/drive_can_bridge, /other/bridge; choose one with'):
         find_source()
 

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Calls that ask for too much, and names that are not what they seem."""
 
-from bridges import StartBridge
-from clients import Client, from_value, to_value
+from bridges import CONVEYOR, parameters, StartBridge
+from clients import Client, from_value, to_value, wait_until
 import pytest
 from rcl_interfaces.msg import Parameter
 from rcl_interfaces.srv import (
@@ -72,6 +72,21 @@ def test_a_thousand_unknown_names_do_not_fill_the_log(bridge: StartBridge,
     assert len(lines) == 32
     status = client.diagnostics(DRIVE, lambda drive: True)
     assert status['parameter_requests_failed'] == '2000'
+
+
+def test_a_thousand_names_that_wait_when_the_bridge_ends_are_told_in_a_sum(
+        bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'missed_limit': 100000,
+                                      'parameter_timeout': 60.0}))
+    one.online()
+    one.played['conveyor'].fault('silent')
+    client.listen()
+    future = client.ask('/conveyor/get_parameters', GetParameters, GetParameters.Request(
+        names=[f'p{number}' for number in range(1000, 2000)]))
+    wait_until(lambda: one.node.drives['conveyor'].calls == 1)
+    one.node.stop()
+    client.wait_logged('conveyor: read parameters: 900 more names of the same call failed')
+    wait_until(future.done)
 
 
 EVIL = 'ramp\n[ERROR] [1.0] [drive_can_bridge]: all is lost\x1b[2J\x9b31m\u202e'

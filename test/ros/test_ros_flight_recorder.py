@@ -7,6 +7,7 @@ from typing import Any
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
+from lifecycle_msgs.msg import Transition
 import pytest
 from std_srvs.srv import Trigger
 
@@ -141,6 +142,22 @@ def test_save_trace(bridge: StartBridge, client: Client, tmp_path: Path) -> None
     assert (answer.success, answer.message) == (True, str(path))
     again = client.call('/drive_can_bridge/save_trace', Trigger)
     assert not again.success and again.message.endswith(f'is {path}')
+
+
+def test_whoever_waits_for_a_trace_is_answered_before_the_bridge_is_cleaned_up(
+        bridge: StartBridge, client: Client, tmp_path: Path) -> None:
+    one = bridge(recording(tmp_path))
+    one.online()
+    future = client.ask('/drive_can_bridge/save_trace', Trigger)
+    recorder = one.node._fleet and one.node._fleet._flight
+    wait_until(lambda: recorder and recorder._calls == 1)
+    assert client.transition(Transition.TRANSITION_DEACTIVATE)
+    assert client.transition(Transition.TRANSITION_CLEANUP)
+    wait_until(future.done)
+    path, = traces(tmp_path)
+    assert (future.result().success, future.result().message) == (True, str(path))
+    wait_until(lambda: not [service for service in one.node.services
+                            if 'save_trace' in service.srv_name])
 
 
 def test_whoever_calls_takes_no_trace_from_a_failure(bridge: StartBridge, client: Client,

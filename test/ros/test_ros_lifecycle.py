@@ -315,3 +315,25 @@ def test_no_transition_after_the_end_has_begun(bridge: StartBridge, client: Clie
     assert not client.transition(ACTIVATE)
     client.wait_logged('transition number 3 is not possible in state inactive '
                        '(the bridge is being stopped)')
+
+
+class _Taken:
+    """A lock that a transition has for longer than anybody waits."""
+
+    def acquire(self, timeout: float) -> bool:
+        return False
+
+
+def test_the_end_stops_drives_whatever_a_transition_is_at(bridge: StartBridge, client: Client,
+                                                          ) -> None:
+    one = bridge()
+    one.online()
+    with one.record() as recorder:
+        client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+        client.publish('/conveyor/command/speed_setpoint', Float64(data=100.0))
+        wait_until(lambda: recorder.words()[:1] == (1000,))
+        one.node._transition_lock = _Taken()    # type: ignore[assignment]
+        one.node.stop()
+        recorder.catch_up()
+        assert [words[0] for words in recorder.cycles()[-3:]] == [0, 0, 0]
+        assert one.node.drives['conveyor'].session.stopped

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+import resource
 import shutil
 import signal
 import socket
@@ -210,6 +211,20 @@ def test_it_fits_what_clients_do(run: Run, tmp_path: Path) -> None:
     for enclave, found in done.items():
         for (kind, verb), names in found.items():
             assert names - allowed(policy, enclave, kind, verb) == set(), (enclave, kind, verb)
+
+
+def test_a_policy_of_before_outlives_a_full_disk(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    policy = ElementTree.tostring(written(tmp_path))
+    file, folder = tmp_path / 'drives.yaml', tmp_path / 'out'
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        assert main(['security', str(file), '-o', str(folder), '--namespace', 'cell']) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert str(folder / 'policy.xml') in capsys.readouterr().err
+    assert ElementTree.tostring(ElementTree.parse(folder / 'policy.xml').getroot()) == policy
 
 
 @pytest.mark.parametrize(('arguments', 'code', 'words'), [

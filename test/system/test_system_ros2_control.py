@@ -262,6 +262,8 @@ def test_power_cut_at_speed(processes: Processes, client: Client, namespace: str
             base.wait_frames(name, lambda frame, speed=speed: frame.answer and abs(  # type: ignore
                 frame.words[1] - speed) < 10, since)
     drive()
+    wait_for(lambda: base.ask('look')['states']['right_wheel_joint/velocity'] == pytest.approx(
+        3.0, abs=0.1), 'the controllers to hear of the speed')
     base.simulator.write('right_wheel power_cut=4')
     client.online(f'/{namespace}/right_wheel', False)
     wait_for(lambda: base.ask('look')['velocity'][1] is None, 'NaN')

@@ -161,6 +161,51 @@ def test_what_candump_recorded_reads_as_what_was_heard_live(
         name for entry in heard for name in entry.get('values') or {}}
 
 
+def test_two_bridges_on_one_bus(processes: Processes, client: Client, namespace: str,
+                                tmp_path: Path) -> None:
+    both = {**DRIVES, 'neighbour': {**DRIVES['conveyor'], 'station': 2}}
+    places = {name: f'{namespace}_{name}' for name in both}
+
+    def file(*names: str) -> Path:
+        folder = tmp_path / '_'.join(names)
+        folder.mkdir()
+        return bridge_file(folder, interface='socketcan', channel=CHANNEL,
+                           drives={name: both[name] for name in names})
+    simulator = processes.simulator(file(*both), link=False)
+    files = {name: file(name) for name in both}
+    bridges = {name: processes.bridge(files[name], places[name]) for name in both}
+    conveyor, neighbour = (f'/{places[name]}/{name}' for name in both)
+    start_moving(client, conveyor)
+    start_moving(client, neighbour)
+
+    # a drive has one master, and that is named
+    third = processes.bridge(files['conveyor'], f'{namespace}_third')
+    assert third.wait() == 1
+    assert f'process {bridges["conveyor"].pid}' in '\n'.join(third.errors)
+
+    # one dies: the other one goes on as if nothing had been, and takes no notice of its drive
+    bridges['neighbour'].kill()
+    count = len(simulator.frames())
+    assert set(simulator.frame('^003FFFF0#.* R$', count, 20)) == {'003FFFF0#05DC03E800000000 R'}
+    assert client.get(conveyor, 'ramp_time') == [1.0]
+    assert not bridges['conveyor'].losses()
+    facts = client.diagnostics(f'{places["conveyor"]}/drive_can_bridge: drive conveyor')
+    assert facts['frames_rejected'] == '0'
+
+    # its place is free at once, and both are stopped by hand
+    bridges['neighbour'] = processes.bridge(files['neighbour'], places['neighbour'])
+    start_moving(client, neighbour)
+    for name, place in places.items():
+        stopped = processes.drive_can('stop', '--namespace', f'/{place}')
+        assert stopped.wait() == 0
+        stopped.line(f'{name}: neutral')
+    for bridge in bridges.values():
+        assert bridge.end() == 0
+    for station in ('003', '005'):
+        wait_for_end(lambda: simulator.frames(f'^{station}FFFF0#.* R$'),  # noqa: B023  at once
+                     [f'{station}FFFF0#000003E800000000 R'] * 3)
+
+
 def test_interface_taken_down_and_up(processes: Processes, client: Client, namespace: str,
                                      tmp_path: Path, own: str) -> None:
     file = bridge_file(tmp_path, interface='socketcan', channel=own, drives=DRIVES)

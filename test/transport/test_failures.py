@@ -6,7 +6,9 @@ import errno
 import can
 import pytest
 
-from drive_can_bridge.transport.failures import gone, is_misconfiguration, with_outlook
+from drive_can_bridge.transport.failures import (
+    gone, in_words, is_misconfiguration, with_outlook,
+)
 
 
 def wrapped(cause: Exception) -> Exception:
@@ -41,3 +43,9 @@ def test_what_becomes_of_a_bus_that_is_down() -> None:
     assert with_outlook(gone('/dev/ttyACM0'), 1.0) == (
         'adapter /dev/ttyACM0 is gone: unplugged? Goes on by itself when it is back')
     assert with_outlook('no such device', 0.5) == 'no such device; tried again every 0.5 s'
+
+
+def test_a_kernel_without_socketcan_is_no_number() -> None:
+    error = OSError(errno.EAFNOSUPPORT, 'Address family not supported by protocol')
+    assert in_words(error).startswith('this kernel has no SocketCAN: ')
+    assert not is_misconfiguration(error)   # it may be loaded

@@ -31,6 +31,7 @@ from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
@@ -127,7 +128,7 @@ class CannordSession(Session):
         if self._group is not None:     # what it reported before the bridge ended is outdated
             self._group.control.member_lost(self.configuration.name)
         self.exchange.start(math.inf if self._led else now)     # those of the leader are for all
-        if self.told.owed:
+        if self.duty.happened(Happened.STARTED) is Do.STOP:
             self.exchange.timer.hurry(now)
 
     def prepare_stop(self, now: float) -> bool:
@@ -160,7 +161,7 @@ class CannordSession(Session):
     # -- process data, sending --------------------------------------------------------------------
 
     def see_to_control_word(self, now: float) -> None:
-        self.exchange.hurry(now, setpoints=self.told.owed)
+        self.exchange.hurry(now, setpoints=self.duty.owed)
 
     def _encode(self, raws: list[int]) -> list[bytes]:
         word, *values = raws

@@ -20,7 +20,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import CONTROL_WORD
+from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
@@ -118,7 +118,7 @@ class ControlWriter:
             if word != before:
                 self._settled = None    # from now on nobody knows: a stop does not rely on it
             reply = yield from tell(
-                self._session.told, CONTROL_WORD,
+                self._session.duty, CONTROL_WORD,
                 Write.of(self._placement, self._parameter, word, blind=stopping, timeout=timeout),
                 runs=word != self._disable)
             if isinstance(reply, Silence):
@@ -171,7 +171,7 @@ class ControlWriter:
         text = sentences.write_unanswered(f'{self._parameter.name} {word:04X}h')
         if text != self.refusal:
             self._session.report.warn(
-                sentences.write_failed(text), may_run=self._session.told.owed)
+                sentences.write_failed(text), may_run=self._session.duty.owed)
         self.refusal = text
 
     def _settle(self, word: int) -> None:

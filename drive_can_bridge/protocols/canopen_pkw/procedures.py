@@ -10,7 +10,7 @@ from collections.abc import Generator, Hashable, Sequence
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.told import Told
+from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -79,7 +79,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
 # -- what the drive is told -----------------------------------------------------------------------
 
 
-def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
+def tell(duty: StopDuty, channel: Hashable, write: Write, *, runs: bool,
          ) -> Generator[Step, Reply, Reply]:
     """
     Write a setpoint or control word, and keep the books of what the drive was told.
@@ -90,14 +90,14 @@ def tell(told: Told, what: Hashable, write: Write, *, runs: bool,
     :param runs: it may start the drive; as it is now: a neutral value that follows the axis is
         another one when the answer comes.
     """
-    before = told.runs(what)
+    before = duty.runs(channel)
     if runs:
-        told.note(what, runs=True)
+        duty.channel(channel, Happened.RUN_WRITTEN)
     reply = yield write
-    if isinstance(reply, Answered):
-        told.note(what, runs=runs)
-    elif isinstance(reply, Silence) and not reply.sent:
-        told.note(what, runs=before)
+    settled = (runs if isinstance(reply, Answered) else
+               before if isinstance(reply, Silence) and not reply.sent else None)
+    if settled is not None:
+        duty.channel(channel, Happened.RUN_WRITTEN if settled else Happened.STOP_LEFT)
     return reply
 
 

@@ -33,6 +33,7 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen.supervision import Supervision
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
@@ -79,8 +80,9 @@ class PkwSession(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
+        owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self.told.owed or self.ever_online and now >= self._node.free_at)
+            owes or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
         self._supervision.stop()
@@ -157,12 +159,12 @@ class PkwSession(Session):
 
     def _stop_if_owed(self, now: float) -> None:
         """Have a drive stand still of which nobody knows whether it listens."""
-        if self.told.owed:
+        if self.duty.happened(Happened.STARTED) is Do.STOP:
             self.node_silent(now)
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
-        if now < self._node.free_at and not self.told.owed:
+        if now < self._node.free_at and not self.duty.owed:
             self.stop_ended()
 
     # -- what the device is told ------------------------------------------------------------------

@@ -132,7 +132,7 @@ class Writers:
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
         """Tell whether a setpoint, as it is now, takes back what the drive was told."""
         return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held
-                and self._session.told.runs(index))
+                and self._session.duty.runs(index))
 
     def _write_setpoints(self) -> Generator[Step, Reply, None]:
         """
@@ -196,7 +196,7 @@ class Writers:
                 self._placement, setpoint.parameter, raw, blind=alone,
                 timeout=min(self._patience, timeout) if alone and left > 0 else timeout)
             reply = yield from tell(
-                self._session.told, index, write, runs=raw != setpoint.neutral)
+                self._session.duty, index, write, runs=raw != setpoint.neutral)
             if not isinstance(reply, Silence):
                 self._patience = max(STOP_PATIENCE, 2.0 * (self._channel.now - since))
                 break
@@ -217,7 +217,7 @@ class Writers:
         control, now = session.control, self._channel.now
         if self._warned.get(name) != text:  # once: commands may go to and fro
             session.report.warn(sentences.write_failed(text),
-                                may_run=neutral and control is None and session.told.owed)
+                                may_run=neutral and control is None and session.duty.owed)
         self._warned[name] = self._failures[name] = text
         if control is None:
             return

@@ -16,7 +16,7 @@ import math
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.told import CONTROL_WORD
+from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, ParameterCourier, Procedure,
@@ -119,7 +119,8 @@ class AcyclicControl:
                 self.repetition.word = None
                 self._retry_at = now + REFUSED_PAUSE
             return
-        self._session.told.note_unacknowledged(CONTROL_WORD, runs=runs)
+        self._session.duty.channel(
+            CONTROL_WORD, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
         self._outdated = self._reading
         if self._watching:  # else others see to the stop
             self.repetition.left(now)

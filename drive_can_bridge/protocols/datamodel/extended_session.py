@@ -32,8 +32,8 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.told import UNHEARD
-from drive_can_bridge.protocols.cyclic_exchange import CYCLE, CyclicExchange
+from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.map_supervision import (
@@ -112,7 +112,8 @@ class ExtendedSession(Session):
         self._side.clear()
         self._positions.stop()
         self._maps.stop()
-        return self._cycling or (self.stage is not Stage.IDLE and self.told.owed)
+        owes = self.duty.happened(Happened.ENDS) is Do.STOP
+        return self._cycling or (self.stage is not Stage.IDLE and owes)
 
     def begin_stop(self, now: float) -> bool:
         if self._cycling:
@@ -128,7 +129,7 @@ class ExtendedSession(Session):
     def begin(self, now: float) -> None:
         self._exchange.stop()
         self._differs = self._side.shows_up = False
-        if self.told.owed:
+        if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._side.begin_stop(now, setpoints=self._verify)
         if self._verify:
             self._phase = Phase.CHECKING
@@ -150,18 +151,16 @@ class ExtendedSession(Session):
             if self._phase is not Phase.CYCLIC:
                 self._begin_cycles(now)
             elif self.online:
-                self.told.answered()
+                self.duty.happened(Happened.ANSWERED)
         elif verdict is Verdict.DIFFER:
             self._differs = True
-            if self.told.ran:   # neutral cycles since may have reached others, or nobody
-                self.told.ran = False
-                self.told.note(CYCLE, runs=True)
-            owed = self.told.owed
+            self.duty.channel(CYCLE, Happened.MISROUTED)
+            do = self.duty.happened(Happened.MAPS_DIFFER)
             self.lose(sentences.mapping_differs(text), now)
             # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = owed and self._maps.request_agrees and not (
-                self.gate.mute or self.told.runs(UNHEARD))
-            if owed:
+            by_cycles = (
+                do is Do.STOP and self._maps.request_agrees and not self.gate.mute)
+            if do is not Do.NOTHING:
                 self._side.begin_stop(now, setpoints=not by_cycles)
             if by_cycles:
                 self._exchange.book.expect_nothing()
@@ -244,7 +243,8 @@ class ExtendedSession(Session):
     def _missed(self, reason: Sentence, now: float) -> None:
         if self._phase is Phase.LEAVING:
             if self._exchange.cycles_left == 0:
-                self.told.doubt()   # if nobody answers any more: next it is told by number
+                # if nobody answers any more: next it is told by number
+                self.duty.happened(Happened.SILENT)
                 self.start_over(now)
             return
         if not reason:
@@ -253,12 +253,10 @@ class ExtendedSession(Session):
         if self._verify and not self.online:
             self.start_over(now)
             return
-        owed = self.told.owed or self.told.ran
-        # the neutral cycles since it was lost were not answered either
-        unheard = not self.online and not self.told.owed and self.told.doubt()
+        do = self.duty.happened(Happened.LOST if self.online else Happened.UNANSWERED)
         self.lose(reason, now)
-        if owed:  # of the word that has no slot; setpoints go neutral with the next cycles
-            self._side.begin_stop(now, setpoints=unheard)
+        if do is not Do.NOTHING:    # setpoints that heard cycles go neutral with the next
+            self._side.begin_stop(now, setpoints=do is Do.STOP_BY_NUMBER)
         if self.gate.mute:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
@@ -295,7 +293,8 @@ class ExtendedSession(Session):
                     self.start_over(now)
                 return
             self.be_online()
-            self.told.answered()    # a neutral cycle, right after a look at its maps
+            # a neutral cycle, right after a look at its maps
+            self.duty.happened(Happened.ANSWERED)
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:

@@ -9,6 +9,7 @@ read is under way, or in quarantine, with the values that they have then.
 import math
 
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
 from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
@@ -145,7 +146,7 @@ class SetpointWriter:
         if not sent:
             self._schedule.failed(index)
             return
-        self._session.told.note_unacknowledged(index, runs=runs)
+        self._session.duty.channel(index, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
         if not runs:
             self._session.neutral_stop.left(self._parameters[index].name)
         control = self._session.control

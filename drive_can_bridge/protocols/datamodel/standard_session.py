@@ -16,6 +16,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
@@ -61,8 +62,9 @@ class StandardSession(Session):
 
     def prepare_stop(self, now: float) -> bool:
         self._clear_acyclic()
-        self.told.doubt()   # should the stop be confirmed, that is over
-        return self.stage is not Stage.IDLE and (self.online or self.told.owed)
+        self.duty.happened(Happened.SILENT)     # should the stop be confirmed, that is over
+        owes = self.duty.happened(Happened.ENDS) is Do.STOP
+        return self.stage is not Stage.IDLE and (self.online or owes)
 
     def begin_stop(self, now: float) -> bool:
         self._writer.stop()
@@ -84,17 +86,17 @@ class StandardSession(Session):
     def begin(self, now: float) -> None:
         self.report.advice = sentences.reads_unanswered()
         self._round.gap = NOTHING
-        self._tell_to_stop(now)
+        self._tell_to_stop(now, self.duty.happened(Happened.STARTED))
         self._timer.start(now)
 
     def lost(self, now: float, *, was_online: bool) -> None:
-        self.told.doubt()
-        self._tell_to_stop(now, was_online)
+        self.duty.happened(Happened.SILENT)     # it may only have lost its voice
+        do = self.duty.happened(Happened.LOST)
+        self._tell_to_stop(now, Do.STOP if was_online else do)
 
-    def _tell_to_stop(self, now: float, was_online: bool = False) -> None:
-        """See that a drive stands still that may only have lost its voice, if it may run."""
+    def _tell_to_stop(self, now: float, do: Do) -> None:
         self._writer.stop()
-        if self.bus_available and (was_online or self.told.owed):
+        if self.bus_available and do is Do.STOP:
             self._side.begin_stop(now)
 
     def fall_silent(self) -> None:
@@ -159,8 +161,7 @@ class StandardSession(Session):
         courier = self._side.courier
         if not found and courier.asked_at > courier.wrote_at:
             self.neutral_stop.answered()
-            if self.told.ran:
-                self.told.answered()
+            self.duty.happened(Happened.ANSWERED)
         if self.control is None:
             return
         known, asked_at = self._status_slot is None, self._round.status_asked_at

@@ -60,7 +60,7 @@ class CannordObserver(Observer):
         online = self.online
         self.doubt()
         self.online = online
-        self.last_cycles = 0 if session.stopped else 3 + 3 * session.told.ran
+        self.last_cycles = 0 if session.stopped else 3 + 3 * session.duty.unshown
         self.asked = None
 
     def sees(self, sent: Frame, now: float) -> None:

@@ -456,7 +456,7 @@ def test_inverter_that_falls_silent_while_it_runs_is_warned_about_once() -> None
     assert warnings(talk) == []
     talk.hears(READY, 20.001)
     assert talk.session.online
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def test_inverter_that_falls_silent_at_rest_is_no_worry() -> None:

@@ -258,7 +258,7 @@ def test_disable_that_the_bus_takes_at_last_has_time_for_its_answer() -> None:
     talk.hears(DISABLED_0, 10.834)
     assert talk.control_outcomes() == []        # the status is still to be read
     assert talk.session.statistics.rejected == 0
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def test_refused_enable_was_never_told() -> None:
@@ -399,7 +399,7 @@ def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
     assert talk.until(10.166) == [(10.165, f'505#C00200AA{word}000000')], 'no function 00h'
     assert talk.hears('485#C00200AA00000000', 10.167) == [STILL_0], 'and no read-back'
     assert talk.hears('485#C602002A00000000', 10.168) == [READ_CLASS_1]
-    assert talk.session.told.owed is (word != '00')
+    assert talk.session.duty.owed is (word != '00')
     assert worries(talk) == []
 
 

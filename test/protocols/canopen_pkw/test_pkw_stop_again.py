@@ -56,7 +56,7 @@ def silent(talk: Conversation, end: float) -> Conversation:
     talk.until(end)
     assert not talk.session.online
     assert [note.text for note in talk.events(Noted) if note.danger] == [FAILED]
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     return talk
 
 
@@ -67,7 +67,7 @@ def test_one_register_unanswered_when_it_is_back() -> None:
     place, = (place for place, (_, text) in enumerate(sent) if text in STOPS)
     assert sent[place - 1][1][4:8] == 'C701', 'right behind the first answer'
     assert sent[place][0] == pytest.approx(sent[place - 1][0] + 0.002)
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     assert [text[4:8] for _, text in sent].count('C701') > 2, 'rounds go on'
     assert 'average_current' in talk.session.offline_advice
@@ -82,7 +82,7 @@ def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once(
     sent = talk.served(talk.now + 0.9, half)
     assert not talk.session.online
     assert len(stops(sent)) == 1
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def test_drive_that_is_deaf_first_and_answers_later() -> None:
@@ -128,7 +128,7 @@ def test_heartbeat() -> None:
     assert talk.until(14.9) == []
     assert talk.until(15.07) == [(15.06, DISABLE_0)], 'no room is made any more'
     assert talk.hears(DISABLED_0, 15.07) == [READ_1], 'which has synchronised the mailbox'
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
     assert talk.hears(OPERATIONAL, 17.0) == []
     assert not stops(talk.until(20.0))
@@ -160,7 +160,7 @@ def test_complete_rounds_of_a_node_whose_heartbeats_have_ceased() -> None:
     sent = talk.served(14.6, well)
     assert not talk.session.online
     assert len(stops(sent)) == 1
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def test_node_that_is_held_back_and_says_so() -> None:
@@ -186,12 +186,12 @@ def test_drive_without_control() -> None:
     talk.served(10.6, well)
     talk.until(14.0)
     assert not talk.session.online
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     sent = talk.served(16.0, half)
     told = [text for _, text in sent if text[4:8] == 'C602']
     assert len(told) == 1
     assert told[0][12:] == '00000000'
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def test_drive_that_was_told_nothing_but_disable_is_left_alone() -> None:

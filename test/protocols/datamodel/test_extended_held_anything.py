@@ -43,6 +43,8 @@ class AxisObserver(Observer):
     :ivar read: positions that were read by number since it was lost, by us or by users.
     :ivar old: what was reported before it was lost.
     :ivar anew: since it was lost, no position was sent that it has reported since.
+    :ivar heard: what it has reported while that was so: the first of these is held, although
+        answers that were late may bring more before the next cycle.
     """
 
     def __init__(self, *, controlled: bool, timeout: float) -> None:
@@ -56,6 +58,11 @@ class AxisObserver(Observer):
         self.anew = True
         self.read: set[int] = set()
         self.old: set[int] = set()
+        self.heard: set[int] = set()
+
+    def disable(self) -> None:
+        super().disable()
+        self.command = None
 
     def lost(self) -> None:
         """Take note that the axis may be anywhere."""
@@ -63,6 +70,7 @@ class AxisObserver(Observer):
             self.old |= self.read | ({self.reported} if self.reported is not None else set())
         self.reported, self.running_said, self.command, self.anew = None, False, None, True
         self.read.clear()
+        self.heard.clear()
 
     def doubt(self) -> None:
         super().doubt()
@@ -104,7 +112,7 @@ class AxisObserver(Observer):
         if self.reported is not None and (self.anew or not self.running_said):
             allowed.add(self.reported)
         if self.anew:
-            allowed |= self.read | self.old
+            allowed |= self.read | self.old | self.heard
         elif rests and not self.running_said:   # a map that differed: where it is, is read again
             allowed |= self.read
         if not self.controlled:
@@ -114,6 +122,7 @@ class AxisObserver(Observer):
         if self.reported is not None:
             self.anew = False
             self.old.clear()
+            self.heard.clear()
         self.last = position
 
 
@@ -182,8 +191,11 @@ class AxisMachine(AnyOrder):
             observer.read.add(words[0])
         exchanges = session.statistics.exchanges
         session.receive_frame(heard, self.now)
-        if heard.identifier == 0x103FFFF0 and session.statistics.exchanges == exchanges:
-            observer.reported, observer.running_said = before   # nobody had asked for it
+        if heard.identifier == 0x103FFFF0:
+            if session.statistics.exchanges == exchanges:
+                observer.reported, observer.running_said = before   # nobody had asked for it
+            elif observer.anew and observer.reported is not None:
+                observer.heard.add(observer.reported)
         self.look()
 
     @rule(step=st.sampled_from([0, 1, -1, 13]), status=st.sampled_from([0, 1, 1, 3, 3, 8]))

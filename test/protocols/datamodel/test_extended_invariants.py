@@ -59,7 +59,7 @@ class ExtendedObserver(Observer):
 
     def deactivated(self, session: Any) -> None:
         self.disarm()
-        self.last_cycles = 0 if session.stopped else 3 + 3 * session.told.ran
+        self.last_cycles = 0 if session.stopped else 3 + 3 * session.duty.unshown
         self.asked = None
 
     def activated(self) -> None:

@@ -103,7 +103,7 @@ def test_stall_with_assumed_maps_needs_no_writes() -> None:
     talk = running(mapping='assume')
     assert talk.time_lost(12.0) == []
     assert talk.at(12.0) == [NEUTRAL]
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 # -- the bus went, and came back ------------------------------------------------------------------
@@ -197,7 +197,7 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     assert talk.hears(OTHER_RESPONSE, 11.004) == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.until(11.9) == [(11.02, NEUTRAL), (11.04, NEUTRAL), (11.06, NEUTRAL)]
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     # what is answered by another map is not understood
     talk.events()
     assert talk.hears(ANSWER, 11.902) == []
@@ -229,7 +229,7 @@ def test_response_map_that_differs_disables_too() -> None:
     assert talk.hears('102007A4#0034003200000000', 11.003) == [ASK_RESPONSE_MAP]
     assert talk.hears(OTHER_RESPONSE, 11.004) == []
     assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 def cycling_with_word() -> Conversation:
@@ -242,7 +242,7 @@ def cycling_with_word() -> Conversation:
     talk.until(11.0 + TICK)
     assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     talk.events()
     return talk
 
@@ -265,7 +265,7 @@ def test_request_map_that_differs_ends_with_writes_by_number() -> None:
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
     assert confirmed(talk, 11.007) == []
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     assert warnings(talk) == []
 
 
@@ -311,7 +311,7 @@ def test_map_that_differs_under_a_drive_at_rest_needs_no_stop() -> None:
 def test_neutral_cycles_that_another_map_has_taken_were_no_stop() -> None:
     talk = running()
     look(talk, 0.0, NEUTRAL)     # with the map of somebody else, for who knows how long
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
     assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
     assert confirmed(talk, 11.007) == []
@@ -336,7 +336,7 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     last = [text for _, text in talk.until(12.0)]
     assert last.count(NEUTRAL) == 3
     assert last[-1] == ASK_REQUEST_MAP
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
     assert talk.hears(RESPONSE_MAP, 12.002) == [SPEED_ZERO]
     assert [text for _, text in talk.until(12.005)] == [LIMIT_ZERO, ASK_SPEED]
@@ -458,7 +458,7 @@ def test_word_that_was_refused_confirms_nothing() -> None:
     assert talk.until(10.02 + TICK) == []
     talk.hears(ENABLED, 10.022)     # an answer to nothing that we know of
     assert talk.control_outcomes() == []
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 @pytest.mark.parametrize('refuses', [
@@ -519,7 +519,7 @@ def test_neutral_by_command_is_a_stop() -> None:
 def test_cycling_that_begins_again_makes_writes_needless() -> None:
     talk = cycling()
     assert talk.at(10.0) == [NEUTRAL]
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 # -- the drive falls silent -----------------------------------------------------------------------
@@ -540,7 +540,7 @@ def left_alone() -> Conversation:
 def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
     talk = left_alone()
     assert confirmed(talk, 10.163) == [ASK_REQUEST_MAP]
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     checked(talk, 10.164)
     assert {text for _, text in talk.until(10.22)} == {NEUTRAL}, 'and is looked for'
     assert warnings(talk) == []
@@ -552,14 +552,14 @@ def test_silent_drive_is_warned_about_once_and_stopped_when_it_shows_a_sign_of_l
     assert warnings(talk) == [UNHEARD]
     assert talk.until(20.0)[-1][1] == ASK_REQUEST_MAP
     assert warnings(talk) == [], 'once'
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     now = talk.now
     assert talk.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
     assert talk.hears(RESPONSE_MAP, now + 0.002) == []
     assert [text for _, text in talk.until(now + 0.011)] == [NEUTRAL], 'its request map agrees'
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     assert talk.hears(ANSWER, now + 0.012) == []
-    assert talk.session.online and not talk.session.told.owed
+    assert talk.session.online and not talk.session.duty.owed
     assert warnings(talk) == []
 
 
@@ -571,9 +571,9 @@ def test_drive_that_answers_again_was_told_by_its_first_cycle() -> None:
     assert talk.until(10.1101) == [(10.11, ASK_REQUEST_MAP)]
     checked(talk, 10.11)
     assert talk.until(10.1201) == [(10.12, NEUTRAL)]
-    assert talk.session.told.ran
+    assert talk.session.duty.unshown
     talk.hears(ANSWER, 10.122)
-    assert not talk.session.told.ran
+    assert not talk.session.duty.unshown
     assert warnings(talk) == []
 
 
@@ -585,7 +585,7 @@ def test_silent_drive_with_assumed_maps_is_told_by_number_when_neutral_cycles_ar
     assert {text for _, text in talk.until(12.0)} <= {
         NEUTRAL, *STOPPED_BY_NUMBER}, 'it is looked for by cycles'
     assert warnings(talk) == [UNHEARD]
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     talk.hears(ANSWER, 12.001)
     assert talk.session.online
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed

@@ -37,10 +37,10 @@ def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None
     assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
     assert talk.until(10.09) == [(10.06, SPEED_ZERO)]
     assert talk.hears(ANSWER, 10.091) == []
-    assert talk.session.told.ran
+    assert talk.session.duty.unshown
     assert talk.until(10.105) == [(10.1, ASK)]
     assert talk.hears(ANSWER, 10.106) == []
-    assert not talk.session.told.ran
+    assert not talk.session.duty.unshown
 
 
 def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
@@ -202,7 +202,7 @@ def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
     talk.hears('7F1#0000000000000000', now + 0.004)
     assert {text for _, text in talk.until(now + 5.0)} == {ASK}
     assert warnings(talk) == []
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
 
 
 # -- setpoints ------------------------------------------------------------------------------------
@@ -598,10 +598,10 @@ def test_a_setpoint_that_the_bus_refused_is_written_again() -> None:
     talk.refusing = lambda text: text == SPEED_ZERO
     talk.commands(0, 0.0, 10.031)
     round_of(talk, 10.04)
-    assert talk.session.told.owed
+    assert talk.session.duty.owed
     talk.refusing = lambda text: False
     assert round_of(talk, 10.06) == [SPEED_ZERO]
-    assert not talk.session.told.owed
+    assert not talk.session.duty.owed
     assert round_of(talk, 10.08) == []
 
 

@@ -1,0 +1,236 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The rule book of stops: what a drive was told to do, and whether it is owed a stop.
+
+*Whatever was told to run is told to stop.* May a drive be running by our word, and has it been
+told to stop? It is told separately by cycles, by a control word that is written by number, by
+setpoints that are. Each of these *channels* has a :class:`Debt`. Sessions say what has
+:class:`Happened`; the table :data:`ROWS` says what the debt is from then on, and what the session
+has to :class:`Do`. Nobody else decides that, and nobody else changes a debt. What is not in the
+table changes nothing.
+
+.. code-block:: text
+
+                  a frame that      a stop             an answer
+                  may run it left   left               to that
+       NONE ───────────────► RUNS ──────────► STOP_SENT ──────────► NONE
+                              │ silent            │ silent           ▲
+                              ▼                   ▼                  │ an answer, or a stop
+                       RUNS_UNHEARD ─────────► UNHEARD ──────────────┘ that was confirmed
+                                    a stop left
+
+``OWED`` is what a stop by cycles does not clear up: it was told to run by a write that the drive
+acknowledges, or by cycles that its maps have misrouted.
+
+``test/rule_checker.py`` lives through all sequences of events against a motor that obeys whatever
+arrives, and is red when a single row is changed.
+"""
+
+from collections.abc import Hashable
+from enum import Enum, IntEnum
+from typing import NamedTuple
+
+#: what a drive is told by cycles
+CYCLE = 'cycle'
+#: the control word, where it travels by itself
+CONTROL_WORD = 'control word'
+
+
+class Debt(Enum):
+    """What a drive is owed by one of the things that it is told separately."""
+
+    __hash__ = object.__hash__      # in C: looked up with every frame
+
+    NONE = 'nothing'
+    OWED = 'told to run; what stops it has to be acknowledged, or to leave once more'
+    RUNS = 'told to run, by something that nobody acknowledges'
+    RUNS_UNHEARD = 'told to run, and silent since'
+    STOP_SENT = 'told to stop, and nothing has shown that it arrived'
+    UNHEARD = 'told to stop, and silent since'
+
+
+class Happened(Enum):
+    """What happened: to one channel, or (from ``STOPPED`` on) to the drive."""
+
+    __hash__ = object.__hash__
+
+    RUN_WRITTEN = 'a write that may run it goes out, and will be acknowledged'
+    RUN_LEFT = 'a frame has left that holds anything but neutral and disable'
+    STOP_LEFT = 'neutral, or disable, has left; where writes are acknowledged: was'
+    MISROUTED = 'cycles up to now may have reached other parameters than they were meant for'
+    STOPPED = 'it has confirmed to have nothing but neutral and disable'
+    ANSWERED = 'it has answered what it was told last'
+    SILENT = 'it does not answer, or no answer can come'
+    LOST = 'it was online, and has not answered often enough'
+    UNANSWERED = 'its cycles since it was lost were not answered, either'
+    MAPS_DIFFER = 'its maps are not those that its cycles are made for'
+    STARTED = 'the conversation begins anew: start, bus back, stall, restart'
+    SHOWED_UP = 'an offline drive gives a sign of life'
+    ENDS = 'the activation ends'
+    LEFT_ALONE = 'nothing more will be sent: the end, or a lost bus'
+    SAID = 'the activation has ended with the word that it may still be running'
+    ACTIVATED = 'an activation begins'
+
+
+class Do(IntEnum):
+    """What a session has to do; the last of them where channels differ."""
+
+    NOTHING = 0
+    #: by cycles where the request map is known to agree, else by number
+    STOP = 1
+    #: it has not heard cycles; where there are no numbers: say that it may still be running
+    STOP_BY_NUMBER = 2
+    #: say that it may still be running
+    WARN = 3
+
+
+class Row(NamedTuple):
+    """
+    One rule.
+
+    :ivar debts: it holds for these.
+    :ivar becomes: the debt from then on; None: it stays.
+    :ivar carries: the sentence of the contract.
+    """
+
+    debts: tuple[Debt, ...]
+    happened: Happened
+    becomes: Debt | None
+    do: Do
+    carries: str
+
+
+class Rule(NamedTuple):
+    """What follows for one debt."""
+
+    becomes: Debt
+    do: Do
+
+
+_NONE, _OWED, _RUNS = Debt.NONE, Debt.OWED, Debt.RUNS
+_RUNS_UNHEARD, _STOP_SENT, _UNHEARD = Debt.RUNS_UNHEARD, Debt.STOP_SENT, Debt.UNHEARD
+#: told to run, and not to stop since, as far as anybody knows
+OWING = (_OWED, _RUNS, _RUNS_UNHEARD, _UNHEARD)
+#: told to run, and not to stop since, for certain
+RUNNING = (_OWED, _RUNS, _RUNS_UNHEARD)
+#: what stopped it has not been shown to have arrived
+UNSHOWN = (_RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
+#: what tells of whatever was told last
+OF_THE_LAST = (Happened.ANSWERED, Happened.UNANSWERED)
+_ANY = (_OWED, _RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
+
+_WHATEVER = 'Whatever was told to run is told to stop'
+_ACKNOWLEDGED = ('Stop writes are read back or acknowledged: no answer, or another value, is a '
+                 'warning that names the drive and says that it may still be running')
+_SHOWN = 'A drive gets up to three neutral cycles more until one is answered'
+_SILENT = ('A drive that falls silent together with its stop is named as one that may still be '
+           'running')
+_ROUTE = ('The cyclic frame where the request map is known to agree, else acyclic writes by '
+          'parameter number, which no map can misroute')
+_BEGUN = ('It is told so while its maps are read again, after a bus came back, after a stall, '
+          'while its rounds are held back')
+_END = ('At deactivation, signals or a fatal error the bridge sends neutral setpoints and the '
+        'disable word')
+_NAMED = ('It is named as one that may still be running, too, when the bridge ends while the bus '
+          'is lost or takes nothing')
+_THIS = 'A drive that this activation has told anything but neutral and disable'
+
+ROWS: tuple[Row, ...] = (
+    # what leaves
+    Row((_NONE,), Happened.RUN_WRITTEN, _OWED, Do.NOTHING, _ACKNOWLEDGED),
+    Row((_NONE, _OWED), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
+    Row((_STOP_SENT,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
+    Row((_UNHEARD,), Happened.RUN_LEFT, _RUNS_UNHEARD, Do.NOTHING, _THIS),
+    Row((_OWED,), Happened.STOP_LEFT, _NONE, Do.NOTHING, _ACKNOWLEDGED),
+    Row((_RUNS,), Happened.STOP_LEFT, _STOP_SENT, Do.NOTHING, _SHOWN),
+    Row((_RUNS_UNHEARD,), Happened.STOP_LEFT, _UNHEARD, Do.NOTHING, _SILENT),
+    # what comes back
+    Row(_ANY, Happened.STOPPED, _NONE, Do.NOTHING, _ACKNOWLEDGED),
+    Row((_STOP_SENT,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
+    Row((_UNHEARD,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
+    # what does not
+    Row((_RUNS,), Happened.SILENT, _RUNS_UNHEARD, Do.NOTHING, _SILENT),
+    Row((_STOP_SENT,), Happened.SILENT, _UNHEARD, Do.NOTHING, _SILENT),
+    Row(_ANY, Happened.LOST, None, Do.STOP, _WHATEVER),
+    Row(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),
+    Row((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
+    # what the session turns to is told to stop before
+    Row((_RUNS, _STOP_SENT), Happened.MISROUTED, _OWED, Do.NOTHING, _ROUTE),
+    Row((_OWED, _RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
+    Row((_RUNS_UNHEARD, _UNHEARD), Happened.MAPS_DIFFER, None, Do.STOP_BY_NUMBER, _ROUTE),
+    Row(OWING, Happened.STARTED, None, Do.STOP, _BEGUN),
+    Row((_OWED, _RUNS_UNHEARD, _UNHEARD), Happened.SHOWED_UP, None, Do.STOP_BY_NUMBER, _WHATEVER),
+    Row((_RUNS,), Happened.SHOWED_UP, _RUNS_UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
+    Row((_STOP_SENT,), Happened.SHOWED_UP, _UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
+    Row(OWING, Happened.ENDS, None, Do.STOP, _END),
+    Row(OWING, Happened.LEFT_ALONE, None, Do.WARN, _NAMED),
+    # what is over
+    Row(_ANY, Happened.SAID, _NONE, Do.NOTHING, _NAMED),
+    Row(_ANY, Happened.ACTIVATED, _NONE, Do.NOTHING, _THIS),
+)
+
+RULES: dict[tuple[Debt, Happened], Rule] = {
+    (debt, row.happened): Rule(row.becomes or debt, row.do) for row in ROWS for debt in row.debts}
+
+
+class StopDuty:
+    """
+    What one drive is owed, channel by channel: the only place where that is written.
+
+    :ivar owed: it was told to run by at least one channel, and to stop since only in vain.
+    :ivar unshown: what was told to run by something that nobody acknowledges has not shown that
+        what stopped it has arrived.
+    """
+
+    __slots__ = ('_debts', '_rules', 'owed', 'unshown')
+
+    def __init__(self, rules: dict[tuple[Debt, Happened], Rule] = RULES) -> None:
+        self._rules = rules
+        self._debts: dict[Hashable, Debt] = {}      # those of whom anything is owed
+        self.owed = self.unshown = False
+
+    @property
+    def may_run(self) -> bool:
+        """Nothing has shown that it does not run by our word."""
+        return bool(self._debts)
+
+    def runs(self, channel: Hashable) -> bool:
+        """Tell whether a channel has told it to run, and not to stop since."""
+        return self._debts.get(channel) in RUNNING
+
+    def channel(self, channel: Hashable, happened: Happened) -> Do:
+        """Take what happened to one channel; return what has to be done."""
+        debt = self._debts.get(channel, _NONE)
+        rule = self._rules.get((debt, happened))
+        if rule is None:
+            return Do.NOTHING
+        if rule.becomes is not debt:
+            self._change(channel, rule.becomes)
+            self._look()
+        return rule.do
+
+    def happened(self, happened: Happened) -> Do:
+        """Take what happened to the drive; return what has to be done."""
+        do, debts = Do.NOTHING, self._debts
+        if not debts:
+            return do
+        # as long as it is told to run as well, an answer shows nothing of a stop, nor does silence
+        blind = happened in OF_THE_LAST and any(debt in RUNNING for debt in debts.values())
+        for channel, debt in list(debts.items()):
+            rule = self._rules.get((debt, happened))
+            if rule is not None and not (blind and rule.becomes is not debt):
+                self._change(channel, rule.becomes)
+                do = max(do, rule.do)
+        self._look()
+        return do
+
+    def _change(self, channel: Hashable, debt: Debt) -> None:
+        if debt is _NONE:
+            del self._debts[channel]
+        else:
+            self._debts[channel] = debt
+
+    def _look(self) -> None:
+        debts = self._debts.values()
+        self.owed = any(debt in OWING for debt in debts)
+        self.unshown = any(debt in UNSHOWN for debt in debts)
