@@ -2,8 +2,8 @@
 """
 Whoever waits in a test waits for a condition, by the clock that it has.
 
-That is the clock of the bench (``clocked/``), where a test has one; otherwise that of this machine,
-with a deadline that only a hang exceeds.
+That is the clock of the bench (``clocked/``), where a test has one; otherwise that of this
+machine, with a deadline that only a hang exceeds.
 """
 
 from collections.abc import Callable

@@ -15,6 +15,8 @@ from drive_can_bridge.transport.end_point import EndPoint
 
 #: bits of a frame beside its data, with some that are stuffed
 OVERHEAD = 80
+#: bit/s of the buses of a story
+BITRATE = 1_000_000
 
 
 class Wire:
@@ -128,7 +130,7 @@ class Wires:
     def of(self, channel: str) -> Wire:
         """Return the wire of a channel."""
         if channel not in self._wires:
-            self._wires[channel] = wire = Wire(self._clock)
+            self._wires[channel] = wire = Wire(self._clock, BITRATE)
             wire.watchers.append(partial(self._see, channel))
         return self._wires[channel]
 

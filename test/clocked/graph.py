@@ -336,7 +336,7 @@ class Entity(Destroyable):
         return self.node.logger_name()
 
     def check(self, *, alone: bool = False) -> None:
-        """Raise what rcl does when the entity is gone, or its context, unless it is enough alone."""
+        """Raise what rcl does when the entity is gone, or (not ``alone``) its context."""
         if self.gone or not (alone or self.context.ok()):
             raise real.RCLError(f'{type(self).__name__.lower()} is invalid')
 
@@ -584,6 +584,28 @@ class Service(Entity):
         if not request.client.gone:
             request.client.receive(bytes(real.rclpy_serialize(response, self.kind.Response)),
                                    request)
+
+
+class Responses:
+    """Sends answers in place of :class:`drive_can_bridge.ros.rcl_response.RclResponses`."""
+
+    def prepare(self, service: Any, message: Any, header: Any) -> Any:
+        """Make an answer ready."""
+        return _Response(service, message, header, bytes(id(header.request_id.client)
+                                                         .to_bytes(16, 'big')))
+
+    def send(self, response: Any) -> None:
+        """Send it."""
+        with response.service.handle:
+            response.service.handle.service_send_response(response.message,
+                                                          response.header.request_id)
+
+
+class _Response(NamedTuple):
+    service: Any
+    message: Any
+    header: Any
+    caller: bytes
 
 
 class Client(Entity):
@@ -886,7 +908,7 @@ def _sublogger(graph: Graph, parent: str, child: str) -> bool:
 
 
 def _unregister(guard: Any, former: Any = real.unregister_sigint_guard_condition) -> None:
-    """Leave alone what was never registered; executors outlive their story until they are found."""
+    """Leave alone what was never registered: executors may outlive their story."""
     if not isinstance(guard, GuardCondition):
         former(guard)
 
@@ -933,7 +955,8 @@ def pretending(clock: JumpingClock) -> Iterator[Graph]:
         'rclpy_logging_rosout_add_sublogger': lambda *names: _sublogger(graph, *names),
         'rclpy_logging_set_logger_level': set_level,
         **dict.fromkeys((
-            'register_sigint_guard_condition', 'install_signal_handlers', 'rclpy_logging_configure', 'rclpy_logging_fini'),
+            'register_sigint_guard_condition', 'install_signal_handlers',
+            'rclpy_logging_configure', 'rclpy_logging_fini'),
             _nothing)}
     former = {name: getattr(real, name) for name in names}
     for name, value in names.items():

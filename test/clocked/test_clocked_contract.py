@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 rclpy = pytest.importorskip('rclpy')
-
+# flake8: noqa: I100, I202  nothing of ROS is imported where there is none
 from lifecycle_msgs.msg import TransitionEvent  # noqa: E402
 from lifecycle_msgs.srv import (  # noqa: E402
     ChangeState, GetAvailableStates, GetAvailableTransitions, GetState,

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The bench: buses, drives, bridges and the graph, all by one clock that jumps, and all from one seed.
+The bench: buses, drives, bridges and the graph, by one clock that jumps, and from one seed.
 
 While a world is there, everything that is started in this process belongs to it: what opens a
 bus, what asks rclpy for something, and whoever waits by ``waiting.py``. What happened in it is a
@@ -74,8 +74,9 @@ def world(seed: int, *, ros: bool = False) -> Iterator[World]:
         # nobody's priority matters, and one thread of a machine under test is not to rule it
         stack.enter_context(patch.object(os, 'sched_setscheduler', lambda *_: None))
         if ros:
-            from graph import pretending
+            from graph import pretending, Responses
             graph: Any = stack.enter_context(pretending(clock))
             graph.tell = made.tell
+            stack.enter_context(patch('drive_can_bridge.ros.answers.RclResponses', Responses))
         stack.enter_context(patch.object(sys.modules[__name__], 'current', made))
         yield made

@@ -75,7 +75,8 @@ class Bridge:
     def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
                  simulated: bool = True, autostart: bool = True,
                  key: str = '/**/drive_can_bridge',
-                 mechanics: dict[str, Mechanics] | None = None, clock: Clock | None = None) -> None:
+                 mechanics: dict[str, Mechanics] | None = None,
+                 clock: Clock | None = None) -> None:
         clock = clock or waiting.clock()
         number = next(_COUNTER)
         self.file = directory / f'bridge_{number}.yaml'

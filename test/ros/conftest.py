@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The bridge's node with its drives and whoever uses it, on the bench (``clocked/``) or, where a test
-has the mark ``real``, with the graph, the threads and the clock of this machine.
+The bridge's node with its drives and whoever uses it, on the bench (``clocked/``).
+
+Where a test has the mark ``real``: with the graph, the threads and the clock of this machine.
 
 Whatever a test starts is stopped after it, and has to be gone then: threads, buses, nodes.
 """

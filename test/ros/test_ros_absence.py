@@ -7,9 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from waiting import clock
 
 pytest.importorskip('rclpy')
-from waiting import clock
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState

@@ -150,6 +150,7 @@ def _sees(client: Client, bridge: str, *others: str) -> bool:
     return client.get(bridge, 'bridges') == [list(others)]
 
 
+@pytest.mark.real
 def test_services_that_are_found_one_by_one(client: Client) -> None:
     def greet(_: Any, response: Any) -> Any:
         def later() -> None:

@@ -149,6 +149,7 @@ def test_refused_commands_do_not_refresh_the_age(bridge: StartBridge, client: Cl
         wait_until(neutral)
 
 
+@pytest.mark.real
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor=CONVEYOR))
@@ -336,6 +337,7 @@ def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Cli
                        f'(RELIABILITY): nothing is received from it')
 
 
+@pytest.mark.real
 def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client) -> None:
     lost = [0.0]
     one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}),

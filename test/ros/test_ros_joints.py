@@ -191,6 +191,7 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
     assert speeds(one)['north'] == 1000
 
 
+@pytest.mark.real
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(two())

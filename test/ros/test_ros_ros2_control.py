@@ -20,8 +20,8 @@ from ros2_control_twin import (
     Constraints, HardwareTwin, run, System, takes_positions, TrajectoryTwin,
 )
 from std_srvs.srv import SetBool, Trigger
-import yaml
 from waiting import clock
+import yaml
 
 from drive_can_bridge.simulation.plant import Mechanics
 
