@@ -25,6 +25,9 @@ import yaml
 
 from drive_can_bridge.simulation.plant import Mechanics
 
+#: a controller with a thread of its own (test/real.py)
+pytestmark = pytest.mark.real
+
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 AXES = {'shoulder': 1, 'elbow': 2, 'wrist': 3}
 REMAPS = ('-r', '~/joint_states:=/robot_joint_states',
