@@ -2,7 +2,7 @@
 """
 What all tests share: where they run, how long they look, and which of them run beside each other.
 
-Puts this directory on the path: every test may import ``builders``.
+Puts this directory and ``clocked/`` on the path: every test may import ``builders``.
 
 *Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
 domains of its own, before anything of ROS is imported. The tests of ``ros/`` have another one than
@@ -95,6 +95,7 @@ def _domain(in_process: bool) -> str:
     return domain
 
 
+sys.path.insert(0, str(Path(__file__).with_name('clocked')))
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 tell_in_messages()
 

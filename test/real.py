@@ -24,7 +24,6 @@ FIXTURES = {
     'test/monitor/': {'run'},
     'test/panel/': {'site', 'run', 'browser', 'phone', 'somebody'},
     'test/security/': {'run'},
-    'test/ros/': {'_client_context', 'client', 'bridge', 'shared_bridge'},
     'test/backup/': {'shop'},
     'test/client/': {'world', 'drives'},
 }

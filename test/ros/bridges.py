@@ -8,20 +8,21 @@ import itertools
 from pathlib import Path
 import struct
 import threading
-import time
 from types import TracebackType
 from typing import Any
 
 import can
-from clients import patience, wait_until
-from clocks import REAL
+from clients import wait_until
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
+import waiting
+import world
 import yaml
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.simulation.plant import Mechanics
@@ -74,7 +75,9 @@ class Bridge:
     def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
                  simulated: bool = True, autostart: bool = True,
                  key: str = '/**/drive_can_bridge',
-                 mechanics: dict[str, Mechanics] | None = None, clock: Clock = REAL) -> None:
+                 mechanics: dict[str, Mechanics] | None = None,
+                 clock: Clock | None = None) -> None:
+        clock = clock or waiting.clock()
         number = next(_COUNTER)
         self.file = directory / f'bridge_{number}.yaml'
         if not isinstance(content, str):
@@ -100,7 +103,7 @@ class Bridge:
     def begin(self) -> None:
         """Start the simulation and the bridge."""
         if self._simulated:
-            self.simulation = Simulation(configuration_from_file(self.file), REAL,
+            self.simulation = Simulation(configuration_from_file(self.file), waiting.clock(),
                                          complain=self.errors.append,
                                          mechanics=self._mechanics)
             self.simulation.start()
@@ -120,15 +123,15 @@ class Bridge:
 
     def record(self, bus: str = 'main') -> 'Recorder':
         """Record the frames of a bus; use as a context manager."""
+        if waiting.virtual is not None:
+            return ClockedRecorder(self.channel(bus))
         return Recorder(self.channel(bus))
 
     def online(self, *names: str, timeout: float = 60.0) -> None:
         """Wait until drives are online; all of them by default."""
-        deadline = time.monotonic() + patience(timeout)
-        while not all(self.node.drives[name].session.online
-                      for name in names or self.node.drives):
-            assert time.monotonic() < deadline, 'the drives do not come online'
-            time.sleep(0.01)
+        wait_until(lambda: all(self.node.drives[name].session.online
+                               for name in names or self.node.drives), timeout,
+                   'drives that come online')
 
     def close(self) -> None:
         """End everything, in the order of the executable."""
@@ -211,6 +214,30 @@ class Recorder:
         """Send a frame as a stranger."""
         self._bus.send(can.Message(arbitration_id=identifier, data=data,
                                    is_extended_id=extended))
+
+
+class ClockedRecorder(Recorder):
+    """The same on the bench: there is no time between a frame and its record."""
+
+    def __enter__(self) -> 'ClockedRecorder':
+        assert world.current is not None
+        self._wire = world.current.wires.of(self._channel)
+        self._wire.watchers.append(self._see)
+        return self
+
+    def __exit__(self, exception_type: type[BaseException] | None,
+                 exception: BaseException | None, traceback: TracebackType | None) -> None:
+        self._wire.watchers.remove(self._see)
+
+    def _see(self, frame: Frame) -> None:
+        self._frames.append((frame.identifier, frame.data))
+
+    def catch_up(self) -> None:
+        """Wait for nothing."""
+
+    def send(self, identifier: int, data: bytes, *, extended: bool = True) -> None:
+        """Send a frame as a stranger."""
+        self._wire.carry(Frame(identifier, data, extended))
 
 
 StartBridge = Callable[..., Bridge]

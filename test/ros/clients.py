@@ -5,7 +5,6 @@ from collections.abc import Callable
 import itertools
 import os
 import re
-import threading
 import time
 from typing import Any
 
@@ -27,6 +26,7 @@ from rclpy.qos import (
     DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy,
 )
 from rclpy.signals import SignalHandlerOptions
+import waiting
 
 _COUNTER = itertools.count(1)
 CLIENT = f'client_{os.getpid()}'
@@ -50,6 +50,8 @@ def patience(seconds: float) -> float:
 
 def wait_until(condition: Callable[[], Any], timeout: float = 60.0, what: str = '') -> Any:
     """Return what a condition gives as soon as it is true."""
+    if waiting.virtual is not None:
+        return waiting.virtual.until(condition, what, timeout)
     deadline = time.monotonic() + patience(timeout)
     while True:
         found = condition()
@@ -72,7 +74,7 @@ class ClientContext:
         rclpy.init(args=[], context=self.context, signal_handler_options=SignalHandlerOptions.NO)
         self.executor = SingleThreadedExecutor(context=self.context)
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name='clients', daemon=True)
+        self._thread = waiting.clock().worker(self._run, 'clients')
         self._thread.start()
 
     def _run(self) -> None:
@@ -203,13 +205,14 @@ class Client:
         return found
 
     def _acquaint(self, name: str, host: str) -> None:
-        deadline = time.monotonic() + patience(60.0)
+        clock = waiting.clock()
+        deadline = clock.now() + patience(60.0)
 
         def wait(condition: Callable[[], bool], seconds: float) -> bool:
-            end = time.monotonic() + seconds
-            while not condition() and time.monotonic() < end:
-                assert time.monotonic() < deadline, f'no answer from the node of {name}'
-                time.sleep(0.002)
+            end = clock.now() + seconds
+            while not condition() and clock.now() < end:
+                assert clock.now() < deadline, f'no answer from the node of {name}'
+                waiting.pause(0.002)
             return condition()
         acquaint(self.node, name, wait, host)
 

@@ -1,22 +1,25 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The bridge's node with real rclpy, simulated drives and a virtual bus, all in this process.
+The bridge's node with its drives and whoever uses it, on the bench (``clocked/``).
 
-Whatever a test starts is stopped after it, and has to be gone then: threads, buses, nodes. What
-the tests of a module share is stopped after the last of them, or before one that starts its own.
+Where a test has the mark ``real``: with the graph, the threads and the clock of this machine.
+
+Whatever a test starts is stopped after it, and has to be gone then: threads, buses, nodes.
 """
 
 from collections.abc import Iterator
 import importlib.util
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import pytest
+from world import World, world
 
 MISSING = importlib.util.find_spec('rclpy') is None
 if TYPE_CHECKING or not MISSING:
     from bridges import Bridge, StartBridge
-    from clients import Client, ClientContext
+    from clients import Client, ClientContext, is_client
     from leaks import assert_nothing_left
 
 
@@ -33,8 +36,42 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector,
     return _Skipped.from_parent(parent, path=module_path) if MISSING else None
 
 
+WORLD = pytest.StashKey[World]()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
+    """Print the story of a test that failed."""
+    report = yield
+    if report.failed and WORLD in item.stash:
+        report.sections.append(('story', item.stash[WORLD].story()))
+    return report
+
+
 @pytest.fixture(scope='session')
-def _client_context() -> Iterator['ClientContext']:
+def _real_context() -> Iterator['ClientContext']:
+    context = ClientContext()
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest) -> Iterator[World | None]:
+    """Put a test on the bench, unless it has the mark ``real``: that one has None."""
+    if request.node.get_closest_marker('real') is not None:
+        yield None
+        return
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as made:
+        request.node.stash[WORLD] = made
+        yield made
+
+
+@pytest.fixture
+def _client_context(bench: World | None,
+                    request: pytest.FixtureRequest) -> Iterator['ClientContext']:
+    if bench is None:
+        yield request.getfixturevalue('_real_context')
+        return
     context = ClientContext()
     yield context
     context.close()
@@ -48,64 +85,12 @@ def client(_client_context: 'ClientContext') -> Iterator['Client']:
     node.close()
 
 
-class _Shared:
-    """The bridge that the tests of a module share, one at a time."""
-
-    def __init__(self, directory: Path, context: 'ClientContext') -> None:
-        self._directory = directory
-        self._context = context
-        self._content: object = None
-        self._one: Bridge | None = None
-
-    def start(self, content: object = None) -> 'Bridge':
-        if self._one is None or content != self._content:
-            self.close()
-            self._one, self._content = Bridge(self._directory, content), content
-            self._one.begin()
-        for drive in self._one.played.values():
-            drive.fault('ok')
-        self._one.online()
-        return self._one
-
-    def close(self) -> None:
-        if self._one is None:
-            return
-        one, self._one = self._one, None
-        one.close()
-        assert not one.errors, one.errors
-        del one
-        client = Client(self._context)
-        try:
-            assert_nothing_left(client)
-        finally:
-            client.close()
-
-
-@pytest.fixture(scope='module')
-def _shared(_client_context: 'ClientContext',
-            tmp_path_factory: pytest.TempPathFactory) -> Iterator[_Shared]:
-    shared = _Shared(tmp_path_factory.mktemp('shared'), _client_context)
-    yield shared
-    shared.close()
-
-
 @pytest.fixture
-def shared_bridge(_shared: _Shared) -> 'StartBridge':
-    """
-    Return the module's bridge with these parameters, online; whoever got it before used it.
-
-    For tests that leave nothing behind but values of parameters and counters.
-    """
-    return _shared.start
-
-
-@pytest.fixture
-def bridge(client: 'Client', tmp_path: Path, _shared: _Shared) -> Iterator['StartBridge']:
+def bridge(client: 'Client', tmp_path: Path, bench: World | None) -> Iterator['StartBridge']:
     """Start bridges with their simulated drives; see :class:`bridges.Bridge`."""
     started: list[Bridge] = []
 
     def start(content: object = None, **options: object) -> Bridge:
-        _shared.close()
         one = Bridge(tmp_path, content, **options)
         started.append(one)
         one.begin()
@@ -117,4 +102,17 @@ def bridge(client: 'Client', tmp_path: Path, _shared: _Shared) -> Iterator['Star
         errors += one.errors
     started.clear()
     assert not errors, errors
-    assert_nothing_left(client)
+    if bench is None:
+        assert_nothing_left(client)
+    else:
+        assert all(map(is_client, client.nodes()))
+
+
+@pytest.fixture
+def shared_bridge(bridge: 'StartBridge') -> 'StartBridge':
+    """Start a bridge whose drives are online."""
+    def start(content: object = None) -> 'Bridge':
+        one = bridge(content)
+        one.online()
+        return one
+    return start

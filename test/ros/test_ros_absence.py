@@ -6,10 +6,11 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
-from clocks import REAL
 import pytest
+from waiting import clock
 
 pytest.importorskip('rclpy')
+
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.ros.absence import absence, Attendance
@@ -80,7 +81,7 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
             for number in range(12)]
     lost = drive('lost', ever_online=True)
     other = drive('other', state=DriveState.MAPPING_DIFFERS)    # it answers
-    Attendance(log, [*seen, drive('a'), lost, other, drive('b')], REAL).look()  # type: ignore[arg-type]
+    Attendance(log, [*seen, drive('a'), lost, other, drive('b')], clock()).look()  # type: ignore[arg-type]
     assert [line.split(': ')[0] for line in log.lines] == ['a', 'b', '12 of 16 drives online; not '
                                                            'seen']
     assert log.lines[2].endswith('not seen: a, b')
@@ -89,12 +90,12 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
 
 def test_on_a_bus_that_is_down_they_are_told_too() -> None:
     log = Lines()
-    Attendance(log, [drive(bus_state='down')], REAL).look()  # type: ignore[arg-type, list-item]
+    Attendance(log, [drive(bus_state='down')], clock()).look()  # type: ignore[arg-type, list-item]
     assert log.lines == ['lift: not seen since start: bus main is down',
                          '0 of 1 drive online; not seen: lift']
 
 
 def test_where_all_were_seen_nothing_is_said() -> None:
     log = Lines()
-    Attendance(log, [drive(ever_online=True)], REAL).look()  # type: ignore[arg-type, list-item]
+    Attendance(log, [drive(ever_online=True)], clock()).look()  # type: ignore[arg-type, list-item]
     assert log.lines == []

@@ -21,6 +21,9 @@ from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
 from drive_can_bridge.ros.service_thread import ServiceThread
 
+#: what DDS does (test/real.py)
+pytestmark = pytest.mark.real
+
 #: a hundred of them would fit into the wait of the middleware
 TICK = 0.001
 #: so many show that the interpreter was not held

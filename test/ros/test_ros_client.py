@@ -7,7 +7,6 @@ from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
 from clients import Client, wait_until
-from clocks import REAL
 from graph_builders import answer, hang, offer
 from lifecycle_msgs.srv import ChangeState
 import pytest
@@ -15,6 +14,7 @@ from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import qos_profile_parameters
 from rclpy.task import Future
+from waiting import clock
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled
@@ -150,6 +150,7 @@ def _sees(client: Client, bridge: str, *others: str) -> bool:
     return client.get(bridge, 'bridges') == [list(others)]
 
 
+@pytest.mark.real
 def test_services_that_are_found_one_by_one(client: Client) -> None:
     def greet(_: Any, response: Any) -> Any:
         def later() -> None:
@@ -230,7 +231,7 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         client.node.create_service(
             kind, f'/forgetful/{name}', answers(name) if forgets else lambda _, given: given,
             qos_profile=qos_profile_parameters, callback_group=ReentrantCallbackGroup())
-    here = search.Graph(REAL)
+    here = search.Graph(clock())
     try:
         here.call('/forgetful', 'list_parameters', ListParameters.Request())
         assert asked['list_parameters'] == 2

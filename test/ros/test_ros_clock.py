@@ -22,6 +22,7 @@ from drive_can_bridge.ros.stamps import Stamps
 REAL_TIME, REAL_TIME_NS = time.time, time.time_ns
 
 
+@pytest.mark.real
 @pytest.mark.parametrize('hours', [-48.0, 48.0], ids=['back', 'forward'])
 def test_clock_that_is_set(bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
                            hours: float) -> None:
@@ -62,6 +63,7 @@ def test_a_stamp_is_that_of_the_moment_not_of_the_look() -> None:
     assert before - 1000.001 <= seconds + 1e-9 * nanoseconds <= time.time() - 999.999
 
 
+@pytest.mark.real
 def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """In all messages with that sample, and as long as it is the last one."""
@@ -99,6 +101,7 @@ def test_a_time_that_no_stamp_holds_is_0_and_told_once(monkeypatch: pytest.Monke
     assert stamps.now().sec > 0
 
 
+@pytest.mark.real
 @pytest.mark.parametrize('seconds', [2 ** 31 + 5, 2 ** 33, -5])
 def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
@@ -111,6 +114,7 @@ def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
     goes_on_without_stamps(one, client, topics)
 
 
+@pytest.mark.real
 @pytest.mark.parametrize('seconds, nanoseconds', [
     (2 ** 31 - 1, 2 ** 32 - 1), (-1, 0), (-2 ** 31, 0)], ids=['2038', 'negative', 'least'])
 def test_drives_go_on_whatever_simulated_time_is_published(

@@ -5,12 +5,12 @@ from collections import deque
 import math
 from typing import Any
 
-from clocks import REAL
 import pytest
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
+from waiting import clock
 
 from drive_can_bridge.ros.command_topic import CommandTopic
 
@@ -49,7 +49,7 @@ class Taken:
         self.topic = CommandTopic(
             self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
             old=self.old.append, late=self.late.append, unreadable=self.unreadable.append,
-            stamp=REAL.stamp)
+            stamp=clock().stamp)
 
 
 @pytest.mark.parametrize('message', [

@@ -2,16 +2,16 @@
 """Setpoints from topics to the wire: arming, ageing, refusals."""
 
 import math
-import time
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, Recorder, StartBridge
 from clients import Client, wait_until
-from clocks import HandClock, REAL
+from clocks import HandClock
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
+from waiting import clock, pause
 
 SPEED, LIMIT = '/conveyor/command/speed_setpoint', '/conveyor/command/torque_limit'
 POSITION = '/conveyor/command/position_setpoint'
@@ -149,6 +149,7 @@ def test_refused_commands_do_not_refresh_the_age(bridge: StartBridge, client: Cl
         wait_until(neutral)
 
 
+@pytest.mark.real
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor=CONVEYOR))
@@ -157,10 +158,10 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         arm(client, recorder)
         exchange, = one.node.exchanges.values()
         with exchange.lock:     # as long as the exchange is late, and the process does not stand
-            until = time.monotonic() + 0.5
+            until = clock().now() + 0.5
             client.publish(SPEED, Float64(data=200.0))
-            while time.monotonic() < until:
-                time.sleep(0.01)
+            while clock().now() < until:
+                pause(0.01)
         wait_until(lambda: refused(one))
         client.wait_logged('commands thrown away: the exchange was 0')
         cycles_pass(one)
@@ -336,10 +337,11 @@ def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Cli
                        f'(RELIABILITY): nothing is received from it')
 
 
+@pytest.mark.real
 def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client) -> None:
     lost = [0.0]
     one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}),
-                 clock=HandClock(lambda: REAL.now() + lost[0]))
+                 clock=HandClock(lambda: clock().now() + lost[0]))
     one.online()
     with one.record() as recorder:
         arm(client, recorder)

@@ -8,7 +8,6 @@ which one it runs with.
 
 from collections.abc import Callable
 from pathlib import Path
-import time
 from typing import Any
 
 from bridges import Bridge, parameters, StartBridge
@@ -21,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock
 
 from drive_can_bridge.protocols.families import FAMILIES as TABLE
 
@@ -156,7 +156,7 @@ def test_samples(shared: Bridge, client: Client, facts: Facts) -> None:
     joint = client.topic(f'{DRIVE}/joint_state', JointState)
     for name, value in (('actual_speed', -12.3), ('counts', 65535), ('braked', True)):
         drive.set_value(name, value)
-    before = time.time()
+    before = clock().stamp() * 1e-9
     for name, value in (('actual_speed', -12.3), ('counts', 65535), ('braked', True)):
         wait_until(lambda topic=topics[name], value=value: [  # type: ignore[misc]
             entry for entry in topic.values[-1:] if entry == pytest.approx(value)])
@@ -177,7 +177,7 @@ def test_samples(shared: Bridge, client: Client, facts: Facts) -> None:
     assert message.velocity == pytest.approx([-12.3 * FACTOR])
     assert not message.position and not message.effort
     stamps = [entry.stamp.sec + 1e-9 * entry.stamp.nanosec for entry in list(response.messages)]
-    assert before - 60.0 < stamps[-1] < time.time() + 0.1
+    assert before - 60.0 < stamps[-1] < clock().stamp() * 1e-9 + 0.1
     assert all(later > earlier for earlier, later in zip(stamps, stamps[1:]))
     wait_until(lambda: topics['status_word'].messages)
 
@@ -320,7 +320,7 @@ def test_what_was_last_sent(start: Start, client: Client, facts: Facts) -> None:
         'control_word': facts.word or drive.value('control_word'),
         'speed_setpoint': pytest.approx(-250.0), 'mode': 3, 'brake': True}])
     stamps = [message.stamp.sec + 1e-9 * message.stamp.nanosec for message in topic.messages]
-    assert stamps == sorted(stamps) and abs(stamps[-1] - time.time()) < 60.0
+    assert stamps == sorted(stamps) and abs(stamps[-1] - clock().stamp() * 1e-9) < 60.0
     assert moving
     assert client.transition(4)
     wait_until(lambda: sent(topic.last) == {**neutral, 'control_word': word})

@@ -215,6 +215,7 @@ def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
     assert enable(client) == (False, 'bridge inactive')
 
 
+@pytest.mark.real
 def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()

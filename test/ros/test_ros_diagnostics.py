@@ -7,10 +7,10 @@ from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, ERROR, wait_until
-from clocks import REAL
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_msgs.msg import Float64
+from waiting import clock
 
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.sentences import answer_late, NOTHING
@@ -119,7 +119,7 @@ def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
     def told_of_a_long_round() -> str:
         with one.node.exchanges['main'].lock:
             statistics.latency.add(100.0)
-        return reporter.report(REAL.now()).message
+        return reporter.report(clock().now()).message
     assert 'an exchange takes' in told_of_a_long_round()
     assert client.get('/conveyor', 'ramp_time') != [None]
     assert 'an exchange takes' not in told_of_a_long_round()
@@ -134,14 +134,14 @@ def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
     with one.record() as recorder:
         recorder.send(0x00200000 | 30 << 4 | 1, bytes(8))
         wait_until(lambda: one.node.drives['conveyor'].foreign_text)
-    assert 'there must be one master only' in drive.report(REAL.now()).message
-    assert 'master' not in drive.report(REAL.now()).message
+    assert 'there must be one master only' in drive.report(clock().now()).message
+    assert 'master' not in drive.report(clock().now()).message
     link.send_failures += 2
     link.last_error = 'send: transmit queue full'
-    report = bus.report(REAL.now())
+    report = bus.report(clock().now())
     assert (report.level, report.message) == (
         DiagnosticStatus.WARN, '2 frames not sent: send: transmit queue full')
-    report = bus.report(REAL.now())
+    report = bus.report(clock().now())
     assert (report.level, report.message[:8]) == (DiagnosticStatus.OK, 'virtual ')
     assert report.facts['send_failures'] == '2'
 
@@ -154,12 +154,12 @@ def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
     link = one.node.exchanges['main'].link
     monkeypatch.setattr(type(link), 'counts', Counts(refused=3))
     link.frames_sent, link.send_failures = 1000, 1
-    report = bus.report(REAL.now())
+    report = bus.report(clock().now())
     assert (report.level, report.message) == (
         DiagnosticStatus.WARN, '4 frames not sent: the adapter refuses frames')
     assert report.facts['send_failures'] == '4'
     assert 997 <= int(report.facts['frames_sent']) < 1100
-    assert bus.report(REAL.now()).level == DiagnosticStatus.OK
+    assert bus.report(clock().now()).level == DiagnosticStatus.OK
 
 
 def test_the_load_is_that_of_both_directions(bridge: StartBridge) -> None:

@@ -205,6 +205,7 @@ def test_callers_are_answered_before_a_drive_goes(bridge: StartBridge, client: C
     wait_until(lambda: not one.node._leaving)
 
 
+@pytest.mark.real
 def test_ten_rounds_leak_nothing(bridge: StartBridge, client: Client) -> None:
     one = waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
     before = threads()
@@ -234,6 +235,7 @@ def test_ten_rounds_leak_nothing(bridge: StartBridge, client: Client) -> None:
 UNDER_WAY = 50
 
 
+@pytest.mark.real
 def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
     """Sixty transitions by chance, legal and illegal, while everybody uses the drives."""
     waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))

@@ -180,6 +180,7 @@ def test_log_level_by_service(bridge: StartBridge, client: Client) -> None:
     client.wait_logged('active: 1 drive on 1 bus')
 
 
+@pytest.mark.real
 @pytest.mark.parametrize(('level', 'told'), [('info', True), ('warn', False)])
 def test_log_level_by_argument(client: Client, tmp_path: Path, level: str, told: bool) -> None:
     """In a process of its own: the first context of a process decides."""

@@ -2,33 +2,32 @@
 """A thread that does something again and again."""
 
 import threading
-import time
 
-from clocks import HandClock, REAL
+from clocks import HandClock
 import pytest
-from waiting import wait_for
+from waiting import clock, pause, wait_for
 
 from drive_can_bridge.ros.periodic_thread import PeriodicThread
 
 
 def test_again_and_again_until_stopped() -> None:
     calls: list[float] = []
-    thread = PeriodicThread('again', 0.01, lambda: calls.append(time.monotonic()), print, REAL)
-    begun = time.monotonic()
+    thread = PeriodicThread('again', 0.01, lambda: calls.append(clock().now()), print, clock())
+    begun = clock().now()
     thread.start()
     wait_for(lambda: len(calls) > 5, 'six calls')
     assert calls[0] - begun >= 0.01
     assert calls[5] - begun >= 0.06
     thread.stop()
     count = len(calls)
-    time.sleep(0.05)
+    pause(0.05)
     assert len(calls) == count
     assert 'again' not in [each.name for each in threading.enumerate()]
 
 
 def test_another_period_begins_at_once() -> None:
     calls: list[float] = []
-    thread = PeriodicThread('again', 3600.0, lambda: calls.append(time.monotonic()), print, REAL)
+    thread = PeriodicThread('again', 3600.0, lambda: calls.append(clock().now()), print, clock())
     thread.start()
     thread.set_period(0.01)
     wait_for(lambda: len(calls) > 1, 'calls')
@@ -41,7 +40,7 @@ def test_a_failure_is_told_and_does_not_end_it() -> None:
 
     def fail() -> None:
         raise ValueError('no')
-    thread = PeriodicThread('again', 0.01, fail, told.append, REAL)
+    thread = PeriodicThread('again', 0.01, fail, told.append, clock())
     thread.start()
     wait_for(lambda: len(told) > 1, 'two failures')
     thread.stop()

@@ -11,7 +11,6 @@ import math
 from pathlib import Path
 import struct
 import threading
-import time
 from typing import Any
 
 from bridges import Bridge, cyclic_identifier, Recorder, StartBridge
@@ -21,9 +20,13 @@ from ros2_control_twin import (
     Constraints, HardwareTwin, run, System, takes_positions, TrajectoryTwin,
 )
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock
 import yaml
 
 from drive_can_bridge.simulation.plant import Mechanics
+
+#: a controller with a thread of its own (test/real.py)
+pytestmark = pytest.mark.real
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 AXES = {'shoulder': 1, 'elbow': 2, 'wrist': 3}
@@ -94,7 +97,7 @@ class Arm:
     def __init__(self, one: Bridge, client: Client, manager: Manager, recorder: Recorder) -> None:
         self.one, self.client, self.manager, self.recorder = one, client, manager, recorder
         self.controller = TrajectoryTwin(manager.hardware, constraints())
-        manager.update = lambda: self.controller.update(time.monotonic())
+        manager.update = lambda: self.controller.update(clock().now())
 
     def steps(self, name: str) -> int:
         """Return where an axis really is, in steps; the encoder's noise is not in it."""
@@ -117,7 +120,7 @@ class Arm:
         return all(item.armed for item in self.one.node.drives[name].session.setpoints.items)
 
     def go(self, goal: dict[str, float], duration: float = 2.0) -> None:
-        self.controller.go(goal, duration, time.monotonic())
+        self.controller.go(goal, duration, clock().now())
 
     def go_until(self, goal: dict[str, float], condition: Callable[[], Any],
                  duration: float = 2.0) -> None:

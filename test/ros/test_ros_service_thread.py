@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from clients import Client, ClientContext, wait_until
-from clocks import REAL
 import pytest
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
+from waiting import clock
 
 from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.service_thread import Answer, ServiceThread
@@ -21,7 +21,7 @@ def _errors() -> list[str]:
 
 @pytest.fixture(name='thread')
 def _thread(_client_context: ClientContext, errors: list[str]) -> Iterator[ServiceThread]:
-    thread = ServiceThread('control', _client_context.context, errors.append, REAL)
+    thread = ServiceThread('control', _client_context.context, errors.append, clock())
     yield thread
     thread.stop()
 

@@ -2,17 +2,16 @@
 """What a drive publishes: values, samples, bits, ``~/online``, a joint."""
 
 import math
-import time
 from typing import Any
 
 from bridges import CONVEYOR, HASTY, parameters, StartBridge
 from clients import Client, wait_until
-from clocks import REAL
 import pytest
 from rcl_interfaces.msg import ParameterEvent
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
+from waiting import clock
 
 from drive_can_bridge.core.events import StationLost
 
@@ -61,7 +60,7 @@ def test_a_lost_drive_leaves_no_sample_behind(bridge: StartBridge) -> None:
     """Else all joints in one message would show it once more in the instant it is found again."""
     drive = bridge(parameters(), simulated=False).node.drives['conveyor']
     with drive.exchange.lock:
-        drive.samples.publish((1, 2, 3), REAL.now())
+        drive.samples.publish((1, 2, 3), clock().now())
         assert drive.samples.last is not None
         drive.handle_event(StationLost('no answer'))
         assert drive.samples.last is None
@@ -104,7 +103,7 @@ def test_response_is_consistent_and_stamped(bridge: StartBridge, client: Client)
     speeds = client.topic('/conveyor/actual_speed', Float64)
     one.played['conveyor'].set_value('actual_speed', 100.0)
     one.played['conveyor'].set_value('motor_current', 1.0)
-    before = time.time()
+    before = clock().stamp() * 1e-9
     message = response.wait(
         lambda sample: sample.changed_parameters[0].value.double_value == pytest.approx(100.0)
         and sample.changed_parameters[1].value.double_value == pytest.approx(1.0))
@@ -113,7 +112,7 @@ def test_response_is_consistent_and_stamped(bridge: StartBridge, client: Client)
         'actual_speed', 'motor_current', 'status_word']
     assert not message.new_parameters and not message.deleted_parameters
     stamps = [sample.stamp.sec + 1e-9 * sample.stamp.nanosec for sample in response.messages]
-    assert before - 20.0 < stamps[-1] < time.time() + 0.1
+    assert before - 20.0 < stamps[-1] < clock().stamp() * 1e-9 + 0.1
     assert all(later > earlier for earlier, later in zip(stamps, stamps[1:]))
     wait_until(lambda: pytest.approx(100.0) in speeds.values)
 
@@ -208,7 +207,7 @@ def test_joint_state_in_si_units(bridge: StartBridge, client: Client) -> None:
     assert list(joint.name) == ['belt']
     assert joint.position == pytest.approx([-math.pi / 20])
     assert joint.velocity == pytest.approx([-600.0 * 2 * math.pi / 60 / 10])
-    assert abs(joint.header.stamp.sec - time.time()) < 60
+    assert abs(joint.header.stamp.sec - clock().stamp() * 1e-9) < 60
 
 
 def test_a_truncated_response_publishes_what_arrived(bridge: StartBridge,

@@ -1,0 +1,308 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+A clock that jumps from one time that somebody waits for to the next.
+
+Threads are real ones, but only one runs at a time: until it waits. Then another one that may go on
+does; when none may, time jumps to the next moment that somebody waits for. So nothing takes time
+but waiting, a minute passes in as long as it takes to compute what happens in it, and the same
+seed always tells the same story: where several may go on, a random generator says who goes first.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from heapq import heappop, heappush
+from itertools import count
+import math
+import random
+import threading
+from typing import Any
+
+#: when stories begin: s of the steady clock, and ns since 1970 at its 0
+BEGIN, EPOCH = 1000.0, 1_700_000_000_000_000_000
+#: turns without time that nobody needs who does not go round in circles
+TURNS_MAX = 100_000
+#: s of real time after which a thread does not only compute, but hangs
+HANG = 60.0
+
+
+class Stuck(AssertionError):
+    """Nobody can ever go on, or somebody goes round in circles."""
+
+
+class _Over(BaseException):
+    """The story is over: ends a thread that waits."""
+
+
+class Task:
+    """
+    A thread that runs when it is its turn.
+
+    :ivar rung: somebody woke it, rather than the time for which it waited.
+    """
+
+    def __init__(self, clock: 'JumpingClock', run: Callable[[], object] | None, name: str) -> None:
+        self.name = name
+        self.rung = False
+        self.ticket = 0     # of its wait: what woke it before is out of date
+        self._clock = clock
+        self._run = run
+        self._turn = threading.Semaphore(0)
+        self._begun = self._ended = False
+        self._joining: list[Task] = []
+
+    def start(self) -> None:
+        """Begin, when it is its turn."""
+        self._begun = True
+        threading.Thread(target=self._live, name=self.name, daemon=True).start()
+        self._clock.tasks.append(self)
+        self._clock.wake(self)
+
+    def is_alive(self) -> bool:
+        """Tell whether it has begun, and not ended."""
+        return self._begun and not self._ended
+
+    def join(self, timeout: float = math.inf) -> None:
+        """Wait for its end."""
+        if self.is_alive() and self is not self._clock.current:
+            self._joining.append(self._clock.current)
+            self._clock.block(self._clock.now() + timeout)
+
+    # -- turns ------------------------------------------------------------------------------------
+
+    def give(self) -> None:
+        """Let it go on."""
+        self._turn.release()
+
+    def rest(self) -> None:
+        """Wait for its turn."""
+        if not self._turn.acquire(timeout=HANG):
+            raise Stuck(f'{self._clock.current.name} has not waited for {HANG:g} s')
+        if self._clock.over and self._run is not None:
+            raise _Over
+
+    def _live(self) -> None:
+        assert self._run is not None
+        try:
+            self.rest()
+            self._run()
+        except _Over:
+            pass
+        except BaseException as error:  # noqa: BLE001  told by the story
+            self._clock.failures.append(error)
+        self._ended = True
+        for task in self._joining:
+            self._clock.wake(task)
+        self._clock.tasks.remove(self)
+        self._clock.hand_over()
+
+
+class JumpingAlarm:
+    """Wakes one sleeper; see :class:`drive_can_bridge.clock.Alarm`."""
+
+    def __init__(self, clock: 'JumpingClock') -> None:
+        self._clock = clock
+        self._rung = False
+        self._sleeper: Task | None = None
+
+    def wait(self, until: float = math.inf) -> bool:
+        """Sleep until then, or until somebody rings; tell whether somebody did."""
+        if not self._rung and until > self._clock.now():
+            self._sleeper = self._clock.current
+            self._clock.block(until)
+            self._sleeper = None
+        rung, self._rung = self._rung, False
+        return rung
+
+    def ring(self) -> None:
+        """Wake the sleeper, or the next one at once."""
+        self._rung = True
+        if self._sleeper is not None:
+            self._clock.wake(self._sleeper)
+
+
+class JumpingLock:
+    """A re-entrant lock; see :class:`drive_can_bridge.clock.Lock`."""
+
+    def __init__(self, clock: 'JumpingClock') -> None:
+        self._clock = clock
+        self._owner: Task | None = None
+        self._depth = 0
+        self._waiting: list[Task] = []
+
+    def acquire(self, timeout: float = math.inf) -> bool:
+        """Take it; False: not in so many s."""
+        me, until = self._clock.current, self._clock.now() + timeout
+        while self._owner not in (None, me):
+            if self._clock.now() >= until:
+                return False
+            self._waiting.append(me)
+            self._clock.block(until)
+            if me in self._waiting:
+                self._waiting.remove(me)
+        self._owner = me
+        self._depth += 1
+        return True
+
+    def release(self) -> None:
+        """Give it back."""
+        self._depth -= 1
+        if not self._depth:
+            self._owner = None
+            if self._waiting:
+                self._clock.wake(self._waiting.pop(0))
+
+    def __enter__(self) -> 'JumpingLock':
+        self.acquire()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+class JumpingClock:
+    """
+    Virtual time; see :class:`drive_can_bridge.clock.Clock`. Whoever makes it has the first turn.
+
+    :param seed: says who goes first where several may.
+    :ivar failures: what ended threads.
+    """
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+        self.chance = random.Random(seed)
+        self.tasks: list[Task] = []
+        self.failures: list[BaseException] = []
+        self.over = False
+        self._main = self.current = Task(self, None, 'the story')
+        self._time = BEGIN
+        self._coming: list[tuple[float, int, Task, int]] = []
+        self._ready: list[Task] = []
+        self._number = count()
+        self._turns = 0
+
+    # -- what everybody is handed -----------------------------------------------------------------
+
+    def now(self) -> float:
+        """Return the steady time in s."""
+        return self._time
+
+    def stamp(self) -> int:
+        """Return the time of the day, in ns since 1970."""
+        return EPOCH + round(self._time * 1e9)
+
+    def used(self) -> float:
+        """Return the s of a processor that this thread has used: computing takes no time."""
+        return 0.0
+
+    def alarm(self) -> JumpingAlarm:
+        """Return what a thread waits by."""
+        return JumpingAlarm(self)
+
+    def lock(self) -> JumpingLock:
+        """Return what keeps others out."""
+        return JumpingLock(self)
+
+    def worker(self, run: Callable[[], object], name: str) -> Task:
+        """Return a thread that can be started."""
+        return Task(self, run, name)
+
+    def wait(self, until: float) -> None:
+        """Sleep until then."""
+        while until > self._time:
+            self.block(until)
+
+    # -- for stories ------------------------------------------------------------------------------
+
+    def live(self, seconds: float) -> None:
+        """Let time pass."""
+        self.wait(self._time + seconds)
+        self.check()
+
+    def until(self, condition: Callable[[], Any], what: str = '', limit: float = 60.0,
+              look: float = 0.001) -> Any:
+        """Let time pass until a condition holds; return what it returned."""
+        end = self._time + limit
+        while not (found := condition()):
+            self.check()
+            if self._time >= end:
+                raise AssertionError(f'{limit:g} s went by without {what or condition}')
+            self.wait(self._time + look)
+        return found
+
+    def check(self) -> None:
+        """Raise what ended a thread."""
+        if self.failures:
+            raise self.failures[0]
+
+    def close(self) -> None:
+        """End all threads that are left; return when they have."""
+        self.over = True
+        while self.tasks:
+            left = len(self.tasks)
+            for task in list(self.tasks):
+                self.wake(task)
+            self.block(math.inf)
+            if len(self.tasks) == left:
+                break
+
+    # -- turns ------------------------------------------------------------------------------------
+
+    def wake(self, task: Task) -> None:
+        """Let somebody who waits go on, as soon as it is its turn."""
+        if task not in self._ready and task is not self.current:
+            task.ticket += 1
+            self._ready.append(task)
+
+    def block(self, until: float) -> None:
+        """Wait until then, or until somebody wakes us. The caller looks which it was."""
+        me = self.current
+        if until < math.inf:
+            heappush(self._coming, (until, next(self._number), me, me.ticket))
+        elif self.over and me is self._main:
+            self._ready.append(me)
+        self.hand_over()
+        me.rest()
+
+    def hand_over(self) -> None:
+        """Let the next one go on."""
+        self._turns += 1
+        if self._turns > TURNS_MAX:
+            self._fail(f'{self.current.name} and others go round in circles')
+        while not self._ready:
+            if not self._coming:
+                self._fail('nobody waits for anything that can happen')
+                return
+            until, _, task, ticket = heappop(self._coming)
+            if ticket != task.ticket:
+                continue
+            if until > self._time:
+                self._time, self._turns = until, 0
+            self.wake_at(task)
+            while self._coming and self._coming[0][0] <= self._time:
+                _, _, task, ticket = heappop(self._coming)
+                if ticket == task.ticket:
+                    self.wake_at(task)
+        chosen = self.chance.randrange(len(self._ready)) if len(self._ready) > 1 else 0
+        self.current = self._ready.pop(chosen)
+        self.current.give()
+
+    def wake_at(self, task: Task) -> None:
+        """Let somebody go on whose time has come."""
+        task.ticket += 1
+        self._ready.append(task)
+
+    def _fail(self, why: str) -> None:
+        self.failures.append(Stuck(why))
+        self._turns = 0
+        self._ready.append(self._main)
+
+
+@contextmanager
+def jumping(seed: int) -> Iterator[JumpingClock]:
+    """Give a clock to a story; its threads end with it."""
+    clock = JumpingClock(seed)
+    try:
+        yield clock
+        clock.check()
+    finally:
+        clock.close()
