@@ -53,7 +53,9 @@ def test_what_does_not_apply_is_absent() -> None:
 def test_of_every_family(bridge: StartBridge, client: Client, facts: Facts,
                          tmp_path: Any) -> None:
     bridge(parameters(conveyor=facts.drive(tmp_path)))
-    names = [*facts.listed, 'p110', 'nothing']
+    raw_gain = facts.raw_name('gain')
+    by_index = raw_gain.startswith('x')
+    names = [*facts.listed, raw_gain, 'nothing']
     described = client.call('/conveyor/describe_parameters', DescribeParameters,
                             DescribeParameters.Request(names=names)).descriptors
     found = {entry.name: dict(pair.split('=') for pair in shlex.split(
@@ -64,11 +66,13 @@ def test_of_every_family(bridge: StartBridge, client: Client, facts: Facts,
         'actual_speed': 'cyclic', 'counts': 'cyclic', 'braked': 'cyclic',
         **({'control_word': 'control', 'status_word': 'cyclic'} if facts.status_mapped else {})}
     assert found['ramp_time'] == {
-        'unit': 's', 'number': '102', 'type': 'uint16', 'scale': '0.01', 'offset': '0',
-        'access': 'rw', 'storage': 'eeprom', 'protected': 'false'}
+        'unit': 's', 'type': 'uint16',
+        **({'index': '0x2102'} if by_index else {'number': '102'}),
+        'scale': '0.01', 'offset': '0', 'access': 'rw', 'storage': 'eeprom', 'protected': 'false'}
     assert found['actual_ramp']['offset'] == '-10' and 'unit' not in found['actual_ramp']
     # a raw name obeys the rules of the listed one
-    assert found['p110'] == {**found['gain'], 'type': 'uint16'}
+    assert found[raw_gain] == {
+        **found['gain'], 'type': 'uint16', **({'subindex': '0x00'} if by_index else {})}
     if 'ratio' in found:
         assert (found['ratio']['index'], found['ratio']['subindex']) == ('0x2007', '0x03')
 
