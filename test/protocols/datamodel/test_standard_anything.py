@@ -151,10 +151,12 @@ class StandardObserver(Observer):
             self.armed[index], self.raws[index] = False, 0
             return
         if outcome is CommandOutcome.NOT_ARMED:
-            assert self.controlled or not (self.online and self.active and self.immediate)
+            assert self.controlled or self.held() or not (
+                self.online and self.active and self.immediate)
             if self.timeout and now - self.since[index] > self.timeout:
                 self.armed[index] = False
-            assert self.controlled or not self.armed[index], 'a command in time has to count'
+            assert self.controlled or self.held() or not self.armed[index], (
+                'a command in time has to count')
             self.armed[index] = False
             return
         assert self.online, 'only a drive that answers is armed'
