@@ -66,7 +66,7 @@ class Observer:
 
     def tells(self, what: object, *, runs: bool) -> None:
         """
-        Take note of what a frame that has left tells the drive.
+        Record what a frame that has left tells the drive.
 
         :param what: which of the things that travel separately.
         :param runs: anything but neutral and ``disable``.
@@ -78,19 +78,19 @@ class Observer:
             self.running.discard(what)
 
     def refused(self, sent: Frame, now: float) -> None:
-        """Take note of a frame that the bus did not take."""
+        """Record a frame that the bus did not take."""
 
     def sees(self, sent: Frame, now: float) -> None:
         """Check a frame that the session sends."""
         raise NotImplementedError
 
     def disarm(self) -> None:
-        """Take note that no command counts any more, nor the drive's being there."""
+        """Record that no command counts any more, nor the drive's being there."""
         self.online = False
         self.disable()
 
     def disable(self) -> None:
-        """Take note that no command counts, although the drive may be there."""
+        """Record that no command counts, although the drive may be there."""
         self.armed = [False, False]
         self.raws = [0, 0]
 
@@ -110,11 +110,11 @@ class Observer:
         self.doubt()
 
     def deactivated(self, session: Any) -> None:
-        """Take note that the session is about to be told to stop."""
+        """Record that the session is about to be told to stop."""
         raise NotImplementedError
 
     def time_was_lost(self, session: Any) -> None:
-        """Take note that the session is about to be told that time was lost."""
+        """Record that the session is about to be told that time was lost."""
 
     def commanded(self, index: int, raw: int, outcome: CommandOutcome, now: float, *,
                   neutral: bool | None = None) -> None:
@@ -180,7 +180,7 @@ class AnyOrder(RuleBasedStateMachine):
     # -- what a family says -----------------------------------------------------------------------
 
     def happened(self, event: Any) -> None:
-        """Take note of an event that is not the end of a request."""
+        """Record an event that is not the end of a request."""
         raise NotImplementedError
 
     def completed(self, event: RequestCompleted) -> None:
@@ -236,7 +236,7 @@ class AnyOrder(RuleBasedStateMachine):
                 self.happened(event)
 
     def answered(self, outcome: ControlCompleted) -> None:
-        """Take note of the end of a control request."""
+        """Record the end of a control request."""
 
     def looked(self, sent: bool) -> None:
         """Check what is to be checked after each look; ``sent``: whether there were frames."""
@@ -324,7 +324,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.look()
 
     def wanted(self, action: ControlAction) -> None:
-        """Take note of something that the session agreed to try."""
+        """Record something that the session agreed to try."""
 
     # -- a bus that refuses -----------------------------------------------------------------------
 

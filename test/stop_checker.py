@@ -394,7 +394,7 @@ class World:
     # -- the judge --------------------------------------------------------------------------------
 
     def ends(self) -> None:
-        """Take note of something after which nothing may be resumed."""
+        """Record something after which nothing may be resumed."""
         for partner in self.partners:
             partner.armed = False
             if partner.wanted:
@@ -527,7 +527,7 @@ class World:
                         f'{0x700 + partner.device.node:03X}#00'))
 
     def ends_unless_unseen(self) -> None:
-        """Take note of a restart; a call that waits for its answer goes on."""
+        """Record a restart; a call that waits for its answer goes on."""
         if self.enabling:
             return
         if self.unseen == 0.0 or isinstance(self.partners[0].device, (PkwNode, StandardDrive)):

@@ -190,7 +190,7 @@ class ControlMachine:
 
     def word_sent(self, now: float) -> None:
         """
-        Take note that the current word left.
+        Record that the current word left.
 
         Call it each time the bus has taken the word, before the response can arrive; where a write
         is acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
@@ -221,11 +221,11 @@ class ControlMachine:
             self._watch_disabled(now)
 
     def member_found(self, name: str) -> None:
-        """Take note that a member is online."""
+        """Record that a member is online."""
         self._reports.find(name)
 
     def member_lost(self, name: str) -> None:
-        """Take note that a member is offline. The others do not run without it."""
+        """Record that a member is offline. The others do not run without it."""
         if not self._reports.lose(name):
             return
         self._fault = None if self._fault is None else self._reports.faulted
@@ -237,7 +237,7 @@ class ControlMachine:
 
     def word_refused(self, word: int, reason: Sentence, now: float) -> None:
         """
-        Take note that the drive refused a control word: what is under way fails.
+        Record that the drive refused a control word: what is under way fails.
 
         :param reason: what the drive says, in words.
         """

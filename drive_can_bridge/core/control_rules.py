@@ -38,7 +38,7 @@ class TableRules:
         return word == self._words[ControlAction.DISABLE]
 
     def left(self, word: int) -> None:
-        """Take note of a word that has left."""
+        """Record a word that has left."""
 
     def reported(self, raw: int, *, behind: bool) -> None:
         """
@@ -48,7 +48,7 @@ class TableRules:
         """
 
     def forget(self) -> None:
-        """Take note that nothing is known of the drive."""
+        """Record that nothing is known of the drive."""
 
     @property
     def holds(self) -> Sentence:

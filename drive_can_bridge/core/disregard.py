@@ -23,7 +23,7 @@ class Disregard:
         self._since = math.inf
 
     def lasts(self, now: float, *, so: bool) -> bool:
-        """Take note whether it is so now; tell whether it is to be told."""
+        """Record whether it is so now; tell whether it is to be told."""
         if not so:
             self.forget()
             return False
@@ -31,5 +31,5 @@ class Disregard:
         return not self.text and now - self._since > self._longest
 
     def forget(self) -> None:
-        """Take note that it is over."""
+        """Record that it is over."""
         self._since, self.text = math.inf, NOTHING

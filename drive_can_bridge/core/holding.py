@@ -123,14 +123,14 @@ class HeldSetpoint(Setpoint):
         super().disarm()
 
     def reset(self) -> None:
-        """Take note that nothing was ever known."""
+        """Record that nothing was ever known."""
         self.forget()
         self.ever_known = False
         self.neutral = 0
         self.disarm()
 
     def forget(self) -> None:
-        """Take note that the axis may be anywhere by now."""
+        """Record that the axis may be anywhere by now."""
         self._known = False
 
     def measure(self, raw: int) -> bool:

@@ -29,12 +29,12 @@ class LastSent:
         self.clear()
 
     def clear(self) -> None:
-        """Take note that nothing was sent yet."""
+        """Record that nothing was sent yet."""
         self.raws = (None,) * len(self.parameters)
 
     def take(self, words: Sequence[int], first: int = 0) -> None:
         """
-        Take note of what a frame carries.
+        Record what a frame carries.
 
         :param words: raw integers, or the words on the wire.
         :param first: place of the first of them in ``parameters``.

@@ -47,22 +47,22 @@ class NeutralStop:
             session.hand_out_neutral(now)
 
     def left(self, name: str) -> None:
-        """Take note that one setpoint has left, neutral as it is."""
+        """Record that one setpoint has left, neutral as it is."""
         if self._requests:
             self._lacking.discard(name)
             self._left = not self._lacking
 
     def all_left(self) -> None:
-        """Take note that all of them have left together."""
+        """Record that all of them have left together."""
         self._left = self.pending
 
     def answered(self) -> None:
-        """Take note of an answer that shows that what has left last has arrived."""
+        """Record an answer that shows that what has left last has arrived."""
         if self._left:
             self._end(True, sentences.neutral_without_control())
 
     def refused(self, why: Sentence) -> None:
-        """Take note that the drive does not take a neutral setpoint."""
+        """Record that the drive does not take a neutral setpoint."""
         self.fail(sentences.may_still_be_running(why))
 
     def fail(self, reason: Sentence) -> None:

@@ -27,7 +27,7 @@ class AcyclicPart(Protocol):
         """Do all that is possible now."""
 
     def time_lost(self, now: float) -> None:
-        """Take note that nobody listened until now."""
+        """Record that nobody listened until now."""
 
     def clear(self) -> None:
         """Forget everything under way."""

@@ -298,12 +298,12 @@ class Session(ABC):
             self.withdrawn(now)
 
     def be_online(self) -> None:
-        """Take note that the drive exchanges process data."""
+        """Record that the drive exchanges process data."""
         self.online = self.ever_online = True
         self.report.found()
 
     def be_offline(self, reason: Sentence) -> None:
-        """Take note that the drive is offline, if it was not."""
+        """Record that the drive is offline, if it was not."""
         self.report.lost(reason, was_online=self.online)
         self.online = False
         self.went_offline()
@@ -337,13 +337,13 @@ class Session(ABC):
             part.stop()
 
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
-        """Take note that the drive is lost."""
+        """Record that the drive is lost."""
 
     def went_offline(self) -> None:  # noqa: B027  optional
         """Forget what belongs to a drive that is online."""
 
     def withdrawn(self, now: float) -> None:
-        """Take note that the control word is ``disable`` again."""
+        """Record that the control word is ``disable`` again."""
         self.see_to_control_word(now)
 
     def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
@@ -393,7 +393,7 @@ class Session(ABC):
 
     def frames_left(self, now: float, refused: Collection[int] = ()) -> None:
         """
-        Take note of what became of the frames last taken; there may be more to be sent then.
+        Record what became of the frames last taken; there may be more to be sent then.
 
         :param refused: places in the list of those that the bus did not take: they do not count.
         """

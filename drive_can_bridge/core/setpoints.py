@@ -194,7 +194,7 @@ class Setpoints:
         self.changed = True
 
     def forget(self) -> None:
-        """Take note that the axes may be anywhere by now: the drive was lost."""
+        """Record that the axes may be anywhere by now: the drive was lost."""
         self.forgotten += 1
         for setpoint in self.held:
             setpoint.forget()

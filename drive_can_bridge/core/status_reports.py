@@ -50,11 +50,11 @@ class StatusReports:
     # -- inputs -----------------------------------------------------------------------------------
 
     def find(self, name: str) -> None:
-        """Take note that a member is online."""
+        """Record that a member is online."""
         self._present[name] = _Member()
 
     def lose(self, name: str) -> bool:
-        """Take note that a member is offline; tell whether it was not."""
+        """Record that a member is offline; tell whether it was not."""
         return self._present.pop(name, None) is not None
 
     def take(self, name: str, raw: int | None, *, counts: bool) -> bool:
@@ -74,12 +74,12 @@ class StatusReports:
         return True
 
     def forget_answers(self) -> None:
-        """Take note that the control word has changed."""
+        """Record that the control word has changed."""
         for member in self._present.values():
             member.answer = None
 
     def forget(self) -> None:
-        """Take note that nothing is known any more."""
+        """Record that nothing is known any more."""
         for member in self._present.values():
             member.raw = member.answer = None
 

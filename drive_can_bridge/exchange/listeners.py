@@ -38,10 +38,10 @@ class BusListener(Protocol):
     """What an exchange tells about its bus; from the reader or timer thread, lock not held."""
 
     def bus_opened(self, bus: str) -> None:
-        """Take note that the bus is there (again)."""
+        """Record that the bus is there (again)."""
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """Take note that the bus is gone, or could not be opened."""
+        """Record that the bus is gone, or could not be opened."""
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """End the bridge: the exchange cannot go on."""

@@ -135,7 +135,7 @@ class Member:
             partner._fail(partner_failed(self.session.configuration.name, text))
 
     def _unheard(self, error: Exception) -> None:
-        """Take note that the listener has raised: a stop that takes its course goes on."""
+        """Record that the listener has raised: a stop that takes its course goes on."""
         if self.session.active:
             self.contain(error)
         else:

@@ -226,7 +226,7 @@ class Channel(Generic[StepT, ReplyT]):
         return True
 
     def disturbed(self, now: float) -> None:
-        """Take note of an answer that nobody asked for: more may follow."""
+        """Record an answer that nobody asked for: more may follow."""
         self._quarantine.begin(ANYTHING, now + self._courier.silence)
 
     def wake(self, now: float) -> None:
@@ -235,7 +235,7 @@ class Channel(Generic[StepT, ReplyT]):
         self.advance(now)
 
     def time_lost(self, now: float) -> None:
-        """Take note that nobody listened until now: an answer may lie in some buffer."""
+        """Record that nobody listened until now: an answer may lie in some buffer."""
         self.now = now
         self._quarantine.time_lost(now)
         if self._courier.busy:
@@ -352,7 +352,7 @@ class Channel(Generic[StepT, ReplyT]):
         return key is not None and self._quarantine.ready_at(key) > self.now
 
     def _expect_late(self) -> None:
-        """Take note that the answer under way is not waited for any more."""
+        """Record that the answer under way is not waited for any more."""
         if self._serving is None or not self._courier.busy:
             return
         step = self._serving.step

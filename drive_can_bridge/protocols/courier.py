@@ -54,7 +54,7 @@ class Courier(ABC, Generic[StepT, ReplyT]):
         """Begin an exchange; none is under way."""
 
     def expect(self, step: StepT, until: float) -> None:
-        """Take note that an exchange has begun, and how long its answer is waited for."""
+        """Record that an exchange has begun, and how long its answer is waited for."""
         if self.busy:
             raise RuntimeError('an exchange is under way')
         self.step, self.busy, self.deadline, self._reply = step, True, until, False
@@ -86,7 +86,7 @@ class Courier(ABC, Generic[StepT, ReplyT]):
         return reply
 
     def finish(self) -> None:
-        """Take note that the exchange under way has ended."""
+        """Record that the exchange under way has ended."""
         self.step, self.busy, self.deadline = None, False, math.inf
 
     def forget(self) -> None:
@@ -123,7 +123,7 @@ class Courier(ABC, Generic[StepT, ReplyT]):
 
     def time_lost(self, now: float) -> ReplyT | bool:
         """
-        Take note that nobody listened until now.
+        Record that nobody listened until now.
 
         :return: the reply that ends the exchange under way; False: none does.
         """

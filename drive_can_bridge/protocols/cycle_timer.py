@@ -60,7 +60,7 @@ class CycleTimer:
 
     def begun(self, now: float, pause: float | None = None) -> float:
         """
-        Take note that a cycle begins, and plan the next.
+        Record that a cycle begins, and plan the next.
 
         :param pause: s until then; None: the period, counted from when this one was due.
         :return: distance to the previous one less the period, in s; NaN where the previous one

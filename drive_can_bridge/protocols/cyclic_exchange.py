@@ -219,7 +219,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _left(self, to: 'Iterable[CyclicExchange[Any]]', sent: bool, now: float) -> None:
         """
-        Take note of a frame.
+        Record a frame.
 
         One that may start somebody counts even alone; otherwise a cycle counts only when the bus
         has taken every frame of it.
@@ -260,7 +260,7 @@ class CyclicExchange(Generic[TelegramT]):
     def expect_answer(self, now: float, until: float = math.inf, *,
                       runs: bool | None = None) -> None:
         """
-        Take note that the drive was sent a cycle.
+        Record that the drive was sent a cycle.
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
         :param runs: it holds anything but neutral and ``disable``; None: as the cycle of this
@@ -280,7 +280,7 @@ class CyclicExchange(Generic[TelegramT]):
         return False
 
     def answered(self, received_at: float) -> None:
-        """Take note of the answer to the last cycle."""
+        """Record the answer to the last cycle."""
         book = self.book
         missed = not book.awaiting
         book.answered(received_at)
@@ -302,7 +302,7 @@ class CyclicExchange(Generic[TelegramT]):
             self._in_turn or self._session.stage is Stage.STOPPING)
 
     def _heed(self) -> None:
-        """Take note that the drive has shown to have heard what it was told last, if it has."""
+        """Record that the drive has shown to have heard what it was told last, if it has."""
         if self.heeded and self._session.duty.unshown and self.book.stop_shown:
             self._session.duty.happened(Happened.ANSWERED)
         if self.book.stop_shown:
@@ -402,6 +402,6 @@ class CyclicExchange(Generic[TelegramT]):
         return self._session.duty.unshown and not self.book.stop_shown
 
     def doubt_the_end(self) -> None:
-        """Take note of a drive that ran, and has answered none of its last cycles."""
+        """Record a drive that ran, and has answered none of its last cycles."""
         if self._unanswered():
             self._session.duty.happened(Happened.SILENT)

@@ -69,7 +69,7 @@ class ExchangeBook:
 
     def begin(self, now: float, pause: float | None = None) -> None:
         """
-        Take note that an exchange begins, and plan the next.
+        Record that an exchange begins, and plan the next.
 
         :param pause: s until then; None: a period.
         """
@@ -82,7 +82,7 @@ class ExchangeBook:
 
     def asked(self, now: float, *, runs: bool) -> None:
         """
-        Take note that the drive was sent a cycle that it answers.
+        Record that the drive was sent a cycle that it answers.
 
         :param runs: it holds anything but neutral and ``disable``.
         """
@@ -94,12 +94,12 @@ class ExchangeBook:
         self._asked.append(Asked(now, -1 if runs else self._runs))
 
     def doubt(self) -> None:
-        """Take note that no cycle up to now shows that the drive was told to stop."""
+        """Record that no cycle up to now shows that the drive was told to stop."""
         self._runs += 1
         self.stop_shown = False
 
     def heard(self, received_at: float) -> None:
-        """Take note of an answer: to the oldest cycle that may still get one."""
+        """Record an answer: to the oldest cycle that may still get one."""
         if self._asked:
             at, neutral = self._asked.popleft()
             self.stop_shown = self.stop_shown or neutral == self._runs
@@ -126,7 +126,7 @@ class ExchangeBook:
         return bool(self._asked)
 
     def forget_asked(self) -> None:
-        """Take note that no answer to any cycle up to now is on its way."""
+        """Record that no answer to any cycle up to now is on its way."""
         self._asked.clear()
 
     def _forget_older(self, now: float) -> None:
@@ -137,7 +137,7 @@ class ExchangeBook:
     # -- answers ----------------------------------------------------------------------------------
 
     def answered(self, received_at: float) -> None:
-        """Take note of the answer that completes an exchange."""
+        """Record the answer that completes an exchange."""
         self.awaiting = False
         self.missed_in_row = 0
         statistics = self._statistics
@@ -146,7 +146,7 @@ class ExchangeBook:
         statistics.latency.add(latency if latency > 0.0 else 0.0)
 
     def missed(self) -> bool:
-        """Take note of an exchange that nobody answered; tell whether those were too many."""
+        """Record an exchange that nobody answered; tell whether those were too many."""
         self.awaiting = False
         self._statistics.missed += 1
         self.missed_in_row += 1

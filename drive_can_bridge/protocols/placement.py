@@ -80,7 +80,7 @@ class SentWrites(Generic[SpanT]):
         self._spans = [placement.span(parameter) for parameter in sent.parameters]
 
     def note(self, span: SpanT, words: Sequence[int]) -> None:
-        """Take note of a write that left."""
+        """Record a write that left."""
         found = dict(zip(self._placement.addresses(span), words))
         for place, parameter in enumerate(self._sent.parameters):
             raw = self._placement.raw_among(parameter, self._spans[place], found)

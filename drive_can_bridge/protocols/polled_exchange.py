@@ -76,7 +76,7 @@ class PolledExchange(Generic[StepT, ReplyT]):
         self._book.missed_in_row = 0
 
     def disregard(self) -> None:
-        """Take note that the round under way, if any, says nothing."""
+        """Record that the round under way, if any, says nothing."""
         self._void = self.reading
 
     def cancel(self) -> None:

@@ -95,7 +95,7 @@ class WriteSchedule:
         self._due: list[int] = []
 
     def forget(self) -> None:
-        """Take note that nothing is known of the drive: everything is due at the next look."""
+        """Record that nothing is known of the drive: everything is due at the next look."""
         self._written = [None] * len(self._written)
         self._due.clear()
 
@@ -131,12 +131,12 @@ class WriteSchedule:
         return self._due.pop(0)
 
     def written(self, index: int, raw: int, now: float) -> None:
-        """Take note of what the drive was told (and, where it acknowledges, has confirmed)."""
+        """Record what the drive was told (and, where it acknowledges, has confirmed)."""
         self._written[index] = raw
         self._written_at[index] = now
         if index in self._due:
             self._due.remove(index)
 
     def failed(self, index: int) -> None:
-        """Take note that nobody knows what the drive has: it is due at the next look."""
+        """Record that nobody knows what the drive has: it is due at the next look."""
         self._written[index] = None

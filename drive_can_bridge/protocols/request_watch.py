@@ -154,7 +154,7 @@ class RoundWatch:
                 self._observed.latency.add(now - self._began)
 
     def failed(self, span: Hashable) -> None:
-        """Take note that a read was not answered: the round is missed."""
+        """Record that a read was not answered: the round is missed."""
         if self._next is not None and span == self.plan[self._next]:
             self._next = None
             self._observed.missed += 1

@@ -113,7 +113,7 @@ class SafeStop(Generic[StepT, ReplyT]):
             self._channel.run(self._look(), self._looked, now, Lane.STOP)
 
     def forget(self) -> None:
-        """Take note that the channel was cleared."""
+        """Record that the channel was cleared."""
         self.running = False
 
     def _then_look(self, procedure: Generator[StepT, ReplyT, list[Sentence]],

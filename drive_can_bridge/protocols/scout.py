@@ -81,7 +81,7 @@ class Scout(ABC):
         return {}
 
     def asked(self, frame: Frame, now: float) -> None:
-        """Take note of a question of our own: its answer is no sign of a master."""
+        """Record a question of our own: its answer is no sign of a master."""
         self._ours = True
         self.hear_request(frame, now)
         self._ours = False

@@ -51,7 +51,7 @@ class SetpointsFirst:
         self._starting = False
 
     def written(self, index: int) -> bool:
-        """Take note that the drive has a setpoint; tell whether it was the last one waited for."""
+        """Record that the drive has a setpoint; tell whether it was the last one waited for."""
         waited = self._starting and index in self._lacking
         self._lacking.discard(index)
         return waited and not self._lacking

@@ -42,7 +42,7 @@ class StopAgain:
 
     def heard(self, now: float, *, hurry: bool = False, answered: bool = False) -> None:
         """
-        Take note of a sign of life, before an answer is taken that it may be.
+        Record a sign of life, before an answer is taken that it may be.
 
         :param hurry: it is no answer, and for that to what is under way a moment will do; once,
             for a slow drive would never be found.

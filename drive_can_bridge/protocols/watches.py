@@ -42,7 +42,7 @@ class CyclicWatch:
         observer.watches.append(self)
 
     def begin_cycle(self, now: float) -> None:
-        """Take note that a period begins."""
+        """Record that a period begins."""
         if self._cycle == self._cycle:      # not NaN
             self._observed.period.add(now - self._cycle)
         self._cycle = now
@@ -118,7 +118,7 @@ class Questions(Generic[Key, About]):
         observer.watches.append(self)
 
     def ask(self, key: Key, about: About, now: float) -> None:
-        """Take note of a request; one that is repeated waits anew."""
+        """Record a request; one that is repeated waits anew."""
         self.note(key, about, now)
         due = now + self._timeout
         if self._certain_from != self._certain_from:    # NaN

@@ -38,14 +38,14 @@ class WordRepetition:
         self.forget()
 
     def forget(self) -> None:
-        """Take note that nothing is known of the drive."""
+        """Record that nothing is known of the drive."""
         self.word: int | None = None
         self._ran = False       # the word before was enable
         self._repeats = 0
         self._due_at = math.inf
 
     def begun(self, word: int) -> None:
-        """Take note that a word is being written."""
+        """Record that a word is being written."""
         if word == self.word:
             self._repeats += 1
         else:
@@ -57,7 +57,7 @@ class WordRepetition:
 
     def left(self, now: float, pause: float | None = None) -> None:
         """
-        Take note that it left; where writes are acknowledged, that it was.
+        Record that it left; where writes are acknowledged, that it was.
 
         :param pause: s until it is to leave again in any case; None: it is no pulse.
         """

@@ -109,7 +109,7 @@ class CommandTopic:
             self._old(self._decode(data))
 
     def forget(self) -> None:
-        """Take note that nobody publishes here any more: whoever comes has a clock of its own."""
+        """Record that nobody publishes here any more: whoever comes has a clock of its own."""
         self._quickest = math.inf
 
     def _lateness(self, info: dict[str, Any]) -> float:

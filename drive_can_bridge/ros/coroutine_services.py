@@ -90,7 +90,7 @@ class CoroutineServices:
             raise
 
     def _ended(self) -> None:
-        """Take note that one caller less waits: it was answered, or nothing comes of it."""
+        """Record that one caller less waits: it was answered, or nothing comes of it."""
         with self._counting:
             self.calls -= 1
 

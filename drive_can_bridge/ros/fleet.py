@@ -204,7 +204,7 @@ class Fleet:
         self._flight.bus_lost(bus)
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        """Take note that an exchange cannot go on."""
+        """Record that an exchange cannot go on."""
         text = f'buses.{bus}: {reason}'
         if misconfigured and self._misconfigured is not None:
             self._misconfigured.append(text)

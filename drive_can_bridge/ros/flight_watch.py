@@ -65,11 +65,11 @@ class Occasions:
             self._trigger(bus, f'{drive}_{each.value}', rank=_RANKS[each])
 
     def forget(self, drive: str) -> None:
-        """Take note that a drive is inactive: whatever ails it then begins anew."""
+        """Record that a drive is inactive: whatever ails it then begins anew."""
         self._faulted.discard(drive)
 
     def bus_lost(self, bus: str) -> None:
-        """Take note that a bus is gone."""
+        """Record that a bus is gone."""
         self._trigger(bus, 'bus_lost', rank=_BUS_LOST_RANK)
 
     def reported(self, report: Report, bus: str) -> None:

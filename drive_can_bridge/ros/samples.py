@@ -164,7 +164,7 @@ class SamplePublisher:
                 bits.update(raws[bits.slot])
 
     def forget(self) -> None:
-        """Take note that the drive is gone: nothing known of it is current."""
+        """Record that the drive is gone: nothing known of it is current."""
         self.last = None
         for bits in self._bits:
             bits.forget()

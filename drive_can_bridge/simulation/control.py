@@ -161,7 +161,7 @@ class Operation:
                         else self._machine.after_fault)
 
     def standstill(self) -> None:
-        """Take note that the motor stands: the end of a quick stop, or of a shutdown."""
+        """Record that the motor stands: the end of a quick stop, or of a shutdown."""
         self._enter(ENDS.get(self.state, self.state))
 
     def _enter(self, state: State) -> None:

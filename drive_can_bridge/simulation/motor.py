@@ -128,7 +128,7 @@ class Motor:
 
     def advance(self, duration: float, *, energised: bool,
                 torque_max: float = TORQUE_MAX) -> None:
-        """Take note of how the shaft has moved for some time, by what torque at most."""
+        """Record how the shaft has moved for some time, by what torque at most."""
         goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
         self.temperature += (goal - self.temperature) * -math.expm1(
             -duration / TEMPERATURE_TIME_CONSTANT)

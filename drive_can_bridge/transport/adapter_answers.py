@@ -30,7 +30,7 @@ class AdapterAnswers:
         self._since = math.inf
 
     def sent(self) -> None:
-        """Take note of a frame that was written."""
+        """Record a frame that was written."""
         self._unanswered += 1
 
     def take(self, line: str, now: float) -> None:

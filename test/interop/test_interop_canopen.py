@@ -324,7 +324,7 @@ class Bridge:
             self.events.append(event)
 
     def bus_opened(self, bus: str) -> None:
-        """Take note of the bus: it was to be expected."""
+        """Record the bus: it was to be expected."""
 
     def bus_lost(self, bus: str, reason: str) -> None:
         self.failures.append(reason)

@@ -243,7 +243,7 @@ class Story:
         return DELAY, str(answers[0])
 
     def look(self) -> None:
-        """Take note of what ends an enable."""
+        """Record what ends an enable."""
         for event in self.talk.events():
             if isinstance(event, StationLost):
                 self.allowed = self.online = False

@@ -100,7 +100,7 @@ class Group:
             member.expect_answer(now, now + leader.configuration.period, runs=exchange.runs)
 
     def cycle_left(self) -> None:
-        """Take note that a cycle has left: it told everybody the same."""
+        """Record that a cycle has left: it told everybody the same."""
         for member in self.members[1:]:
             member.sent.raws = self.leader.sent.raws
 
@@ -120,18 +120,18 @@ class Group:
     # -- what becomes of its members --------------------------------------------------------------
 
     def member_found(self, member: CannordSession) -> None:
-        """Take note that an inverter of the group came online: it must not jump."""
+        """Record that an inverter of the group came online: it must not jump."""
         self.leader.setpoints.disarm()
         self.control.member_found(member.configuration.name)
 
     def member_lost(self, member: CannordSession) -> None:
-        """Take note that an inverter of the group is offline."""
+        """Record that an inverter of the group is offline."""
         if member.active:       # else the bridge ends: what it reported last is to be told
             self.control.member_lost(member.configuration.name)
             self.leader.gate.follow()
 
     def end(self, reason: Sentence, now: float) -> None:
-        """Take note that all are stopped: that, and no member that goes, takes the enable back."""
+        """Record that all are stopped: that, and no member that goes, takes the enable back."""
         self.control.withdraw(reason, now, lost=False)
 
     def member_status(self, member: CannordSession, word: int, now: float) -> None:

@@ -44,7 +44,7 @@ class Samples:
         return int(awaiting)
 
     def forget(self) -> None:
-        """Take note that the inverter is offline."""
+        """Record that the inverter is offline."""
         self._held = None
         self._last = ()
         self.warning = NOTHING

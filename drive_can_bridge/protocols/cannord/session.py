@@ -191,7 +191,7 @@ class CannordSession(Session):
 
     def expect_answer(self, now: float, until: float = math.inf, *, runs: bool) -> None:
         """
-        Take note that the inverter was sent its process frames.
+        Record that the inverter was sent its process frames.
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
         :param runs: they hold anything but neutral and ``disable``.

@@ -98,12 +98,12 @@ class Node:
         self._heartbeat_at = max(self._heartbeat_at, now)   # none was due while nobody listened
 
     def offline(self, now: float) -> None:
-        """Take note that the drive is offline: it is started once a second."""
+        """Record that the drive is offline: it is started once a second."""
         if self._nmt_start and self._start_due == math.inf:
             self._start_due = max(now, self._started_at + START_PERIOD)
 
     def online(self) -> None:
-        """Take note that the drive is online: it needs no more starting."""
+        """Record that the drive is online: it needs no more starting."""
         self._start_due = math.inf
 
     def stop(self) -> None:

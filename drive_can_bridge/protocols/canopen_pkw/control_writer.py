@@ -64,7 +64,7 @@ class ControlWriter:
         self._hurried: int | None = None    # the stop that others have made room for
 
     def forget(self) -> None:
-        """Take note that nothing is known of the drive."""
+        """Record that nothing is known of the drive."""
         self._settled = self._doubtful = self._hurried = None
         self._retry_at = math.inf
         self._repetition.forget()
@@ -175,7 +175,7 @@ class ControlWriter:
         self.refusal = text
 
     def _settle(self, word: int) -> None:
-        """Take note that the drive has a word."""
+        """Record that the drive has a word."""
         self._doubtful = None
         self._settled, self._settled_at = word, self._channel.now
         self._repetition.left(self._channel.now)

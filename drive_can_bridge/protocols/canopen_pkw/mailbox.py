@@ -217,7 +217,7 @@ class MailboxCourier(Courier[Step, Reply]):
         self._refused_at = None
 
     def _left(self, sent: bool, now: float) -> None:
-        """Take note of a request that the bus refused; or took, if late, after all."""
+        """Record a request that the bus refused; or took, if late, after all."""
         if self._request is None:
             return
         if sent:

@@ -67,7 +67,7 @@ class Writers:
             session, channel, self._stop, lambda now: self.stop(now, again=True))
 
     def forget(self) -> None:
-        """Take note that nothing is known of the drive."""
+        """Record that nothing is known of the drive."""
         self._schedule.forget()
         self._failures.clear()
         self._warned.clear()
@@ -126,7 +126,7 @@ class Writers:
         return expired
 
     def round_begins(self) -> None:
-        """Take note that a round begins, in which others may make room once more."""
+        """Record that a round begins, in which others may make room once more."""
         self._made_room = False
 
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
@@ -209,7 +209,7 @@ class Writers:
 
     def _failed(self, setpoint: Setpoint, text: Sentence, *, neutral: bool) -> None:
         """
-        Take note of a setpoint that the drive does not take.
+        Record a setpoint that the drive does not take.
 
         :param neutral: it is the neutral one: a drive that is enabled would run on.
         """

@@ -127,7 +127,7 @@ class Beat:
 
     def begun(self, turn: Turn, now: float, tell: Left) -> None:
         """
-        Take note that a drive was sent its RPDOs; SYNC follows if it was the last of this round.
+        Record that a drive was sent its RPDOs; SYNC follows if it was the last of this round.
 
         :param tell: takes what becomes of SYNC.
         """
@@ -149,7 +149,7 @@ class Beat:
         self._send_sync(outbox)
 
     def leave(self, turn: Turn) -> None:
-        """Take note that a drive is not in exchange any more: others may have waited for it."""
+        """Record that a drive is not in exchange any more: others may have waited for it."""
         turn.begun_round, turn.tell = False, None
         running = [each for each in self.turns if each.running]
         if running and not self._pulling and all(each.begun_round for each in running):

@@ -146,7 +146,7 @@ class DriveRules(TableRules):
         self._quick_stop_unseen = self._last == states.QUICK_STOP
 
     def known_disabled(self) -> None:
-        """Take note that the drive was asked by SDO, and is not enabled."""
+        """Record that the drive was asked by SDO, and is not enabled."""
         self._may_be_enabled = self._quick_stop_unseen = False
         self._last = 0
 

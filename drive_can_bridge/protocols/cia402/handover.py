@@ -51,6 +51,6 @@ class Handover:
         rules.halted = rules.mode_bits == states.HALT
 
     def carried(self, word: int, setpoints: list[int]) -> None:
-        """Take note of a telegram that was made: the edge hands over what is in it."""
+        """Record a telegram that was made: the edge hands over what is in it."""
         if self._rising and word & states.NEW_SETPOINT:
             self._handed, self._rising = setpoints[self._place], False

@@ -128,7 +128,7 @@ class AcyclicSide:
         return True
 
     def foreign_master(self, frame: Frame) -> None:
-        """Take note of a request that is not ours."""
+        """Record a request that is not ours."""
         session = self._session
         session.report.note(ForeignMasterSeen(
             sentences.other_master_asks(session.configuration.station, str(frame))))
@@ -136,13 +136,13 @@ class AcyclicSide:
     # -- control and status word without a slot ---------------------------------------------------
 
     def found(self, now: float) -> None:
-        """Take note that the drive is online."""
+        """Record that the drive is online."""
         if self.control_writer is not None:
             self.control_writer.begin(now)
         self._session.control_changed(now)
 
     def withdrawn(self) -> None:
-        """Take note that the control word is ``disable`` again."""
+        """Record that the control word is ``disable`` again."""
         if self.control_writer is not None:
             self.control_writer.end()
 

@@ -142,7 +142,7 @@ class SetpointWriter:
         return raws
 
     def _left(self, index: int, raw: int, sent: bool, now: float, *, runs: bool) -> None:
-        """Take note of a setpoint, or control word, that left; the refused ones are due again."""
+        """Record a setpoint, or control word, that left; the refused ones are due again."""
         if not sent:
             self._schedule.failed(index)
             return

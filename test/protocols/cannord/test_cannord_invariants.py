@@ -131,7 +131,7 @@ class CannordObserver(Observer):
 
     def hears_response(self, data: bytes) -> bool:
         """
-        Take note of a parameter response; tell whether it answers the last task.
+        Record a parameter response; tell whether it answers the last task.
 
         It does so even late: where time was lost, nobody has given the task up yet.
         """

@@ -65,7 +65,7 @@ class AxisObserver(Observer):
         self.command = None
 
     def lost(self) -> None:
-        """Take note that the axis may be anywhere."""
+        """Record that the axis may be anywhere."""
         if self.controlled:     # beside ``disable``, what was known goes on, sent or refused
             self.old |= self.read | ({self.reported} if self.reported is not None else set())
         self.reported, self.running_said, self.command, self.anew = None, False, None, True

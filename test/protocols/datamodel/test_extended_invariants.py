@@ -148,7 +148,7 @@ class ExtendedObserver(Observer):
             assert count == 1
 
     def is_neutral(self, number: int) -> None:
-        """Take note of a setpoint that was written neutral, or found so, since the last cycle."""
+        """Record a setpoint that was written neutral, or found so, since the last cycle."""
         self.neutral.add(number)
         if self.neutral >= {50, 51}:
             self.tells('cycle', runs=False)

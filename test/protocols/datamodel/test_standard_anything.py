@@ -217,7 +217,7 @@ class StandardObserver(Observer):
             self.quiet_until = now + TIMEOUT + QUARANTINE
 
     def timer_ran(self, now: float) -> None:
-        """Take note that the session had the chance to see a time-out."""
+        """Record that the session had the chance to see a time-out."""
         if self.asked is not None and now >= self.asked.at + TIMEOUT:
             self.asked = None
             self.quiet_until = max(self.quiet_until, now + QUARANTINE)
