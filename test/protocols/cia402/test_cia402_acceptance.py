@@ -1,0 +1,20 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""Sentences of the contract that only show where a drive is in the middle of something."""
+
+from servo_builders import Axis
+from test_cia402_modes import home, meet
+
+from drive_can_bridge.core.control import ControlAction
+
+
+def test_an_axis_that_is_halted_stays_so_until_homing_starts() -> None:
+    axis, drive = meet('pp', homing=True)
+    axis.commands(1000.0, 2000.0)
+    axis.live(0.6)
+    assert drive.told[-1] == 0x010F
+    axis.take()
+    assert home(axis) == [('home', True, 'homed')]
+    sent = axis.take()
+    start = next(at for at, text in enumerate(sent) if text.startswith('205#1F00'))
+    before = {text[4:8] for text in sent[:start] if text.startswith('205#')}
+    assert before == {'0F01'}
