@@ -18,3 +18,16 @@ def test_an_axis_that_is_halted_stays_so_until_homing_starts() -> None:
     start = next(at for at, text in enumerate(sent) if text.startswith('205#1F00'))
     before = {text[4:8] for text in sent[:start] if text.startswith('205#')}
     assert before == {'0F01'}
+
+
+def test_the_mode_stays_while_a_quick_stop_ends_a_homing() -> None:
+    axis, drive = meet('csp', homing=True)
+    drive.homing = -1
+    home(axis, 0.2)
+    drive.braking = 30
+    axis.take()
+    axis.asks(ControlAction.QUICK_STOP, 0.1)
+    assert drive.state == drive.QUICK_STOP
+    assert not any(text.startswith('605#2F6060') for text in axis.take())
+    axis.live(0.6)
+    assert '605#2F60600008000000' in axis.take()
