@@ -31,3 +31,20 @@ def test_the_mode_stays_while_a_quick_stop_ends_a_homing() -> None:
     assert not any(text.startswith('605#2F6060') for text in axis.take())
     axis.live(0.6)
     assert '605#2F60600008000000' in axis.take()
+
+
+def test_a_quick_stop_that_ends_by_itself_is_not_cut_short_when_found() -> None:
+    axis = Axis()
+    axis.drive.becomes(axis.drive.QUICK_STOP)
+    status = int.from_bytes(axis.drive.objects[0x6041, 0], 'little') | 0x0400
+    axis.drive.objects[0x6041, 0] = status.to_bytes(2, 'little')
+    axis.start()
+    assert '605#2B40600000000000' not in axis.take()
+
+
+def test_one_that_holds_when_found_stands_when_its_velocity_is_0() -> None:
+    axis = Axis(objects={(0x605A, 0): b'\6\0'})
+    axis.drive.becomes(axis.drive.QUICK_STOP)
+    axis.start()
+    assert '605#2B40600000000000' in axis.take()
+    assert axis.session.online
