@@ -185,7 +185,7 @@ class BringUp:
             wanted = DISABLE_WORDS[self._options.disable_word]
             if state is State.QUICK_STOP_ACTIVE:    # which takes its course
                 wanted = states.DISABLE_VOLTAGE
-            braking = state is State.QUICK_STOP_ACTIVE and not raw & states.TARGET_REACHED
+            braking = state is State.QUICK_STOP_ACTIVE and (yield from self._brakes(raw))
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
                 yield from self._must(states.CONTROL_WORD, 0, word, 2)
@@ -194,6 +194,15 @@ class BringUp:
         self.status = raw
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
+
+    def _brakes(self, status: int) -> Generator[Ask, Reply, bool]:
+        """Tell whether a quick stop takes its course: one that ends by itself does until then."""
+        self._rules.quick_stop_option = yield from self._read(
+            states.QUICK_STOP_OPTION, signed=True)
+        if not self._rules.stays:
+            return True
+        return not status & states.TARGET_REACHED and (
+            yield from self._read(states.VELOCITY)) != 0
 
     def _learn(self) -> Script:
         """Read what the drive does at a stop."""

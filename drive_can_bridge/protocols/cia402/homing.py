@@ -22,6 +22,8 @@ from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.states import State
 
+#: a mode that changes now would change how the drive brakes
+_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 _DONE = states.BIT_12 | states.TARGET_REACHED
 
 
@@ -163,8 +165,7 @@ class Homing:
             self._answer(False, sentences.homing_stopped(self._step.value))
         self._rules.homing_bits = 0
         self._deadline = math.inf
-        if states.state_of(status) is not State.OPERATION_ENABLED and (
-                self._step is not Step.LEAVING):
+        if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING:
             self._go(Step.LEAVING)
             self._change(self._mode, lambda failure: self._finish())
 
