@@ -397,10 +397,10 @@ class BringUp:
         difference, identifier = yield from self._compare(wanted, transmit=transmit)
         if difference:
             self._may_write(difference)
-            yield from self._write(wanted, identifier, transmit=transmit)
+            refusal = yield from self._write(wanted, identifier, transmit=transmit)
             difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
             if difference:
-                raise _differs(difference)
+                raise _differs(refusal or difference)
 
     def _types(self, *, transmit: bool) -> tuple[int, ...]:
         event = pdo.EVENT_PROFILE, pdo.EVENT_MAKER
@@ -451,16 +451,25 @@ class BringUp:
         return [(pdo.INHIBIT_TIME, min(round(5000 * self._drive.period), 0xFFFF)),
                 (pdo.EVENT_TIMER, round(1000 * self._drive.period))]
 
-    def _write(self, wanted: Pdo, identifier: int, *, transmit: bool) -> Script:
-        """Write one PDO, in the order that all devices take."""
+    def _write(self, wanted: Pdo, identifier: int, *, transmit: bool,
+               ) -> Generator[Ask, Reply, Sentence]:
+        """
+        Write one PDO, in the order that all devices take.
+
+        :return: the refusal of an RPDO that is fixed: it may fit as it is, but for its type.
+        """
         at, mapping = wanted.communication, wanted.communication + pdo.MAPPING_OFFSET
         kept = identifier & (pdo.NO_REMOTE | pdo.LONG_IDENTIFIER)
-        yield from self._must(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
+        refusal = yield from self._put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
+        if refusal and transmit:
+            raise _differs(refusal)
+        if refusal:
+            yield from self._put(at, pdo.TRANSMISSION, self._types(transmit=False)[0], 1)
+            return refusal
         yield from self._must(mapping, 0, 0, 1)
         for place, entry in enumerate(wanted.entries, 1):
             yield from self._must(mapping, place, entry, 4)
         yield from self._must(mapping, 0, len(wanted.entries), 1)
-        refusal = NOTHING
         for kind in self._types(transmit=transmit):
             refusal = yield from self._put(at, pdo.TRANSMISSION, kind, 1)
             if not refusal:
@@ -477,6 +486,7 @@ class BringUp:
             if refusal:
                 self.tell(refusal)
         yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
+        return NOTHING
 
     def _close(self, first: int, used: Iterable[Pdo]) -> Script:
         """Make PDOs invalid that are not needed."""

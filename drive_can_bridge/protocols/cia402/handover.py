@@ -32,6 +32,7 @@ class Handover:
         self._rules = rules
         self._handed: int | None = None     # the drive was given this one
         self._rising = False                # bit 4 has yet to travel
+        self._before = 0                    # the bits that travel until then
 
     def look(self, status: int) -> None:
         """Take a status word, before the next control word is chosen."""
@@ -41,10 +42,14 @@ class Handover:
             rules.mode_bits, rules.halted = 0, False
             return
         acknowledged = bool(status & states.BIT_12)
-        if rules.mode_bits & states.NEW_SETPOINT:
+        if self._rising:
+            if not setpoint.armed:      # bit 8 would fall alone
+                rules.mode_bits, self._rising = self._before, False
+        elif rules.mode_bits & states.NEW_SETPOINT:
             if acknowledged or not setpoint.armed:
                 rules.mode_bits = 0
         elif setpoint.armed and setpoint.raw != self._handed and not acknowledged:
+            self._before = rules.mode_bits
             rules.mode_bits, self._rising = states.NEW_SETPOINT | states.AT_ONCE, True
         if not setpoint.armed and self._handed is not None:
             rules.mode_bits, self._handed, self._rising = states.HALT, None, False

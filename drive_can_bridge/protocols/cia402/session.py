@@ -567,7 +567,11 @@ class Cia402Session(Session):
     def _last_cycle_left(self, now: float) -> None:
         if self.stage is not Stage.STOPPING:
             return
-        if now < self._stop_until and not self.exchange.book.missed_in_row and (
+        book = self.exchange.book
+        # one that has answered its stop may miss some: it is lost by as many as ever
+        listens = not book.missed_in_row or (
+            book.stop_shown and book.missed_in_row < self.configuration.missed_limit)
+        if now < self._stop_until and listens and (
                 self._rules.state in _MOVING or self._rules.state and self._machine.word_due):
             self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
             return

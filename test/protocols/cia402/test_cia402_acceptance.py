@@ -1,10 +1,17 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Sentences of the contract that only show where a drive is in the middle of something."""
 
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
 from servo_builders import Axis
 from test_cia402_modes import home, meet
+from test_cia402_set_up import FITS
+from test_cia402_stop import running, WATCH_OFF
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.protocols.cia402.handover import Handover
 
 
 def test_an_axis_that_is_halted_stays_so_until_homing_starts() -> None:
@@ -48,3 +55,56 @@ def test_one_that_holds_when_found_stands_when_its_velocity_is_0() -> None:
     axis.start()
     assert '605#2B40600000000000' in axis.take()
     assert axis.session.online
+
+
+def test_a_drive_that_brakes_may_miss_some_cycles_of_its_stop() -> None:
+    axis = running()
+    axis.drive.ramp = 100
+    axis.take()
+    axis.deliver(axis.talk.deactivate(axis.now))
+    axis.live(0.2)
+    axis.mute = True
+    axis.live(0.02)
+    axis.mute = False
+    axis.live(5.0)
+    sent = axis.take()
+    assert sent.count('205#070000000000') >= 100
+    assert '205#060000000000' in sent
+    assert sent[-1] == WATCH_OFF
+
+
+@pytest.mark.parametrize('kind', [0xFF, 0xFE])
+def test_a_fixed_drive_that_fits_but_for_the_type_of_its_rpdo(kind: int) -> None:
+    axis = Axis(objects={**FITS, (0x1400, 2): bytes([kind])})
+    axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
+    axis.start()
+    assert '605#2F00140201000000' in axis.take()
+    assert axis.session.online
+
+
+def test_a_fixed_drive_that_differs_says_what_it_refused() -> None:
+    axis = Axis(objects={**FITS, (0x1600, 1): bytes.fromhex('10007160')})
+    axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
+    axis.start()
+    assert not axis.session.online
+    assert '1400h.01h refused by the drive: 06010000h' in axis.session.offline_advice
+
+
+def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> None:
+    """Statuses come between two telegrams: TPDOs by event."""
+    target: Any = SimpleNamespace(parameter=SimpleNamespace(index=0x607A, subindex=None),
+                                  armed=True, raw=5000)
+    rules: Any = SimpleNamespace(mode_bits=0, halted=False)
+    handover = Handover(SimpleNamespace(items=[target]), rules)     # type: ignore[arg-type]
+    handover.look(0x0027)
+    handover.carried(0x003F, [5000])
+    target.armed = False
+    handover.look(0x1027)
+    assert (rules.mode_bits, rules.halted) == (0x100, True)
+    handover.look(0x0027)
+    target.armed, target.raw = True, 6000
+    handover.look(0x0027)
+    assert rules.mode_bits == 0x30
+    target.armed = False
+    handover.look(0x0027)
+    assert (rules.mode_bits, rules.halted) == (0x100, True)
