@@ -13,6 +13,7 @@ their time, and how long that was in all is noted.
 """
 
 from array import array
+from collections.abc import Sequence
 import math
 import os
 import socket
@@ -46,17 +47,22 @@ class Drives:
         self._enabled: set[int] = set()
         self._stops = array('d')
 
-    def answer(self, frame: bytes) -> bytes | None:
-        """Return the answer to a frame, or None."""
+    def asked(self, station: int) -> float:
+        """Note that a drive is asked in an exchange; return the time."""
+        now = time.monotonic()
+        last, self._last[station] = self._last[station], now
+        if last:
+            self._distances.append(now - last)
+        elif station not in self._first:
+            self._first[station] = now
+        return now
+
+    def answers(self, frame: bytes) -> Sequence[bytes]:
+        """Return what the drives answer to a frame."""
         identifier, _, request = CAN_FRAME.unpack(frame)
         if identifier & CYCLIC == CYCLIC:
-            now = time.monotonic()
             station = identifier >> 21 & 127
-            last, self._last[station] = self._last[station], now
-            if last:
-                self._distances.append(now - last)
-            elif station not in self._first:
-                self._first[station] = now
+            now = self.asked(station)
             self._values = self._values + 1 & 0x7FFF
             enabled = request[7] & 1
             if enabled:
@@ -66,12 +72,12 @@ class Drives:
                 self._stops.append(now)
             data = struct.pack('>4H', self._values, 1, 2, 1 | enabled << 1)
         elif identifier & 0x00100000:
-            return None
+            return ()
         else:
             number = identifier >> 4 & 0xFFFF
             data = {122: REQUEST_MAP, 126: RESPONSE_MAP}.get(
                 number, struct.pack('>4H', 7, 8, 9, 10))
-        return CAN_FRAME.pack(identifier | DIR, 8, data)
+        return (CAN_FRAME.pack(identifier | DIR, 8, data),)
 
     def clear(self) -> bool:
         """Begin to note anew."""
@@ -115,23 +121,23 @@ class Drives:
                     frame = client.recv(16)
                     if not frame:
                         break
-                    reply = self.answer(frame)
+                    replies = self.answers(frame)
                     if self._wire:
                         self._take_time()
-                    if reply is not None:
+                    for reply in replies:
                         client.send(reply)
                 except OSError:
                     break
             client.close()
 
 
-def main() -> None:
+def main(kind: type[Drives] = Drives) -> None:
     """Listen on the Unix socket given; with a bit rate and the time of an answer, slowly."""
     server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     server.bind(sys.argv[1])
     server.listen()
     bitrate, answer = map(float, sys.argv[2:4] or (math.inf, 0.0))
-    drives = Drives(2 * FRAME_BITS / bitrate + answer)
+    drives = kind(2 * FRAME_BITS / bitrate + answer)
     threading.Thread(target=drives.run, args=(server,), daemon=True).start()
     serve({'clear': drives.clear, 'distances': drives.distances, 'first': drives.first,
            'stops': drives.stops, 'spent': drives.spent})

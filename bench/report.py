@@ -51,6 +51,22 @@ def exchange_figures(found: dict[str, Any], name: str, goal: float) -> list[Figu
     ]
 
 
+def axes_figures(found: dict[str, Any]) -> list[Figure]:
+    """Axes of CiA 402 beside 29-bit drives."""
+    axes, drives = found['axes'], found['drives']
+    cpu, floor = (1e6 * each['process_cpu'] / max(1, each['exchanges']) for each in (axes, drives))
+    return [
+        Figure('CPU of the process per exchange, csp axes with SYNC', f'{cpu:.0f} µs',
+               f'29-bit drives {floor:.0f} µs', cpu / floor, 1.5),
+        Figure('exchanges missed, csp axes with SYNC',
+               f'{axes["missed"]} of {axes["exchanges"]}, period error p99 '
+               f'{1e3 * p99(axes["period_errors"]):.2f} ms',
+               f'29-bit drives {drives["missed"]} of {drives["exchanges"]}, '
+               f'{1e3 * p99(drives["period_errors"]):.2f} ms',
+               axes['missed'], drives['missed']),
+    ]
+
+
 def buses_figures(found: dict[str, Any]) -> list[Figure]:
     """Two full buses."""
     figures = []
@@ -287,7 +303,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'subscribed': lambda found: exchange_figures(found, 'subscribed', 0.85),
     'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 0.5),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
-    'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
+    'axes': axes_figures, 'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'hand': hand_figures, 'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,

@@ -57,6 +57,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False), duration),
         'ordinary': lambda: scenarios.exchange(
             Load(drives, period, commands=200.0, real_time=False), duration),
+        'axes': lambda: scenarios.axes(Load(drives, period, subscribed=False), duration),
         'buses': lambda: scenarios.buses(
             Load(2 * drives, period, commands=800.0, buses=2), duration),
         'latency': lambda: scenarios.latency(Load(drives, period), duration),

@@ -34,6 +34,11 @@ SETTINGS_AT = 1000
 SLOW = (125_000.0, 0.001)
 RESPONSES = 'actual_speed, motor_current, actual_position, digital_inputs'
 
+#: keys of an axis: what flows is RPDO, SYNC and TPDO
+SERVO = ('        protocol: cia402', '        mode: csp', '        mapping: assume',
+         '        heartbeat_producer: 0.0', '        heartbeat_timeout: 0.0',
+         '        bridge_heartbeat: 0.0')
+
 
 @dataclass(frozen=True)
 class Load:
@@ -48,6 +53,7 @@ class Load:
     :param stuck: nobody reads the bridge's standard error.
     :param buses: among which the drives are shared out.
     :param settings: parameters of each drive that a backup has, none beside another.
+    :param servo: the drives are axes of CiA 402 in csp.
     :param joints: Hz of the message with all joints; 0: there is none; None: drives have no joint.
     """
 
@@ -61,6 +67,7 @@ class Load:
     stuck: bool = False
     buses: int = 1
     settings: int = 0
+    servo: bool = False
     joints: float | None = None
 
     @property
@@ -82,7 +89,8 @@ class Bus:
         self.buses = [f'bus{number}' for number in range(load.buses)]
         self.channel = self._folder / self.buses[0]
         self.file = self.file_of(self.buses, 'drive_can_bridge')
-        self.drives = [stack.enter_context(child('drives.py', self._folder / bus, *pace))
+        self.drives = [stack.enter_context(child(
+            'axes.py' if load.servo else 'drives.py', self._folder / bus, *pace))
                        for bus in self.buses]
 
     def file_of(self, buses: Sequence[str], name: str) -> Path:
@@ -100,6 +108,9 @@ class Bus:
             profile = HERE / 'profile_control.yaml'
             requests = requests.replace('digital_outputs', 'control_word')
             responses = responses.replace('digital_inputs', 'status_word')
+        if load.servo:
+            profile, requests = HERE / 'profile_axis.yaml', 'target_position'
+            responses = 'actual_position, actual_torque'
         if load.settings:
             profile = self._folder / 'profile.yaml'
             profile.write_text((HERE / 'profile.yaml').read_text() + ''.join(
@@ -110,9 +121,10 @@ class Bus:
             if bus not in buses:
                 continue
             lines += [f'      drive{number}:', f'        bus: {bus}',
-                      '        protocol: datamodel_extended',
                       f'        station: {number // load.buses + 1}',
-                      f'        profile: {profile}', '        rearm: immediate',
+                      *(SERVO if load.servo else (
+                          '        protocol: datamodel_extended', '        rearm: immediate')),
+                      f'        profile: {profile}',
                       f'        period: {load.period}', f'        cyclic_request: [{requests}]',
                       f'        cyclic_response: [{responses}]']
             if load.joints is not None:
@@ -223,6 +235,12 @@ def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, An
             found['sleeper'] = sleeper.ask('errors')
             found['resident_mb'] = bridge.resident_mb()
     return found
+
+
+def axes(load: Load, duration: float) -> dict[str, Any]:
+    """Measure axes of CiA 402, each of them two frames and all one SYNC, beside 29-bit drives."""
+    return {name: exchange(replace(load, servo=servo), duration, floor=False)['bridge']
+            for name, servo in (('axes', True), ('drives', False))}
 
 
 def buses(load: Load, duration: float) -> dict[str, Any]:
