@@ -35,6 +35,9 @@ canopen = pytest.importorskip('canopen')
 objectdictionary = pytest.importorskip('canopen.objectdictionary')
 p402 = pytest.importorskip('canopen.profiles.p402')
 
+#: against the wall clock (test/real.py)
+pytestmark = pytest.mark.real
+
 NODE = 5
 #: s after which a thing that has not happened never will
 DEADLINE = 30.0
