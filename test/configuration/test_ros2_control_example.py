@@ -12,7 +12,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import JointConfiguration
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
-ROBOTS = ['arm', 'base']
+ROBOTS = ['arm', 'base', 'servo']
 KINDS = ('position', 'velocity', 'effort')
 
 
@@ -78,15 +78,17 @@ def test_controllers_name_these_joints(robot: str) -> None:
     assert configuration.joint_state_rate == rate
     for drive in configuration.drives.values():
         assert drive.command_timeout > 5 / rate     # survives a few late cycles
-    if robot == 'arm':
+    if robot != 'base':
         assert own['set_last_command_interface_value_as_state_on_activation'] is False
         assert own['command_interfaces'] == ['position']
+        assert {name for name in own['constraints'] if name.endswith('_joint')} == set(named)
     else:
         assert own['position_feedback'] is False
         assert not any(joint.position for joint in joints_of(robot).values())
 
 
 def test_axes_stay_where_they_are() -> None:
-    for drive in configuration_from_file(FOLDER / 'arm.yaml').drives.values():
-        assert [parameter.neutral_from for parameter in drive.cyclic_request] == [
-            '', 'actual_position']
+    for robot in ('arm', 'servo'):
+        for drive in configuration_from_file(FOLDER / f'{robot}.yaml').drives.values():
+            assert [parameter.neutral_from for parameter in drive.cyclic_request] == [
+                *[''] * (robot == 'arm'), 'actual_position']
