@@ -34,7 +34,8 @@ def write_file(directory: Path, *, patience: float = 10.0) -> Path:
     parameters, = (node['ros__parameters'] for node in content.values())
     parameters['buses']['main'].update(interface='slcan', channel=f'{directory}/links/main')
     for drive in parameters['drives'].values():
-        drive['period'] = max(drive['period'], 0.05)
+        # a servo interpolates over 0.02 s at most
+        drive['period'] = max(drive['period'], 0.02 if 'mode' in drive else 0.05)
         drive.update(parameter_timeout=patience, missed_limit=round(patience / drive['period']))
     file = directory / 'bridge.yaml'
     file.write_text(yaml.dump(content, sort_keys=False))
