@@ -106,7 +106,7 @@ def test_an_edit_reaches_the_drive_and_its_refusal_is_shown(site: Site, browser:
 def test_quick_stop_reaches_the_bus(site: Site, phone: Browser, somebody: Somebody) -> None:
     somebody.enables('/lift')
     phone.open(site.addresses['operator'])
-    wait_for(lambda: phone.value('/lift', 'control_word') == '0x0001', 'that it is enabled')
+    wait_for(lambda: phone.value('/lift', 'control_word') == '0x0001 enable', 'that it is enabled')
     assert phone.fits
     # the control word comes first in the cyclic request of station 2
     stop = '005FFFF0#0002'
@@ -114,7 +114,8 @@ def test_quick_stop_reaches_the_bus(site: Site, phone: Browser, somebody: Somebo
     phone.click('[data-drive="/lift"] button', 'Quick stop')
     wait_for(lambda: stop in site.frame_log.read_text(encoding='ascii'), 'the frame on the bus')
     phone.shows('lift: ready')
-    wait_for(lambda: phone.value('/lift', 'control_word') == '0x0000', 'that it is disabled')
+    wait_for(lambda: phone.value('/lift', 'control_word') == '0x0000 disable',
+             'that it is disabled')
 
 
 def test_all_drives_are_stopped_by_one_button(
