@@ -20,7 +20,7 @@ import time
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-sys.path += [str(HERE.parent / 'test'), str(HERE.parent / 'test' / 'ros')]
+sys.path += [str(HERE.parent / 'test' / folder) for folder in ('', 'ros', 'clocked')]
 
 from bridges import Bridge  # noqa: E402
 import rclpy  # noqa: E402
