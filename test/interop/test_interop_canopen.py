@@ -7,7 +7,6 @@ of the bridge: without it these tests skip.
 """
 
 from collections.abc import Iterator
-import itertools
 from typing import Any
 
 from builders import drive, read, text_of, write
@@ -38,23 +37,6 @@ NODE = 5
 #: s after which a thing that has not happened never will
 DEADLINE = 30.0
 LTMR = read_profile(profiles_directory() / 'tesys_t_ltmr.yaml').profile
-_CHANNELS = itertools.count(1)
-
-
-@pytest.fixture
-def channel() -> str:
-    """Return a channel of python-can's virtual bus that nobody else uses."""
-    return f'interop {next(_CHANNELS)}'
-
-
-@pytest.fixture
-def network(channel: str) -> Iterator[Any]:
-    """Return a network of the other stack on the bus."""
-    connected = canopen.Network()
-    connected.NOTIFIER_CYCLE = 0.05
-    connected.connect(interface='virtual', channel=channel)
-    yield connected
-    connected.disconnect()
 
 
 def bus_of(channel: str) -> BusConfiguration:

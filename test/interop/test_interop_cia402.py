@@ -9,7 +9,6 @@ the bridge: without it these tests skip.
 
 from collections.abc import Iterator
 from functools import partial
-import itertools
 import os
 from pathlib import Path
 from typing import Any
@@ -44,7 +43,6 @@ NODE = 5
 DEADLINE = 30.0
 PERIOD = 0.02
 SERVO = read_profile(profiles_directory() / 'cia402_servo.yaml').profile
-_CHANNELS = itertools.count(1)
 _U8, _I8, _U16, _I16, _U32, _I32 = (
     objectdictionary.UNSIGNED8, objectdictionary.INTEGER8, objectdictionary.UNSIGNED16,
     objectdictionary.INTEGER16, objectdictionary.UNSIGNED32, objectdictionary.INTEGER32)
@@ -85,23 +83,6 @@ def dictionary() -> Any:
             record.add_member(variable(f'entry {subindex}', index, subindex, data_type))
         od.add_object(record)
     return od
-
-
-@pytest.fixture
-def channel() -> str:
-    """Return a channel of python-can's virtual bus that nobody else uses."""
-    return f'interop 402 {next(_CHANNELS)}'
-
-
-@pytest.fixture
-def network(channel: str) -> Iterator[Any]:
-    """Return a network of the other stack on the bus."""
-    connected = canopen.Network()
-    connected.NOTIFIER_CYCLE = 0.05
-    connected.connect(interface='virtual', channel=channel)
-    yield connected
-    connected.sync.stop()
-    connected.disconnect()
 
 
 def bus_of(channel: str) -> BusConfiguration:
