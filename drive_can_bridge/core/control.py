@@ -41,7 +41,7 @@ whole time-out, although it is answered at once: ``disable`` right after it woul
 before it began. A drive that does not report faults gets the reset pulse in any case.
 
 *The pulse.* What nobody acknowledges may get lost, and a drive may look at its control word
-seldom: so the word leaves :data:`RESET_CYCLES` times, and whoever sends it lets little time pass
+seldom: so the word leaves :data:`RESET_CYCLES` times, and its sender lets little time pass
 between them (:attr:`.ControlMachine.pulsing`). Where a write is acknowledged, one is enough. The
 pulse is the same whether or not the fault goes meanwhile; what counts is the status after it.
 

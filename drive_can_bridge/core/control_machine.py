@@ -4,7 +4,7 @@ The machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop`` of one d
 
 It decides which control word is sent now. The session of the drive sends that word, reports that
 it left (:meth:`~ControlMachine.word_sent`) and what status words come back, and hands the outcome
-of each request to whoever asked. What it makes of a request stands in :mod:`.control`.
+of each request to the caller. What it makes of a request stands in :mod:`.control`.
 """
 
 from collections.abc import Callable, Sequence

@@ -13,7 +13,7 @@ class Disregard:
     """
     Notice that something lasts.
 
-    :param timeout: s that whoever asked for a stop waits, ramps included: it may last so long.
+    :param timeout: s that a caller of a stop waits, ramps included: it may last so long.
     :ivar text: what people were told of it; '': nothing.
     """
 

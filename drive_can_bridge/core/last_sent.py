@@ -13,7 +13,7 @@ class LastSent:
     :ivar parameters: all that a drive can be told, in the order of its frames.
     :ivar raws: the raw integer of each; None: not sent since activation. Another tuple after each
         change, and the same one as long as nothing changes.
-    :ivar times: how often frames with new contents have carried each, for whoever waits for one.
+    :ivar times: how often frames with new contents have carried each, for those who wait for one.
     """
 
     __slots__ = ('_widths', 'parameters', 'raws', 'times')

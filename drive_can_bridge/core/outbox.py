@@ -3,7 +3,7 @@
 Frames on their way out, and who wants to know whether they left.
 
 A bus may refuse a frame. What was refused was not sent: it is no stop cycle, no control word, no
-write. So nothing counts when a frame is made, but when whoever drives the session says what became
+write. So nothing counts when a frame is made, but when the driver of the session says what became
 of it:
 
 .. code-block:: python
@@ -61,6 +61,6 @@ class Outbox:
         other.clear()
 
     def clear(self) -> None:
-        """Forget frames that nobody has fetched; whoever made them is about to forget, too."""
+        """Forget frames that nobody has fetched; their maker is about to forget, too."""
         self._frames.clear()
         self._left.clear()

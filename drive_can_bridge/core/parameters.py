@@ -68,7 +68,7 @@ class ValueKind(Enum):
 
     @property
     def words(self) -> str:
-        """What is a value of this kind, for whoever gave another: ``a number``."""
+        """What is a value of this kind, for a refusal: ``a number``."""
         return _KIND_WORDS[self]
 
 

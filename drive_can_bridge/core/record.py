@@ -19,7 +19,7 @@ class Record(NamedTuple):
     One entry of a trace.
 
     Unlike a ``Frame`` it may be anything that adapters report: no protocol here has remote or CAN
-    FD frames, but whoever looks for the reason of a failure wants to see them.
+    FD frames, but who looks for the reason of a failure wants to see them.
 
     :param time: s, since 1970 or since the start of the trace.
     :param channel: what the trace calls the bus: a name, a number, or '' where it has none.

@@ -2,7 +2,7 @@
 """
 What is said to people of drives, requests and stops: every sentence, by its code.
 
-Whoever has something to tell calls a function of this module; its name is the *code*, its
+What has something to tell calls a function of this module; its name is the *code*, its
 arguments are the *fields*, and what it returns is the sentence. A :class:`Sentence` is text
 wherever text is wanted, and tells programs and tests what it says without being read:
 

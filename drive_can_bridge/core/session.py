@@ -2,7 +2,7 @@
 """
 A session: the conversation with one drive, as a state machine without input or output.
 
-Whoever drives it (see :mod:`drive_can_bridge.exchange`) hands in frames, requests and the time,
+Its exchange (see :mod:`drive_can_bridge.exchange`) hands in frames, requests and the time,
 and collects frames to send and events:
 
 .. code-block:: python

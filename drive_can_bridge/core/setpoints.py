@@ -41,7 +41,7 @@ class Setpoints:
     :param sent: what the drive was told last.
     :ivar held: those that stay where the axis is.
     :ivar forgotten: how often all that was known of positions became void.
-    :ivar changed: some ``raw`` is not what it was; whoever encodes the telegram clears it.
+    :ivar changed: some ``raw`` is not what it was; cleared when the telegram is encoded.
     :ivar enabled: commands are taken at all: the drive is online, nothing is stopping, and a drive
         with control is enabled.
     :ivar ignored_at: ``now`` of the last command that came while they were not taken.

@@ -97,7 +97,7 @@ class StatusReports:
 
     @property
     def telling(self) -> int | None:
-        """The status word that says most: of a fault, else of whoever lags behind."""
+        """The status word that says most: of a fault, else of a member that lags behind."""
         raws = [member.raw for member in self._present.values() if member.raw is not None]
         faults = [raw for raw in raws if _matches(self._table.fault, raw)]
         behind = [raw for raw in raws if not _matches(self._running, raw)]

@@ -3,7 +3,7 @@
 The exchange of one bus: owns the sessions of its drives under one lock.
 
 Two threads drive it: the link's reader (``frame_received``) and the timer thread started here.
-Whoever submits a request does so under the same lock and sends the frames at once, so that a
+A request is submitted under the same lock, which sends the frames at once, so that a
 service call never waits for a tick. Everything that a frame causes, publishing included, happens
 in the thread that received it: a hop through an executor costs 50 µs and a quarter of a core at
 1,000 frames/s.

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A drive on its bus: its session, whoever listens to it, and what a defect in either of them costs.
+A drive on its bus: its session, its listener, and what a defect in either of them costs.
 
 Whatever one of the two raises, the bus and its other drives go on. The drive itself is not
 commanded on blindly: it is stopped as at the end of the bridge, is offline for a moment, and is
@@ -123,7 +123,7 @@ class Member:
 
     def contain(self, error: Exception) -> None:
         """
-        Stop the drive, and whoever shares frames with it, because of a defect.
+        Stop the drive, and those that share frames with it, because of a defect.
 
         :raises Exception: the error, where nobody but its user needs the drive.
         """

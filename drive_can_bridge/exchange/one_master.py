@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-One master for each drive: whoever talks to drives locks them on this host before.
+One master for each drive: a process locks drives on this host before it talks to them.
 
 A drive is known by its place (interface, channel), its protocol and its station, whatever a
 parameter file calls it. Serial ports are locked as a whole: what two processes read from one

@@ -108,7 +108,7 @@ class Channel(Generic[StepT, ReplyT]):
     """
     Runs procedures through a courier.
 
-    :ivar now: ``now`` of the call being served, for whoever is called back.
+    :ivar now: ``now`` of the call being served, for callbacks.
     """
 
     def __init__(self, courier: Courier[StepT, ReplyT]) -> None:

@@ -59,7 +59,7 @@ class CyclicExchange(Generic[TelegramT]):
     :param settled: called when an exchange ends, answered or not.
     :param left: called when a cycle has left.
     :param audience: the exchanges of those whom a whole cycle tells; None: this one.
-    :param in_turn: not each cycle asks this drive: whoever asks it settles the one before.
+    :param in_turn: not each cycle asks this drive: the one that asks it settles the one before.
     :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
         has answered none of its cycles.
     :param timer: says when cycles are due, where others are in step; None: one of its own.

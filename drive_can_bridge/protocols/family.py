@@ -188,7 +188,7 @@ class Family(ABC):
         """
         Return what is not 0 in a drive that faults when telegrams end.
 
-        Whoever only asks a few questions should know that.
+        Who only asks a few questions should know that.
         """
         return None
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The stop of a drive that may run on although it is offline: told again to whoever shows up.
+The stop of a drive that may run on although it is offline: told again when it shows up.
 
 A drive that falls silent is told to stop, and may not hear it. When it is back, it is told with
 the first exchange that is complete. Until then, and that may be for ever if it answers a part

@@ -26,12 +26,13 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.time_source import CLOCK_TOPIC
 
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import configuration_from_overrides
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.ros.answers import Answers
@@ -43,9 +44,9 @@ from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.node_parameters import NodeParameters
 from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.transition_guard import guard_transitions
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.end_point import EndPoint
+
 
 NODE_NAME = 'drive_can_bridge'
 
@@ -93,8 +94,8 @@ class BridgeNode(LifecycleNode):
         self._fleet: Fleet | None = None
         self._node_parameters = NodeParameters(self, self._parameter_changed,
                                                self._parameter_refusal)
-        guard_transitions(self, self.log.warning, self._transition_lock,
-                          lambda: 'the bridge is being stopped' if self._ending else '')
+        _guard_transitions(self, self.log.warning, self._transition_lock,
+                           lambda: 'the bridge is being stopped' if self._ending else '')
         spinner.executor.add_node(self)
 
     def create_service(self, *arguments: Any, **options: Any) -> Service:
@@ -308,3 +309,41 @@ def _gone(drive: DriveNode) -> bool:
         drive.destroy()
         return True
     return False
+
+
+def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: Lock,
+                      refusal: Callable[[], str]) -> None:
+    """
+    Answer an illegal lifecycle transition instead of ending on it.
+
+    rclpy lets the error of an illegal transition escape from the service's callback, and so from
+    the executor: any client could end the process. Here it becomes a failure and a warning, before
+    rcl is asked, which would have a warning of its own.
+
+    :param warn: takes what is wrong with a transition.
+    :param lock: is held during a transition.
+    :param refusal: why none is possible any more; '' otherwise.
+    """
+    service = node._service_change_state
+    change_state = service.callback
+    machine = node._state_machine
+
+    def guarded(request: Any, response: Any) -> Any:
+        number, label = request.transition.id, request.transition.label
+        with lock:
+            # of a request with both, rclpy takes the label
+            possible = {known: name for known, name, *_ in machine.available_transitions}
+            why = refusal()
+            if not why and (label not in possible.values() if label else number not in possible):
+                why = f'possible are {", ".join(possible.values()) or "none"}'
+            if not why:
+                try:
+                    return change_state(request, response)
+                except RuntimeError as error:
+                    why = printable(' '.join(str(error).split()))
+            warn(f'transition {printable(label) or f"number {number}"} is not possible in state '
+                 f'{machine.current_state[1]} ({why})')
+            response.success = False
+            return response
+
+    service.callback = guarded

@@ -10,7 +10,7 @@ How old a command is, its two time stamps say: what the publisher's clock showed
 published, and this machine's when it arrived. The clocks may differ; so what counts is by how much
 the difference exceeds the smallest that was seen on the topic. A command that waited somewhere (a
 process that stood still, a network that was away) is told from a fresh one by that. It moves
-nothing, but one that equals neutral stops all the same: so whoever has a clock that lags can.
+nothing, but one that equals neutral stops all the same: so a publisher whose clock lags can.
 """
 
 from collections.abc import Callable
@@ -109,7 +109,7 @@ class CommandTopic:
             self._old(self._decode(data))
 
     def forget(self) -> None:
-        """Record that nobody publishes here any more: whoever comes has a clock of its own."""
+        """Record that nobody publishes here any more: the next one has a clock of its own."""
         self._quickest = math.inf
 
     def _lateness(self, info: dict[str, Any]) -> float:

@@ -3,7 +3,7 @@
 Services whose callbacks are coroutines, which wait for answers without an executor.
 
 An executor looks at everything that it has four or five times for each such call: for the request,
-for the answer, for whoever waits for it, and for its own guards. Here the threads of
+for the answer, for those who wait for it, and for its own guards. Here the threads of
 :mod:`.service_thread` run them: one begins a coroutine, the one that answers goes on with it.
 """
 
@@ -15,9 +15,12 @@ from typing import Any, Generic, TypeVar
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
+from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.ros.polled_topics import PolledGroup
 from drive_can_bridge.ros.service_thread import Answer, Callback, ServiceThread
+
 
 AnswerT = TypeVar('AnswerT')
 #: takes request and response, and returns the response
@@ -97,3 +100,33 @@ class CoroutineServices:
 
 def _never(_: Any, response: Any) -> Any:
     raise RuntimeError('such services are taken by a thread of their own')
+
+
+#: hands a request to the session; answered by its outcome
+Submit = Callable[[ControlRequest], Question[ControlCompleted]]
+
+
+def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
+                     controlled: bool, homing: bool = False) -> CoroutineServices:
+    """
+    Return the control services of a drive.
+
+    :param thread: serves them, and those of other drives, but nothing else.
+    :param controlled: it has a control word.
+    :param homing: it can be asked to look for its reference.
+    """
+    def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
+        async def callback(request: Any, response: Any) -> Any:
+            outcome = await submit(ControlRequest(wanted(request)))
+            response.success, response.message = outcome.success, outcome.message
+            return response
+        return callback
+    services: dict[str, tuple[type, Serve]] = {
+        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))}
+    if controlled:
+        services['enable'] = SetBool, serving(
+            lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
+        services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
+    if homing:
+        services['home'] = Trigger, serving(lambda _: ControlAction.HOME)
+    return CoroutineServices(node, thread, services)

@@ -33,8 +33,9 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.listeners import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
-from drive_can_bridge.ros.control_services import control_services
-from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
+from drive_can_bridge.ros.coroutine_services import (
+    control_services, CoroutineServices, Question,
+)
 from drive_can_bridge.ros.event_topic import RequestTopic
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.ros.gone import GONE
@@ -151,7 +152,7 @@ class DriveNode(DriveListener):
 
     def answer_all(self) -> bool:
         """
-        Tell whoever still waits for an answer that none will come. The exchange must be closed.
+        Tell callers that still wait that no answer will come. The exchange must be closed.
 
         :return: all calls are answered, and the node may go.
         """

@@ -10,9 +10,8 @@ from rclpy.node import Node
 
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
-from drive_can_bridge.ros.audience import Audience
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
-from drive_can_bridge.ros.quality import publisher, state_quality
+from drive_can_bridge.ros.quality import Audience, publisher, state_quality
 from drive_can_bridge.ros.stamps import Stamp, Stamps
 from drive_can_bridge.ros.values import converters, parameter_value, VALUE_FIELDS
 

@@ -3,7 +3,7 @@
 An executor in a thread of its own, which no callback can bring down.
 
 A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
-with the executor's wait. Whoever has a result in another thread leaves it here.
+with the executor's wait. Results of other threads are left here.
 """
 
 from collections.abc import Callable

@@ -3,7 +3,7 @@
 The log of the bridge, written by a thread of its own.
 
 A line costs tens of microseconds at best, and whatever the file of the log and its subscribers
-take at worst. Most of what there is to say is found out with a bus lock held. So whoever has a
+take at worst. Most of what there is to say is found out with a bus lock held. So one that has a
 line puts it into a bounded queue and goes on; what does not fit is counted and said later. How
 much drives and buses may say is limited before (:mod:`.log_limit`).
 """

@@ -104,7 +104,7 @@ class _Topic:
 
 class Speaker:
     """
-    One drive, one bus: whoever has lines of the log.
+    One drive, one bus: a source of lines of the log.
 
     :param name: stands before each line; '': nothing does.
     """

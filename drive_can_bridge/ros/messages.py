@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What is in the messages of parameters: for the bridge, and for whoever asks it."""
+"""What is in the messages of parameters: for the bridge, and for its clients."""
 
 import shlex
 

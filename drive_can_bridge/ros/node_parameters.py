@@ -120,7 +120,7 @@ class _Services(ParameterService):
     """
     The parameter services of rclpy, which answer whatever the type of a value is said to be.
 
-    There, a type that does not exist ends the callback: whoever asks waits for ever.
+    There, a type that does not exist ends the callback, and the client waits for ever.
 
     :param prepare: is told the names of parameters that are asked for.
     """

@@ -98,7 +98,7 @@ class ParameterServices:
         """
         Say why a call asks for too much to be looked at; '' if it does not.
 
-        Whoever waits behind it should not notice it: neither its names are looked up, nor is each
+        Those who wait behind it should not notice it: neither its names are looked up, nor is each
         of them logged.
         """
         if len(names) > NAMES_MAX:

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import math
 from typing import Any, Protocol
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -26,8 +27,20 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.command_topic import CommandTopic
 from drive_can_bridge.ros.gone import GONE
-from drive_can_bridge.ros.polled_group import PolledGroup
 from drive_can_bridge.ros.quality import command_quality, overriding
+
+
+class PolledGroup(CallbackGroup):
+    """Entities of this group are taken by hand; an executor never waits for them."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        pass
 
 
 #: s between two looks at who publishes

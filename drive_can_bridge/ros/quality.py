@@ -9,6 +9,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+
 #: the default policies, and that which makes a topic a latched one
 _OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
                 QoSPolicyKind.DURABILITY)
@@ -59,3 +60,23 @@ def quality_overrides(node: Node) -> list[NodeParameter]:
     """Return what a node's parameters say about the quality of any topic."""
     return [parameter for name, parameter in node._parameter_overrides.items()
             if name.startswith('qos_overrides.')]
+
+
+#: s between two looks at who subscribes
+COUNT_PERIOD = 0.1
+
+
+class Audience:
+    """The subscribers of one topic."""
+
+    def __init__(self, publisher: Publisher) -> None:
+        self._publisher = publisher
+        self._listens = False
+        self._count_at = 0.0
+
+    def listens(self, now: float) -> bool:
+        """Tell whether there are any; ``now`` is of the steady clock."""
+        if now >= self._count_at:
+            self._count_at = now + COUNT_PERIOD
+            self._listens = bool(self._publisher.get_subscription_count())
+        return self._listens

@@ -142,7 +142,7 @@ class RclResponses:
         :raises RCLError: as rclpy does.
         """
         functions, handle = response.functions, response.service.handle
-        with handle:    # whoever destroys it meanwhile only has it destroyed at the end of this
+        with handle:    # who destroys it meanwhile only has it destroyed at the end of this
             raw = functions.create()
             if raw is None:
                 raise MemoryError

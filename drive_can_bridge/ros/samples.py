@@ -18,10 +18,9 @@ from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value
-from drive_can_bridge.ros.audience import COUNT_PERIOD
 from drive_can_bridge.ros.event_topic import EventTopic
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
-from drive_can_bridge.ros.quality import latched_quality, publisher, state_quality
+from drive_can_bridge.ros.quality import COUNT_PERIOD, latched_quality, publisher, state_quality
 from drive_can_bridge.ros.stamps import Stamp
 from drive_can_bridge.ros.values import converters, TOPIC_TYPES
 

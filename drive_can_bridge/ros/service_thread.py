@@ -3,8 +3,8 @@
 Services that wait for nobody.
 
 An executor serves one callback after the other, and looks at everything else that it has in
-between: several times for each call that has to wait for its drive, and whoever asks a drive for a
-thousand parameters is served before the one who wants it to stop. So services of drives are taken
+between: several times for each call that has to wait for its drive, and a client that asks for a
+thousand parameters is served before the one who wants a stop. So services of drives are taken
 by threads that have nothing else to do, straight from a wait set of their own; those that stop
 machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
 halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
@@ -22,7 +22,35 @@ from rclpy.service import Service
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.ros.gone import GONE
-from drive_can_bridge.ros.pace import Pace
+
+
+class Pace:
+    """
+    Have one thread pause when it has used more than its share. Made and used by that thread.
+
+    One thread at a time has the interpreter. One that never waits, because callers ask as fast as
+    they are answered, makes the exchange late and stops wait, however high their priority is.
+
+    :param share: of the processor's time, 0 to 1.
+    :param in_hand: s that may be used at once, after a while of little work.
+    """
+
+    def __init__(self, share: float, clock: Clock, in_hand: float = 0.002) -> None:
+        self._clock = clock
+        self._share = share
+        self._in_hand = in_hand
+        self._left = in_hand
+        self._seen = clock.now()
+        self._used = clock.used()
+
+    def keep(self) -> None:
+        """Pause, if it is time to. After each piece of work."""
+        now, used = self._clock.now(), self._clock.used()
+        self._left = min(self._in_hand, self._left + self._share * (now - self._seen)) - (
+            used - self._used)
+        self._seen, self._used = now, used
+        if self._left < 0.0:
+            self._clock.wait(now - self._left / self._share)
 
 
 #: s between two failures: one that comes at once again must not take the machine

@@ -2,7 +2,7 @@
 """
 What is behind the registers of a simulated drive, whatever protocol it speaks.
 
-A family chooses a plant when a drive is made; whoever makes the drive may bring another one:
+A family chooses a plant when a drive is made; its maker may bring another one:
 ``Simulation(configuration, plants={'lift': MyPlant})``, for instance derived from
 :class:`~.motor_plant.MotorPlant`.
 """

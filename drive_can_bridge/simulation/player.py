@@ -2,7 +2,7 @@
 """
 Plays the drives of one bus: on a link as the bridge's exchange, with a thread for their timers.
 
-The link opens the bus, reads it and gets it back when it is lost. Whoever touches a drive does so
+The link opens the bus, reads it and gets it back when it is lost. A drive is touched
 within :meth:`BusPlayer.touch`.
 """
 
@@ -65,7 +65,7 @@ class BusPlayer:
         self._complained = False
         self._answer_lost = False       # ever
         self._addressees = lru_cache(_ROUTES_MAX)(self._find_addressees)
-        # no filters: whoever looks on sees all frames
+        # no filters: who looks on sees all frames
         self._link = Link(bus, (), self, clock, send_timeout=_SEND_TIMEOUT, opener=self._open)
         self._thread = clock.worker(self._run, f'simulation {bus.name}')
 

@@ -93,7 +93,7 @@ def mains_swing(now: float) -> float:
     """
     Return by which share of a voltage the mains are off.
 
-    Of a drive at rest it is the one value that moves: whoever looks sees that it is alive.
+    Of a drive at rest it is the one value that moves: it shows that the drive is alive.
     """
     return 0.005 * math.sin(2.0 * math.pi * 0.3 * max(now, 0.0))
 

@@ -115,7 +115,7 @@ class SlcanTerminal(EndPoint):
         if path.exists() and not path.is_symlink():
             raise FileExistsError(f'{path} exists and is not a symbolic link')
         path.parent.mkdir(parents=True, exist_ok=True)
-        # a name of its own first: whoever looks finds the old link or the new one, never none
+        # a name of its own first: who looks finds the old link or the new one, never none
         temporary = path.with_name(f'.{path.name}.{os.getpid()}')
         temporary.unlink(missing_ok=True)
         temporary.symlink_to(self.path)

@@ -5,10 +5,10 @@ A lock on a serial device itself: names of the host end at a network namespace, 
 Two containers may share a serial port, by one device node or by two. ``flock`` is of the node, so
 it does not meet where there are two; TIOCEXCL is of the device, but root opens it all the same:
 that is why it is asked for. On a pseudo-terminal TIOCEXCL would outlive its process, and keep out
-whoever starts next: there ``flock`` has to do.
+the process that starts next: there ``flock`` has to do.
 
 The device is asked before python-can opens it, which sets its speed and throws away what has
-arrived; an SLCAN adapter's first bytes would end the exchange of whoever has it.
+arrived; an SLCAN adapter's first bytes would end the exchange of the process that has it.
 """
 
 from array import array
@@ -62,7 +62,7 @@ class DeviceLock:
                                  f'end that first', taken=True) from None
 
     def keep_out(self) -> None:
-        """Let nobody open the device any more; whoever has it open keeps it."""
+        """Let nobody open the device any more; a process that has it open keeps it."""
         if self._exclusive:
             fcntl.ioctl(self._descriptor, termios.TIOCEXCL)
 

@@ -3,7 +3,7 @@
 The link to one bus: opened, read by a thread of its own, reopened when lost.
 
 The reader thread is the only one that opens, reads and closes the port, so that none of it ever
-happens with a lock held. Sending is done by whoever holds the exchange's lock.
+happens with a lock held. The thread that holds the exchange's lock sends.
 
 A bus on which nothing leaves any more (no other node acknowledges, the transmit queue is full) is
 *blocked*: the exchange is told that it is down, and nothing more is put into the queue. Where the

@@ -87,7 +87,7 @@ class _WatchedPort:
         self._serial_port = port
         self.drive_can_writer = SerialWriter.take_over(port, self.drive_can_now)
         if self.drive_can_writer is not None:
-            # what whoever had the adapter before has left may not even leave room for a command
+            # what the process before has left may not even leave room for a command
             port.reset_output_buffer()
             # of text protocols: what was cut off is no beginning of the first command
             port.write(getattr(self, 'LINE_TERMINATOR', b''))

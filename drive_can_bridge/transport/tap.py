@@ -19,7 +19,7 @@ from drive_can_bridge.transport.messages import record_of
 from drive_can_bridge.transport.places import adapter_of, is_absent
 from drive_can_bridge.transport.port import open_port, Port
 
-#: entries that may wait for whoever takes them; beyond, they are lost and counted
+#: entries that may wait to be taken; beyond, they are lost and counted
 QUEUE_MAX = 200_000
 #: s that a receive may block
 _PATIENCE = 0.05

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from drive_can_bridge.ros import answers as answers_module, rcl_response
 from drive_can_bridge.ros.answers import Answers, WAITING_MAX
-from drive_can_bridge.ros.polled_group import PolledGroup
+from drive_can_bridge.ros.polled_topics import PolledGroup
 from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
 from drive_can_bridge.ros.service_thread import ServiceThread
 

@@ -160,7 +160,7 @@ class Cannord(Family):
 
     def _check_kinds(self, drives: Sequence[DriveConfiguration],
                      ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
-        """Look for both kinds of broadcast on one bus: whoever listens, listens to both."""
+        """Look for both kinds of broadcast on one bus: all who listen, listen to both."""
         everyone = [drive for drive in drives if drive.options.broadcast != 'none']
         for drive in everyone[1:]:
             mine = drive.options.broadcast

@@ -8,7 +8,7 @@ and actual values: with four inverters each is heard every fourth period.
 
 The inverter with the lowest station leads. Its session sends everything and has the setpoints;
 its services bring the whole group to a state. The sessions of the others receive, serve the
-parameters of their inverter, and refuse what only the leader can do; but whoever stops one of
+parameters of their inverter, and refuse what only the leader can do; but who stops one of
 them stops all.
 
 All sessions of a group live on one bus, under one lock, so that they may call each other.

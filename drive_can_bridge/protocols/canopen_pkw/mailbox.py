@@ -18,7 +18,7 @@ function 00h goes first; once the device has answered that, any function byte is
 A device that has just started has 00h as its last function byte already and need not answer
 function 00h. So a read is sent all the same: it does no harm, and its answer synchronises. A
 write that was sent like this might be executed although it seems lost; it is reported as *not
-sent*, unless whoever asks for it says that this does not matter (:attr:`Write.blind`).
+sent*, unless the caller says that this does not matter (:attr:`Write.blind`).
 """
 
 from collections.abc import Callable, Generator

@@ -87,7 +87,7 @@ class PkwProber(Prober):
         else:
             findings.append((yield from self._word_order(layout_found)))
             findings.append(_abort_code_order(seen[layout_found]))
-        yield self._idle()      # whoever comes next may begin with any function
+        yield self._idle()      # the next one may begin with any function
         if not self.answered:
             return [finding._replace(reason=_SILENT) for finding in findings]
         return findings

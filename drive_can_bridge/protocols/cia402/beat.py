@@ -4,7 +4,7 @@ What the drives of one bus have in common: SYNC, and the heartbeat of the bridge
 
 *A round* is one SYNC behind the RPDOs of all drives that are in exchange. Each session sends its
 own when it is due, which is the same moment for all; the last of them in the order of the bus
-sends SYNC. Where a stop does not wait for the next SYNC, a whole round is brought forward: whoever
+sends SYNC. Where a stop does not wait for the next SYNC, a whole round is brought forward: all who
 does so sends the RPDOs of all others as well.
 """
 

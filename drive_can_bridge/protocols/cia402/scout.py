@@ -28,7 +28,7 @@ _IDENTITY = {1: 'vendor', 2: 'product', 3: 'revision', 4: 'serial number'}
 
 class Cia402Scout(Scout):
     """
-    Recognises what nodes answer to reads of 1000h, whoever asked.
+    Recognises what nodes answer to anybody's reads of 1000h.
 
     Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families.
     """

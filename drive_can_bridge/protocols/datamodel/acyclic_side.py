@@ -52,7 +52,7 @@ class AcyclicSide:
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
     :ivar control_writer: looks after words that have no slot, or None.
     :ivar parts: what acts at times of its own.
-    :ivar shows_up: something has arrived since whoever wants to know reset this.
+    :ivar shows_up: something has arrived since this was reset.
     :ivar again: tells a drive to stop again that is offline and shows up.
     """
 

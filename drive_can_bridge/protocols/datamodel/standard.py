@@ -27,7 +27,7 @@ byte  read request read response write
 7     00h          word 3 high   00h
 ====  ============ ============= ===========
 
-The response names neither number nor count: whoever asked has to remember, and may have one read
+The response names neither number nor count: the asker has to remember, and may have one read
 outstanding per station. Words beyond the count are undefined. Writes carry one parameter and are
 never acknowledged.
 """

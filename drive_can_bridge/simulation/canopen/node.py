@@ -93,7 +93,7 @@ class CanopenNode(Companion):
         if extended:
             return False
         if self.state is NmtState.BOOT_UP:
-            # whoever is ready to receive has sent its boot-up frame
+            # who is ready to receive has sent its boot-up frame
             self._report_state(now)
         if identifier == network.NMT_IDENTIFIER:
             self._obey(data, now)
