@@ -51,6 +51,9 @@ import pytest
 import real
 from told_again import ToldAgain
 
+sys.path.insert(0, str(Path(__file__).with_name('clocked')))
+import world  # noqa: E402, I100, I202
+
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'
 #: what a test looks at that is run again
@@ -95,17 +98,16 @@ def _domain(in_process: bool) -> str:
     return domain
 
 
-sys.path.insert(0, str(Path(__file__).with_name('clocked')))
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 tell_in_messages()
 
 #: directories and modules whose tests wait for something of their own: each test by itself
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
-          'test/simulation/test_simulate_command', 'test/process/', 'test/backup/test_restore')
+          'test/simulation/test_simulate_command', 'test/process/')
 #: what comes first, because it takes longest
 FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
          'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
-         'test/monitor/test_monitor_attach', 'test/demo/', 'test/backup/', 'test/ros/', 'test/')
+         'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/', 'test/')
 #: s for which others are looked at
 LOOK = 0.5
 #: processes for each core that has nothing else to do: most of the time they wait
@@ -150,6 +152,25 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         for nodeid in dict.fromkeys(failed):
             terminalreporter.line(f'{given} {os.path.relpath(sys.executable)} -m pytest '
                                   f'-n 0 {shlex.quote(nodeid)}')
+
+
+# -- the bench ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def bench() -> Iterator[world.World]:
+    """Put a test on the bench: buses, drives and threads by a clock that jumps."""
+    with world.world(int(os.environ[SEED])) as made:
+        yield made
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
+    """Print the story of a test that failed."""
+    report = yield
+    if report.failed and world.current is not None:
+        report.sections.append(('story', world.current.story()))
+    return report
 
 
 # -- beside each other ----------------------------------------------------------------------------
