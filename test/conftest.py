@@ -31,7 +31,7 @@ the failures stand the commands that run each of them alone, with the seed.
 signals, and what is started here would inherit that.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import fcntl
 from functools import cache
 import gc
@@ -70,11 +70,15 @@ _AVOIDED = os.environ.setdefault('DRIVE_CAN_TEST_AVOIDED_DOMAIN',
                                  os.environ.get('ROS_DOMAIN_ID', ''))
 
 
+#: those that this process has had: what was in one may stay there for a while
+_had: set[int] = set()
+
+
 def _own_domain() -> tuple[str, int]:
-    """Return a domain that no other test process has, and the descriptor of its lock."""
+    """Return a domain that nobody else has and this process never had, and its lock."""
     folder = Path(tempfile.gettempdir())
     for domain in DOMAINS:
-        if str(domain) == _AVOIDED:
+        if str(domain) == _AVOIDED or domain in _had:
             continue
         try:
             lock = os.open(folder / f'drive_can_bridge_test_domain_{domain}',
@@ -86,6 +90,7 @@ def _own_domain() -> tuple[str, int]:
         except OSError:
             os.close(lock)
         else:
+            _had.add(domain)
             return str(domain), lock
     # a file system without locks, or very many runs: any domain will do
     return str(DOMAINS.start + os.getpid() % len(DOMAINS)), -1
@@ -134,6 +139,21 @@ def pytest_configure(config: pytest.Config) -> None:
         if signal.getsignal(number) is signal.SIG_IGN:
             # ignored as before, but nobody inherits a handler
             signal.signal(number, lambda *_: None)
+
+
+@pytest.fixture
+def new_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
+    """Return what moves to a domain in which nobody has been, for the rest of the test."""
+    locks: list[int] = []
+
+    def move() -> None:
+        domain, lock = _own_domain()
+        monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+        locks.append(lock)
+    yield move
+    for lock in locks:
+        if lock >= 0:
+            os.close(lock)
 
 
 @pytest.hookimpl(tryfirst=True)
