@@ -31,7 +31,7 @@ the failures stand the commands that run each of them alone, with the seed.
 signals, and what is started here would inherit that.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import fcntl
 from functools import cache
 import gc
@@ -51,6 +51,9 @@ import pytest
 import real
 from told_again import ToldAgain
 
+sys.path.insert(0, str(Path(__file__).with_name('clocked')))
+import world  # noqa: E402, I100, I202
+
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'
 #: what a test looks at that is run again
@@ -67,11 +70,15 @@ _AVOIDED = os.environ.setdefault('DRIVE_CAN_TEST_AVOIDED_DOMAIN',
                                  os.environ.get('ROS_DOMAIN_ID', ''))
 
 
+#: those that this process has had: what was in one may stay there for a while
+_had: set[int] = set()
+
+
 def _own_domain() -> tuple[str, int]:
-    """Return a domain that no other test process has, and the descriptor of its lock."""
+    """Return a domain that nobody else has and this process never had, and its lock."""
     folder = Path(tempfile.gettempdir())
     for domain in DOMAINS:
-        if str(domain) == _AVOIDED:
+        if str(domain) == _AVOIDED or domain in _had:
             continue
         try:
             lock = os.open(folder / f'drive_can_bridge_test_domain_{domain}',
@@ -83,6 +90,7 @@ def _own_domain() -> tuple[str, int]:
         except OSError:
             os.close(lock)
         else:
+            _had.add(domain)
             return str(domain), lock
     # a file system without locks, or very many runs: any domain will do
     return str(DOMAINS.start + os.getpid() % len(DOMAINS)), -1
@@ -95,17 +103,16 @@ def _domain(in_process: bool) -> str:
     return domain
 
 
-sys.path.insert(0, str(Path(__file__).with_name('clocked')))
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 tell_in_messages()
 
 #: directories and modules whose tests wait for something of their own: each test by itself
 SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
-          'test/simulation/test_simulate_command', 'test/process/', 'test/backup/test_restore')
+          'test/simulation/test_simulate_command', 'test/process/')
 #: what comes first, because it takes longest
 FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
          'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
-         'test/monitor/test_monitor_attach', 'test/demo/', 'test/backup/', 'test/ros/', 'test/')
+         'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/', 'test/')
 #: s for which others are looked at
 LOOK = 0.5
 #: processes for each core that has nothing else to do: most of the time they wait
@@ -134,6 +141,21 @@ def pytest_configure(config: pytest.Config) -> None:
             signal.signal(number, lambda *_: None)
 
 
+@pytest.fixture
+def new_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
+    """Return what moves to a domain in which nobody has been, for the rest of the test."""
+    locks: list[int] = []
+
+    def move() -> None:
+        domain, lock = _own_domain()
+        monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+        locks.append(lock)
+    yield move
+    for lock in locks:
+        if lock >= 0:
+            os.close(lock)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Choose the domain of a test."""
@@ -150,6 +172,25 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         for nodeid in dict.fromkeys(failed):
             terminalreporter.line(f'{given} {os.path.relpath(sys.executable)} -m pytest '
                                   f'-n 0 {shlex.quote(nodeid)}')
+
+
+# -- the bench ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def bench() -> Iterator[world.World]:
+    """Put a test on the bench: buses, drives and threads by a clock that jumps."""
+    with world.world(int(os.environ[SEED])) as made:
+        yield made
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
+    """Print the story of a test that failed."""
+    report = yield
+    if report.failed and world.current is not None:
+        report.sections.append(('story', world.current.story()))
+    return report
 
 
 # -- beside each other ----------------------------------------------------------------------------

@@ -24,8 +24,6 @@ FIXTURES = {
     'test/monitor/': {'run'},
     'test/panel/': {'site', 'run', 'browser', 'phone', 'somebody'},
     'test/security/': {'run'},
-    'test/backup/': {'shop'},
-    'test/client/': {'world', 'drives'},
 }
 
 #: what make test tells -> what it shows

@@ -1,13 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Simulated drives of all families on a bus in this process, and files about them."""
+"""Simulated drives of all families on a bus of the bench, and files about them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
-import os
 from pathlib import Path
 
-from clocks import REAL
+import world
 
 from drive_can_bridge.client import open_drives
 from drive_can_bridge.client.drive import Drive
@@ -36,10 +35,12 @@ class Shop:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.file = folder / 'all_families.yaml'
-        channel = f'backup_{os.getpid()}_{next(_CHANNELS)}'
+        assert world.current is not None
+        self.clock = world.current.clock
+        channel = f'backup_{next(_CHANNELS)}'
         self.file.write_text(ALL_FAMILIES.read_text().replace(
             'channel: all_families', f'channel: {channel}'))
-        self.simulation = Simulation(configuration_from_file(self.file), REAL)
+        self.simulation = Simulation(configuration_from_file(self.file), self.clock)
         self.drives = self.simulation.drives
 
     def change_by_hand(self, name: str) -> dict[str, float]:

@@ -9,8 +9,7 @@ import pytest
 
 
 @pytest.fixture(name='shop')
-def shop_fixture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Shop]:
-    """Give drives to each test; whoever opens them does not listen for long."""
-    monkeypatch.setattr('drive_can_bridge.client.direct.LISTEN', 0.05)
+def shop_fixture(tmp_path: Path, bench: object) -> Iterator[Shop]:
+    """Give drives to each test."""
     with shop(tmp_path) as made:
         yield made

@@ -3,10 +3,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
-import time
 
 from backup_builders import Shop
 import pytest
+import waiting
 
 from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.backup.plan import (
@@ -27,7 +27,8 @@ def planned(drive: Drive, file: Path, *, include_protected: bool = False) -> Res
 
 def restored(drive: Drive, file: Path, *, stopped: Callable[[], bool] = lambda: False,
              wait: Callable[[float], object] = lambda seconds: None,
-             clock: Callable[[], float] = time.monotonic, hints: list[str] | None = None,
+             clock: Callable[[], float] = lambda: waiting.clock().now(),
+             hints: list[str] | None = None,
              **options: bool) -> RestoreResult:
     return Restorer(drive, planned(drive, file, **options), stopped=stopped, clock=clock,
                     wait=wait, hint=(hints if hints is not None else []).append).run()
@@ -233,7 +234,7 @@ class TestMode:
             waited.append(seconds)
             if len(waited) == 1:
                 pump.fault('restart=0')
-            time.sleep(seconds / 2)     # until its heartbeat says that it runs
+            waiting.pause(seconds / 2)      # until its heartbeat says that it runs
         with shop.reached('pump') as drive:
             result = restored(drive, file, wait=wait, hints=hints)
         assert not result.complete

@@ -3,14 +3,14 @@
 
 from collections.abc import Iterator
 import json
+from pathlib import Path
 
 from client_builders import a_world, CONVEYOR, World
 import pytest
 
 from drive_can_bridge.cli.main import main
 
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
+pytestmark = pytest.mark.usefixtures('bench')
 
 PROFILE = """\
 protocols: [datamodel_extended]
@@ -21,12 +21,11 @@ parameters:
 """
 
 
-@pytest.fixture(scope='module')
-def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
-    folder = tmp_path_factory.mktemp('world')
-    (folder / 'named.yaml').write_text(PROFILE, encoding='utf-8')
-    with a_world(folder, conveyor={
-            **CONVEYOR, 'profile': str(folder / 'named.yaml'),
+@pytest.fixture
+def world(tmp_path: Path, bench: object) -> Iterator[World]:
+    (tmp_path / 'named.yaml').write_text(PROFILE, encoding='utf-8')
+    with a_world(tmp_path, conveyor={
+            **CONVEYOR, 'profile': str(tmp_path / 'named.yaml'),
             'cyclic_request': ['speed_setpoint'], 'cyclic_response': ['actual_speed']}) as made:
         yield made
 

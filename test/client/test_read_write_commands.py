@@ -2,12 +2,13 @@
 """``drive_can read`` and ``write`` on the buses of a file: words, tables, JSON, exit codes."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
+import io
 import json
 import os
 from pathlib import Path
 import subprocess
 import sys
-from typing import Any
 
 from builders import frame
 from client_builders import a_world, CONVEYOR, LIFT, parameter_file, stranger, World
@@ -16,16 +17,15 @@ import pytest
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
 
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
+pytestmark = pytest.mark.usefixtures('bench')
 
 Run = Callable[..., tuple[int, list[str], str]]
 
 
-@pytest.fixture(scope='module')
-def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
+@pytest.fixture
+def world(tmp_path: Path, bench: object) -> Iterator[World]:
     """Return two drives."""
-    with a_world(tmp_path_factory.mktemp('world'), conveyor=CONVEYOR, lift=LIFT) as made:
+    with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as made:
         yield made
 
 
@@ -223,7 +223,6 @@ def test_in_use(run: Run, world: World) -> None:
     assert errors.startswith(f'bus main: drive lift is used by process {os.getpid()} ')
 
 
-@pytest.mark.usefixtures('listens')
 def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
     with a_world(tmp_path, conveyor=CONVEYOR, lift=LIFT) as own:
         with stranger(own, frame('3F2#1E00'), after=0.4):
@@ -234,25 +233,33 @@ def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
 
 # -- completion -----------------------------------------------------------------------------------
 
-def completions(line: str) -> list[str]:
-    """Return what the shell would propose."""
-    pytest.importorskip('argcomplete')
-    near, far = os.pipe()
-    environment: dict[str, Any] = {
-        **os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
-        '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_SUPPRESS_SPACE': '1'}
-    script = ('import os; os.dup2({far}, 8); os.dup2(2, 9); '
-              'from drive_can_bridge.cli.start import main; main()').format(far=far)
-    process = subprocess.run([sys.executable, '-c', script], env=environment, pass_fds=[far],
-                             capture_output=True, timeout=60)
-    os.close(far)
-    with open(near, encoding='utf-8') as answer:
-        found = answer.read()
-    assert process.stdout == b''
-    return [word.strip() for word in found.split('\n') if word.strip()]
+def typed(line: str) -> dict[str, str]:
+    """Return the environment in which a shell asks what to propose."""
+    return {'_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
+            '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_SUPPRESS_SPACE': '1'}
 
 
-def test_completion(tmp_path: Path) -> None:
+@pytest.fixture
+def completions(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+    """Return what would be proposed to a shell."""
+    argcomplete = pytest.importorskip('argcomplete')
+    # file descriptors 8 and 9 are the shell's, and somebody else's here
+    monkeypatch.setattr(argcomplete.CompletionFinder, '_init_debug_stream', lambda _: None)
+    monkeypatch.setattr(argcomplete.io, 'debug_stream', io.StringIO())
+
+    def ask(line: str) -> list[str]:
+        with monkeypatch.context() as asking, io.StringIO() as answer:
+            for name, value in typed(line).items():
+                asking.setenv(name, value)
+            asking.setattr(argcomplete, 'autocomplete', partial(
+                argcomplete.CompletionFinder(), exit_method=sys.exit, output_stream=answer))
+            with pytest.raises(SystemExit, match='0'):
+                main([])
+            return [word.strip() for word in answer.getvalue().split('\n') if word.strip()]
+    return ask
+
+
+def test_completion(tmp_path: Path, completions: Callable[[str], list[str]]) -> None:
     file = parameter_file(tmp_path, {'conveyor': CONVEYOR, 'lift': LIFT})
     start = f'drive_can read --params-file {file} '
     assert {'conveyor', 'lift'} <= set(completions(start))
@@ -261,3 +268,19 @@ def test_completion(tmp_path: Path) -> None:
     assert completions(f'drive_can write --params-file {file} lift maxi') == ['maximum_speed=']
     assert {'read', 'record'} <= set(completions('drive_can re'))
     assert completions(f'drive_can read --params-file {file}x conv') == []
+
+
+@pytest.mark.real
+def test_a_shell_is_answered_by_its_descriptor(tmp_path: Path) -> None:
+    pytest.importorskip('argcomplete')
+    file = parameter_file(tmp_path, {'conveyor': CONVEYOR})
+    near, far = os.pipe()
+    script = (f'import os; os.dup2({far}, 8); os.dup2(2, 9); '
+              'from drive_can_bridge.cli.start import main; main()')
+    process = subprocess.run(
+        [sys.executable, '-c', script], pass_fds=[far], capture_output=True, timeout=60,
+        env={**os.environ, **typed(f'drive_can read --params-file {file} conveyor ram')})
+    os.close(far)
+    with open(near, encoding='utf-8') as answer:
+        assert answer.read().split() == ['ramp_time']
+    assert process.stdout == b''

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import importlib.util
 import os
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import pytest
 from world import World, world
@@ -36,18 +36,6 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector,
     return _Skipped.from_parent(parent, path=module_path) if MISSING else None
 
 
-WORLD = pytest.StashKey[World]()
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
-    """Print the story of a test that failed."""
-    report = yield
-    if report.failed and WORLD in item.stash:
-        report.sections.append(('story', item.stash[WORLD].story()))
-    return report
-
-
 @pytest.fixture(scope='session')
 def _real_context() -> Iterator['ClientContext']:
     context = ClientContext()
@@ -62,7 +50,6 @@ def bench(request: pytest.FixtureRequest) -> Iterator[World | None]:
         yield None
         return
     with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as made:
-        request.node.stash[WORLD] = made
         yield made
 
 
