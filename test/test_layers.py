@@ -337,3 +337,20 @@ def test_no_session_uses_anything_private_of_what_all_share() -> None:
                 for node in ast.walk(tree_of(found.source))
                 if isinstance(node, ast.Attribute) and private(node) and node.attr in shared]
     assert not wrong, '\n'.join(wrong)
+
+
+# -- the stop duty --------------------------------------------------------------------------------
+
+
+def test_whether_a_stop_is_owed_is_asked_of_the_session_only() -> None:
+    # everybody else says what happened, and carries out what comes back; `runs`: what a writer itself
+    # has told last
+    inside = {'core/session.py', 'core/stop_duty.py'}
+    wrong = [
+        f'{source}:{node.lineno}: {ast.unparse(node)}'
+        for source in SOURCES if source.relative_to(PACKAGE).as_posix() not in inside
+        for node in ast.walk(tree_of(source))
+        if isinstance(node, ast.Attribute) and node.attr not in ('happened', 'channel', 'runs')
+        and (isinstance(node.value, ast.Attribute) and node.value.attr == 'duty'
+             or isinstance(node.value, ast.Name) and node.value.id == 'duty')]
+    assert not wrong, '\n'.join(wrong)
