@@ -44,14 +44,15 @@ INTERNAL: dict[str, set[str]] = {
     'security': {'', 'core', 'protocols'},
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
-    'ros.client': {'', 'clock', 'core', 'client.drive', 'ros.messages', 'ros.recognition'},
+    'ros.client': {'', 'clock', 'core', 'ros.recognition'},
     'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'clock', 'core', 'configuration', 'process'},
     'client.drive': {'', 'core', 'process'},
+    'client.bridge': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
-        'client.drive', 'ros.client'},
+        'client.bridge', 'client.drive'},
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
@@ -79,6 +80,7 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
+    'client.bridge': {'rcl_interfaces'},
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     # an optional extra
@@ -91,7 +93,7 @@ EXTERNAL: dict[str, set[str]] = {
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
-        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'ros.client')}
+        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'client.bridge')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}
@@ -334,4 +336,21 @@ def test_no_session_uses_anything_private_of_what_all_share() -> None:
                 f'{found.source}:{node.lineno}: {ast.unparse(node)}'
                 for node in ast.walk(tree_of(found.source))
                 if isinstance(node, ast.Attribute) and private(node) and node.attr in shared]
+    assert not wrong, '\n'.join(wrong)
+
+
+# -- the stop duty --------------------------------------------------------------------------------
+
+
+def test_whether_a_stop_is_owed_is_asked_of_the_session_only() -> None:
+    # everybody else says what happened, and carries out what comes back; `runs`: what a writer itself
+    # has told last
+    inside = {'core/session.py', 'core/stop_duty.py'}
+    wrong = [
+        f'{source}:{node.lineno}: {ast.unparse(node)}'
+        for source in SOURCES if source.relative_to(PACKAGE).as_posix() not in inside
+        for node in ast.walk(tree_of(source))
+        if isinstance(node, ast.Attribute) and node.attr not in ('happened', 'channel', 'runs')
+        and (isinstance(node.value, ast.Attribute) and node.value.attr == 'duty'
+             or isinstance(node.value, ast.Name) and node.value.id == 'duty')]
     assert not wrong, '\n'.join(wrong)

@@ -13,7 +13,7 @@ The parameters of drives for people and scripts: directly, or through a running 
         print(error)
 
 See :mod:`drive_can_bridge.client.drive` for what a drive can be asked; both ways to it are made of
-that: :mod:`.direct`, and :mod:`drive_can_bridge.ros.client.drives`.
+that: :mod:`.direct`, and :mod:`.bridge`.
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,7 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
         except OSError as error:
             raise DriveCanError(f'{error.filename or params_file}: '
                                 f'{error.strerror or error}') from error
-    from drive_can_bridge.ros.client.drives import BridgeSource
+    from drive_can_bridge.client.bridge import BridgeSource
     return BridgeSource(namespace, clock)
 
 

@@ -7,18 +7,39 @@ like that of a user.
 """
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import (
     Event, Noted, ProcessDataReceived, RequestCompleted, StationLost,
 )
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import FaultTable
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 
-if TYPE_CHECKING:
-    from drive_can_bridge.core.session import Session
+
+class Desk(Protocol):
+    """Where reads are asked for."""
+
+    def submit(self, request: ReadRequest, now: float) -> None:
+        """Take a request."""
+
+
+class Watched(Protocol):
+    """A drive that may have a fault; the session itself."""
+
+    configuration: DriveConfiguration
+    control: ControlMachine | None
+    report: Reporter
+    sample_parameters: tuple[Parameter, ...]
+
+    @property
+    def users(self) -> Desk:
+        """Where it is asked which one."""
 
 
 class FaultWatch:
@@ -31,7 +52,7 @@ class FaultWatch:
     :ivar unread: why it could not be read.
     """
 
-    def __init__(self, session: 'Session', table: FaultTable) -> None:
+    def __init__(self, session: Watched, table: FaultTable) -> None:
         self.text = ''
         self.unread = NOTHING
         self._session = session

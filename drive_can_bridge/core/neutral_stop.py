@@ -7,20 +7,33 @@ has answered an exchange that carried all of it, or has not in time.
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.command_gate import CommandGate
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.setpoints import Setpoints
 
-if TYPE_CHECKING:
-    from drive_can_bridge.core.session import Session
+
+class Commanded(Protocol):
+    """A drive that goes where its setpoints tell it to; the session itself."""
+
+    configuration: DriveConfiguration
+    setpoints: Setpoints
+    gate: CommandGate
+    report: Reporter
+
+    def hand_out_neutral(self, now: float) -> None:
+        """Have all setpoints sent at once, neutral as they are."""
 
 
 class NeutralStop:
     """Those that wait until one drive has everything neutral; nobody does most of the time."""
 
-    def __init__(self, session: 'Session') -> None:
+    def __init__(self, session: Commanded) -> None:
         self._session = session
         self._requests: list[ControlRequest] = []
         self._deadline = math.inf

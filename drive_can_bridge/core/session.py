@@ -451,10 +451,17 @@ class Session(ABC):
         """Return what diagnostics show of this family beyond what all families have."""
         return {}
 
+    # All that is ever asked of the stop duty is asked here (``test/test_layers.py``).
+
     @property
     def may_run(self) -> bool:
         """Nothing has shown yet that the drive does not run by our word."""
         return self.duty.may_run
+
+    @property
+    def owed(self) -> bool:
+        """The drive was told to run, and to stop since only in vain."""
+        return self.duty.owed
 
     @property
     def unshown(self) -> bool:

@@ -7,22 +7,53 @@ been served (:mod:`.request_desk`), or when the control machine says so.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.fault_watch import FaultWatch
+from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.request_desk import RequestDesk, RequestServer
 from drive_can_bridge.core.requests import (
     is_answer, Outcomes, Request,
 )
+from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
+from drive_can_bridge.core.statistics import DriveStatistics
 
-if TYPE_CHECKING:
-    from drive_can_bridge.core.session import Session
+
+class Conversation(Protocol):
+    """What users can have, by where it stands with their drive; the session itself."""
+
+    active: bool
+    serving: bool
+    bus_available: bool
+    online: bool
+    homes: bool
+    defect: Sentence
+    control: ControlMachine | None
+    fault_watch: FaultWatch | None
+    neutral_stop: NeutralStop
+    report: Reporter
+    roles: Roles
+    setpoints: Setpoints
+    statistics: DriveStatistics
+
+    @property
+    def state(self) -> DriveState:
+        """The state in one word."""
+
+    def home(self, request: ControlRequest, now: float) -> None:
+        """Have the axis look for its reference."""
+
+    def control_changed(self, now: float) -> None:
+        """React to a control word that may have changed."""
 
 
 class Users:
@@ -37,7 +68,7 @@ class Users:
     :param control: takes what is asked of the drive by its control word; None: its own machine.
     """
 
-    def __init__(self, session: 'Session', server: RequestServer, *,
+    def __init__(self, session: Conversation, server: RequestServer, *,
                  blocked: Callable[[float], Sentence] = lambda now: NOTHING,
                  control_refusal: Callable[[ControlAction, Sentence], Sentence] = (
                      lambda action, refusal: refusal),

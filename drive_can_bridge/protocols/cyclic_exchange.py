@@ -303,7 +303,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _heed(self) -> None:
         """Record that the drive has shown to have heard what it was told last, if it has."""
-        if self.heeded and self._session.duty.unshown and self.book.stop_shown:
+        if self.heeded and self.book.stop_shown:
             self._session.duty.happened(Happened.ANSWERED)
         if self.book.stop_shown:
             self._session.neutral_stop.answered()
@@ -399,7 +399,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _unanswered(self) -> bool:
         """Tell whether a drive that ran has not shown to have heard one of the last cycles."""
-        return self._session.duty.unshown and not self.book.stop_shown
+        return self._session.unshown
 
     def doubt_the_end(self) -> None:
         """Record a drive that ran, and has answered none of its last cycles."""

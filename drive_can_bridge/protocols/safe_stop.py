@@ -101,7 +101,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         """
         session = self._session
         self.running = True
-        self._owed, self._insisting = session.duty.owed and not again, insist
+        self._owed, self._insisting = session.owed and not again, insist
         self._again = again
         self._whole = setpoints and not session.gate.mute
         self._channel.run(self._then_look(procedure), self._done, now, Lane.STOP)
@@ -146,7 +146,7 @@ class SafeStop(Generic[StepT, ReplyT]):
                 session.duty.channel(CONTROL_WORD, Happened.STOP_LEFT)
                 if not session.active:  # in its end, to be disabled is enough
                     session.duty.happened(Happened.ANSWERED)
-            if self._again and not session.duty.owed:
+            if self._again and not session.owed:
                 session.report.note(Noted(sentences.stopped_again()))
         elif self._owed or self._insisting:
             session.report.warn(sentences.stop_failed(failed), may_run=self._owed)

@@ -62,7 +62,7 @@ class StopAgain:
     @property
     def _wanted(self) -> bool:
         session = self._session
-        return not session.online and session.stage is Stage.RUNNING and session.duty.may_run
+        return not session.online and session.stage is Stage.RUNNING and session.may_run
 
     def _begin(self) -> Generator[Any, Any, None]:
         """Begin when the exchange under way has ended, unless that has found the drive."""

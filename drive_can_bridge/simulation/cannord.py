@@ -25,8 +25,7 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.simulation.cannord_plant import InverterPlant
 from drive_can_bridge.simulation.cannord_table import CannordTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Refused
+from drive_can_bridge.simulation.registers import PlantFactory, Refused
 
 #: P513, s that may pass between two telegrams; 0 or less: any
 TELEGRAM_TIMEOUT = 513

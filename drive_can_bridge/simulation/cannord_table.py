@@ -24,7 +24,8 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     NUMBER_MAX, ParameterFrame, Response, Task, VALUE_RESPONSES, WRITES,
 )
-from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
+from drive_can_bridge.simulation.plant import Refusal
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 (INVALID_NUMBER, CANNOT_BE_CHANGED, LIMIT_EXCEEDED, WRONG_SUBINDEX, NOT_AN_ARRAY, INVALID_TYPE,
  ) = range(6)

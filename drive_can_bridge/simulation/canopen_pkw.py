@@ -18,8 +18,7 @@ from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Refused
+from drive_can_bridge.simulation.registers import PlantFactory, Refused
 from drive_can_bridge.simulation.starter import TEST_TRIP
 from drive_can_bridge.simulation.starter_plant import is_starter, StarterPlant
 

@@ -26,8 +26,7 @@ from drive_can_bridge.simulation.canopen.sdo import checked_length
 from drive_can_bridge.simulation.cia402_objects import own_parameters
 from drive_can_bridge.simulation.cia402_plant import Habits, ServoPlant
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.plant import PlantFactory
-from drive_can_bridge.simulation.registers import Refused
+from drive_can_bridge.simulation.registers import PlantFactory, Refused
 
 DEVICE_NAME = b'simulated CiA 402 servo drive'
 #: servo drive (additional information 2) of profile 402

@@ -25,8 +25,8 @@ from drive_can_bridge.simulation.motor import (
 from drive_can_bridge.simulation.motor_plant import (
     COAST_TIME, SINKING_SPEED, WARNING_TEMPERATURE,
 )
-from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.plant import Mechanics, Refusal
+from drive_can_bridge.simulation.registers import Registers
 
 INCREMENTS = 10_000.0
 #: revolutions per second, and per second each second at full current

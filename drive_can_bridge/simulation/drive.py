@@ -27,8 +27,8 @@ from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_fault
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import PlantFactory, Registers
 
 #: the manual's least time between two EEPROM writes
 EEPROM_TIME = 0.020

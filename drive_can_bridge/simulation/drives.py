@@ -9,7 +9,8 @@ from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
-from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
+from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import PlantFactory
 
 SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
     'cannord': SimulatedCannordInverter,

@@ -24,8 +24,8 @@ from drive_can_bridge.simulation.bounds import Bounds, Reach
 from drive_can_bridge.simulation.control import ENDS, machine_of, Operation, Report, StatusWord
 from drive_can_bridge.simulation.motor import Motor, Rates, TORQUE_MAX, Travel
 from drive_can_bridge.simulation.names import Quantity, RampParameter, RampUse
-from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.plant import Mechanics, Refusal
+from drive_can_bridge.simulation.registers import Registers
 
 #: s from 0 to the rated speed, where the profile has no ramp parameter
 RAMP_TIME = 1.0

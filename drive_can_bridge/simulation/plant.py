@@ -9,15 +9,23 @@ A family chooses a plant when a drive is made; its maker may bring another one:
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Protocol, TYPE_CHECKING
+from enum import Enum
+from typing import Protocol
 
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.control import Operation
 
-if TYPE_CHECKING:
-    from drive_can_bridge.simulation.registers import Refusal, Registers
+
+class Refusal(Enum):
+    """Why a write is refused, where a protocol can say so; one kind is acknowledged instead."""
+
+    READ_ONLY = 'read-only'
+    OUT_OF_RANGE = 'out of range'
+    CROSSED = 'minimum above maximum'
+    FORBIDDEN = 'a scripted fault'
+    TOO_EARLY = 'another parameter has to be written first'
+    UNTOLD = 'nobody is told, the value stays'
 
 
 class Plant(Protocol):
@@ -37,7 +45,7 @@ class Plant(Protocol):
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         """Return what computes a read-only register; None: it is plain memory."""
 
-    def refusal(self, parameter: Parameter, raw: int) -> 'Refusal | None':
+    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
         """Say why a register does not take a value within its limits now; None: it does."""
 
     def written(self, name: str, before: int, raw: int) -> None:
@@ -89,6 +97,3 @@ class Mechanics:
                 raise ValueRefused(f"'{part.strip()}' is not possible; allowed: {allowed}",
                                    ) from None
         return cls(**given)  # type: ignore[arg-type]  # each has the type of its range
-
-
-PlantFactory = Callable[['Registers', DriveConfiguration, Mechanics], Plant]

@@ -9,25 +9,14 @@ without power only what is in EEPROM.
 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
-from enum import Enum
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.simulation import names
 from drive_can_bridge.simulation.faults import Fault, FaultKind
-from drive_can_bridge.simulation.plant import Plant
+from drive_can_bridge.simulation.plant import Mechanics, Plant, Refusal
 from drive_can_bridge.simulation.scales import clamp, nearest_raw
-
-
-class Refusal(Enum):
-    """Why a write is refused, where a protocol can say so; one kind is acknowledged instead."""
-
-    READ_ONLY = 'read-only'
-    OUT_OF_RANGE = 'out of range'
-    CROSSED = 'minimum above maximum'
-    FORBIDDEN = 'a scripted fault'
-    TOO_EARLY = 'another parameter has to be written first'
-    UNTOLD = 'nobody is told, the value stays'
 
 
 class Refused(DriveCanError):
@@ -196,3 +185,6 @@ class Registers:
             self._kept[name] = raw
         self._plant.written(name, before, raw)
 
+
+#: makes what is behind the registers of a drive
+PlantFactory = Callable[[Registers, DriveConfiguration, Mechanics], Plant]

@@ -24,8 +24,9 @@ from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
 from drive_can_bridge.simulation.drives import make_drives
 from drive_can_bridge.simulation.faults import Fault
-from drive_can_bridge.simulation.plant import Mechanics, PlantFactory
+from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Say, ShowFrame
+from drive_can_bridge.simulation.registers import PlantFactory
 from drive_can_bridge.transport.port import open_port
 
 #: s that the arrival of a frame may be noticed late. Two writes 20 ms apart on the wire must not

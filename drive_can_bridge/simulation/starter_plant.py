@@ -18,8 +18,8 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw_registers import register_number
 from drive_can_bridge.simulation.control import Operation, Report, StatusWord
-from drive_can_bridge.simulation.plant import Mechanics, Plant
-from drive_can_bridge.simulation.registers import Refusal, Registers
+from drive_can_bridge.simulation.plant import Mechanics, Plant, Refusal
+from drive_can_bridge.simulation.registers import Registers
 from drive_can_bridge.simulation.scales import clamp, mains_swing, plausible
 from drive_can_bridge.simulation.starter import (
     MACHINE, RUN_REVERSE, Starter, TEST_TRIP, THERMAL_OVERLOAD,

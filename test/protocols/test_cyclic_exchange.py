@@ -68,7 +68,7 @@ class Plain(Session):
         return self.exchange.longest_stop
 
     def see_to_control_word(self, now: float) -> None:
-        self.exchange.hurry(now, setpoints=self.duty.owed)
+        self.exchange.hurry(now, setpoints=self.owed)
 
     def _encode(self, raws: list[int]) -> bytes:
         return bytes(raws)

@@ -19,7 +19,7 @@ from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.plant import PlantFactory
+from drive_can_bridge.simulation.registers import PlantFactory
 
 OFF, READY, ON, ENABLED, STOPPING = (
     State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.SWITCHED_ON,

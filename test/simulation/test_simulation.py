@@ -24,7 +24,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.console import Console, LineReader
 from drive_can_bridge.simulation.drives import make_drives
 from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.registers import Refusal
+from drive_can_bridge.simulation.plant import Refusal
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint

@@ -89,7 +89,7 @@ class Group:
         self._turn_begun = self._turn
         leader.send(self.broadcast, payloads, *(member.exchange for member in members))
         if exchange.insisting:
-            alone = [member for member in members if member.duty.unshown]
+            alone = [member for member in members if member.unshown]
         else:   # a stop reaches also those that do not listen to broadcasts
             turns = math.ceil(count / STOP_CYCLES) if stopping else 1
             alone = [members[(self._turn + place) % count] for place in range(turns)]
@@ -108,7 +108,7 @@ class Group:
 
     def unheard(self) -> bool:
         """Tell whether an inverter that ran has not answered since all were told to stop."""
-        return any(member.duty.unshown for member in self.members)
+        return any(member.unshown for member in self.members)
 
     def stop_left(self, now: float) -> None:
         """End the stop of all: who ran and did not answer may still be running."""
@@ -142,7 +142,7 @@ class Group:
     def _unheard(self) -> Sentence:
         """Say which inverters were told to run, and have not answered since they were stopped."""
         names = [member.configuration.name for member in self.members
-                 if member.duty.unshown and not member.online]
+                 if member.unshown and not member.online]
         return sentences.members_may_run(names) if names else NOTHING
 
     # -- what the leader does for all -------------------------------------------------------------

@@ -161,7 +161,7 @@ class CannordSession(Session):
     # -- process data, sending --------------------------------------------------------------------
 
     def see_to_control_word(self, now: float) -> None:
-        self.exchange.hurry(now, setpoints=self.duty.owed)
+        self.exchange.hurry(now, setpoints=self.owed)
 
     def _encode(self, raws: list[int]) -> list[bytes]:
         word, *values = raws

@@ -171,7 +171,7 @@ class ControlWriter:
         text = sentences.write_unanswered(f'{self._parameter.name} {word:04X}h')
         if text != self.refusal:
             self._session.report.warn(
-                sentences.write_failed(text), may_run=self._session.duty.owed)
+                sentences.write_failed(text), may_run=self._session.owed)
         self.refusal = text
 
     def _settle(self, word: int) -> None:

@@ -164,7 +164,7 @@ class PkwSession(Session):
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
-        if now < self._node.free_at and not self.duty.owed:
+        if now < self._node.free_at and not self.owed:
             self.stop_ended()
 
     # -- what the device is told ------------------------------------------------------------------

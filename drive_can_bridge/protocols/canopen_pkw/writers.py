@@ -217,7 +217,7 @@ class Writers:
         control, now = session.control, self._channel.now
         if self._warned.get(name) != text:  # once: commands may go to and fro
             session.report.warn(sentences.write_failed(text),
-                                may_run=neutral and control is None and session.duty.owed)
+                                may_run=neutral and control is None and session.owed)
         self._warned[name] = self._failures[name] = text
         if control is None:
             return

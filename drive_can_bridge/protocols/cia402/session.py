@@ -215,7 +215,7 @@ class Cia402Session(Session):
         self._stop_until = now + self.configuration.control_timeout
         if self._cycling:
             self.exchange.stop_soon(now)
-        elif self.duty.owed:
+        elif self.owed:
             self._stop_by_sdo(now)
         else:
             self._release(now)
@@ -533,7 +533,7 @@ class Cia402Session(Session):
         if self.stage is Stage.STOPPING:
             return
         exchange, control = self.exchange, self._machine
-        exchange.hurry(now, setpoints=self.duty.owed)
+        exchange.hurry(now, setpoints=self.owed)
         if control.pending and control.word != exchange.word:   # one step of several
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
@@ -584,7 +584,7 @@ class Cia402Session(Session):
 
     def _release(self, now: float) -> None:
         """Come to the end, as soon as the drive does not watch the bridge any more."""
-        if self.duty.owed:      # then it is to stop by itself
+        if self.owed:      # then it is to stop by itself
             self.stop_left()
             return
         self._channel.run(self._bring_up.release(self._stop.answer_time),

@@ -4,7 +4,8 @@
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes
 from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
-from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
+from drive_can_bridge.simulation.plant import Refusal
+from drive_can_bridge.simulation.registers import Refused, Registers
 
 TOO_HIGH, TOO_LOW = 0x06090031, 0x06090032
 

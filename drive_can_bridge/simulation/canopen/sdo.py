@@ -8,7 +8,8 @@ Block transfer is refused.
 from typing import Protocol
 
 from drive_can_bridge.protocols.canopen import abort_codes
-from drive_can_bridge.simulation.registers import Refusal, Refused
+from drive_can_bridge.simulation.plant import Refusal
+from drive_can_bridge.simulation.registers import Refused
 
 LENGTH = 8
 EXPEDITED_MAX = 4
