@@ -12,6 +12,7 @@ ordinary way.
 from array import array
 from collections.abc import Sequence
 from functools import partial
+from itertools import groupby
 from operator import itemgetter
 import struct
 from typing import NamedTuple
@@ -47,18 +48,30 @@ class _Pattern:
     __slots__ = ('_around', '_bytes', '_names', '_rows', '_struct')
 
     def __init__(self, layout: Layout, names: list[str], quantities: Sequence[str]) -> None:
-        codes, field, places = layout.order, 0, []
+        said = _said(layout)
+        codes, field, at, places = layout.order, 0, 0, []
+        constants: list[bytes] = []
         self._rows = []
-        for index, (constant, code) in enumerate(zip(layout.constants, layout.codes)):
-            codes += f'{len(constant)}s{code}'
-            places.append(field)
-            if index > 1:   # after the stamp
-                self._rows.append((quantities[index - 2],
-                                   slice(field + 1, field + 1 + len(names))))
-            field += 1 + int(code[:-1] or 1)
-        self._struct = struct.Struct(f'{codes}{len(layout.constants[-1])}s')
-        self._around = itemgetter(*places, field)
-        self._bytes = layout.constants
+        for index, constant in enumerate(layout.constants):
+            for written, run in groupby(range(at, at + len(constant)), said.__getitem__):
+                length = len(list(run))
+                codes += f'{length}s' if written else f'{length}x'
+                if written:
+                    constants.append(constant[:length])
+                    places.append(field)
+                    field += 1
+                constant = constant[length:]
+                at += length
+            if index < len(layout.codes):
+                code = layout.codes[index]
+                if index > 1:   # after the stamp
+                    self._rows.append((quantities[index - 2], slice(field, field + len(names))))
+                codes += code
+                at += struct.calcsize(layout.order + code)
+                field += int(code[:-1] or 1)
+        self._struct = struct.Struct(codes)
+        self._around = itemgetter(*places)
+        self._bytes = tuple(constants)
         self._names = names
 
     def read(self, data: bytes) -> JointMessage | None:
@@ -123,6 +136,40 @@ def _name_count(data: bytes) -> int:
     except struct.error:    # it ends too soon: the middleware has words for it
         return 0
     return int(count)
+
+
+def _said(layout: Layout) -> list[bool]:
+    """
+    Return for each byte of a message in plain CDR whether anything is said in it.
+
+    What only fills up to the alignment of the next field, and what follows the last one, is whatever
+    was in the memory of the publisher (rmw_fastrtps clears neither).
+    """
+    data = layout.constants[0]
+    for constant, code in zip(layout.constants[1:], layout.codes):
+        data += bytes(struct.calcsize(layout.order + code)) + constant
+    said = [False] * len(data)
+    at = 0
+
+    def take(size: int, alignment: int = 1) -> int:
+        nonlocal at
+        at += -(at - HEADER) % alignment
+        said[at:at + size] = [True] * size
+        at += size
+        return at - size
+
+    def count() -> int:
+        (number,) = struct.unpack_from(f'{layout.order}I', data, take(4, 4))
+        return int(number)
+
+    take(HEADER + STAMP)
+    take(count())           # frame_id
+    for _ in range(count()):
+        take(count())       # names
+    for _ in QUANTITIES:
+        if values := count():
+            take(8 * values, 8)
+    return said
 
 
 def _pattern(raw: JointState, message: JointMessage, data: bytes) -> _Pattern | None:

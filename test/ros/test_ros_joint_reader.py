@@ -112,3 +112,21 @@ def test_rubbish(data: bytes) -> None:
     reader = knowing(JointState(name=NAMES, velocity=VALUES))
     with pytest.raises((RuntimeError, ValueError)):
         reader(data)
+
+
+def test_bytes_that_say_nothing_may_be_any() -> None:
+    # as rmw_fastrtps_cpp of Jazzy serialised it; ?? stands for what was in its memory before
+    spelled = (
+        '00010000 00000000 00000000 02000000 7800???? 03000000 03000000 776a00?? 03000000 6e6a00??'
+        '13000000 73686f756c6465725f70616e5f6a6f696e7400?? 03000000'
+        '000000000000f03f 0000000000000040 0000000000000840 00000000'
+        '03000000 000000000000f03f 0000000000000040 0000000000000840 ???????????????? '
+    ).replace(' ', '')
+    clean, other = (bytes.fromhex(spelled.replace('??', each)) for each in ('00', 'a5'))
+    reader = JointReader()
+    names = [reader(clean if number % 2 else other).names for number in range(ALIKE)][-1]
+    for data in (clean, other):
+        read = reader(data)
+        assert read.names is names, 'it does not know it'
+        assert [(kind, list(values)) for kind, values in read.columns] == [
+            ('position', [1.0, 2.0, 3.0]), ('effort', [1.0, 2.0, 3.0])]
