@@ -11,7 +11,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameterTypes, SetParameters
 import rclpy
 from rclpy.qos import qos_profile_parameters
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.monitor.source import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
@@ -117,3 +117,25 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
             assert 'nobody offers /conveyor/enable: no control word' in told[-1].text
         finally:
             client.node.destroy_service(service)
+
+
+def test_disable_asks_for_anything_but_enable(client: Client) -> None:
+    asked: list[bool] = []
+
+    def answer(request: Any, response: Any) -> Any:
+        asked.append(request.data)
+        response.success = True
+        return response
+
+    now, told = 100.0, list[Outcome]()
+    service = client.node.create_service(SetBool, '/lift/enable', answer)
+    try:
+        with asking(client) as operations:
+            operations.poll({'/lift': [Stop.DISABLE]}, now)
+            operations.stop('/lift', Stop.DISABLE, told.append, now)
+            wait_until(lambda: not operations.poll({'/lift': [Stop.DISABLE]}, now),
+                       what='an answer')
+    finally:
+        client.node.destroy_service(service)
+    assert asked == [False]
+    assert told == [Outcome(True, '')]
