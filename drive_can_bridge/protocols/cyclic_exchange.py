@@ -209,6 +209,7 @@ class CyclicExchange(Answers, Generic[TelegramT]):
             self._whole = False
         elif self.runs:
             for each in to:
+                each.book.doubt()   # also of those who are not asked by it
                 each.session.duty.channel(CYCLE, Happened.RUN_LEFT)
         if self._frames_out or not self._whole:
             return
