@@ -21,7 +21,7 @@ from typing import Generic, TypeVar
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CYCLE, Happened
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
@@ -40,7 +40,7 @@ TelegramT = TypeVar('TelegramT')
 
 class CyclicExchange(Answers, Generic[TelegramT]):
     """
-    The cycles that one drive is told by, or several at once, and the answers of (the first of) them.
+    The cycles that tell one drive, or several at once, and the answers of the first of them.
 
     :param encode: makes a telegram of the raw integers of all setpoints, with the control word
         among them if it has its slot.

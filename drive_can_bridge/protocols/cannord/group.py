@@ -7,10 +7,10 @@ one inverter of the group, in turn, also gets the frame to itself, and its answe
 and actual values: with four inverters each is heard every fourth period. An inverter that is
 addressed by itself is a group of one without a broadcast: it gets each frame to itself.
 
-There is one cyclic exchange and one control word, and the inverter with the lowest station leads:
-the setpoints are its, and its services bring the whole group to a state. What concerns one inverter
-only (status, samples, parameters, whether it is there, what it is owed) is with the session of each
-member. The others refuse what only the leader can do; but whoever stops one of them stops all.
+There is one cyclic exchange and one control word. The inverter with the lowest station leads: the
+setpoints are its, and its services bring the whole group to a state. What concerns one inverter
+only (status, samples, parameters, whether it is there, what it is owed) is with its session. The
+others refuse what only the leader can do; but whoever stops one of them stops all.
 
 All sessions of a group live on one bus, under one lock, so that they may be called from here.
 """

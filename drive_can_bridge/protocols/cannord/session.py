@@ -232,7 +232,7 @@ class CannordSession(Session):
     def warning(self) -> Sentence:
         return self._timeout.warning or self._samples.warning
 
-    # -- as one of those that are told the same ----------------------------------------------------
+    # -- as one of those that are told the same ---------------------------------------------------
 
     def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         return self._group.control_refusal(self, action, refusal)

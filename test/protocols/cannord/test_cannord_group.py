@@ -815,7 +815,7 @@ def test_a_frame_that_answers_nothing_does_not_show_that_a_stop_was_heard() -> N
     assert [text for _, text in bus.live(0.02)] == ['400#7F040000', '002#7F040000']
     bus.asks(DISABLE)
     assert [text for _, text in bus.live(0.02)] == ['400#7E040000', '004#7E040000']
-    bus.hears(f'007#{READY}')       # twice, say: the last thing that it was asked was before enable
+    bus.hears(f'007#{READY}')       # twice, say: it was asked before enable only
     for session in bus.sessions:
         session.bus_down(bus.now, 'unplugged')
     bus.pump()
