@@ -93,7 +93,7 @@ class Session(ABC):
     :ivar defect: what went wrong in the program, in words, while the drive is left alone for that.
     :ivar serving: it only cares for parameter requests; ``online``: the last one was answered.
     :ivar enabled_by: name of the drive whose ``~/enable`` enables it: its own, but in a group.
-    :ivar partners: sessions on this bus whose timers and events any call of this one may change.
+    :ivar partners: sessions on this bus whose timers and events any call of one may change.
     :ivar phase: s, when in each period of the steady clock this drive has its turn among those
         that share its bus; None: whenever it is ready.
     """

@@ -3,31 +3,28 @@
 The exchange of protocols with a cyclic service: all setpoints and the control word, once a period.
 
 A family says how its telegrams are encoded and sent, what an answer means, and when cycles begin;
-here stands what every such session has to see to:
+here stands what every such session has to see to, and what is not answered in :mod:`.answers`:
 
-* *The beat.* A cycle begins when its time has come. What has not been answered by then is missed,
-  and after ``missed_limit`` of those in a row the drive is lost.
+* *The beat.* A cycle begins when its time has come. What has not been answered by then is missed.
 * *What has left.* What the bus did not take counts for nothing: a cycle has been sent when all its
   frames have left.
 * *The end.* The last cycles before silence are counted. Where a drive that ran has not shown that
   it heard one of those that stop it, an answer is waited for a moment, and then it gets more of
-  them, until one is answered. What it answers to cycles of before shows nothing
-  (:mod:`.exchange_book`).
+  them, until one is answered.
 """
 
 from collections.abc import Callable, Iterable
 from functools import partial
 import math
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
-from drive_can_bridge.core import sentences
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.stop_duty import CYCLE, Happened
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3
@@ -41,30 +38,19 @@ EXPIRY_SPACING = 0.05
 TelegramT = TypeVar('TelegramT')
 
 
-class CyclicExchange(Generic[TelegramT]):
+class CyclicExchange(Answers, Generic[TelegramT]):
     """
-    The cycles of one drive.
+    The cycles that tell one drive, or several at once, and the answers of the first of them.
 
     :param encode: makes a telegram of the raw integers of all setpoints, with the control word
         among them if it has its slot.
     :param send: (telegram, now): hands out its frames (:meth:`put`), and says from whom an answer
         is expected (:meth:`expect_answer`).
     :param slot: of the control word; None: it is not sent cyclically.
-    :param silence: what is said of a drive that does not answer.
-    :param advice: what to look at then.
-    :param missed: (why the drive counts as lost, '' if it does not yet; now): what becomes of a
-        cycle that was not answered, unless the drive is being stopped; None: it is lost.
     :param ended: (now): called when the last cycle before silence has left, and that of a stop was
         answered or waited for; None: that ends the stop.
-    :param settled: called when an exchange ends, answered or not.
-    :param left: called when a cycle has left.
-    :param audience: the exchanges of those whom a whole cycle tells; None: this one.
-    :param in_turn: not each cycle asks this drive: the one that asks it settles the one before.
-    :param unheard: tells whether somebody who ran may not have heard the stop; None: the drive
-        has answered none of its cycles.
-    :param timer: says when cycles are due, where others are in step; None: one of its own.
-    :ivar book: counts the cycles, and the answers.
-    :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
+    :param silence: this and what follows are those of :class:`.Answers`.
+    :ivar audience: whom a whole cycle tells: the answers of this drive, and of others.
     :ivar timer: when the next cycle is due.
     :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
@@ -77,30 +63,18 @@ class CyclicExchange(Generic[TelegramT]):
                  send: Callable[[TelegramT, float], None], *, slot: int | None, silence: str,
                  advice: str = '', missed: Callable[[Sentence, float], None] | None = None,
                  ended: Callable[[float], None] | None = None,
-                 settled: Callable[[], None] | None = None,
-                 left: Callable[[], None] | None = None,
-                 in_turn: bool = False,
-                 audience: 'Callable[[], Iterable[CyclicExchange[Any]]] | None' = None,
-                 unheard: Callable[[], bool] | None = None,
+                 settled: Callable[[], None] | None = None, in_turn: bool = False,
                  timer: CycleTimer | None = None) -> None:
-        self.book = ExchangeBook(session.configuration, session.statistics, timer)
+        super().__init__(session, silence=silence, advice=advice, missed=missed, settled=settled,
+                         in_turn=in_turn, timer=timer)
+        self.audience: list[Answers] = [self]
         self.timer: CycleTimer = self.book.timer
         self.word: int | None = None
         self.cycles_left = -1
         self.again = self.insisting = self.runs = False
-        self._session = session
         self._encode, self._send = encode, send
         self._slot = slot
-        self._silence, self._advice = silence, advice
-        self._missed = missed or self._lose
         self._ended = ended or self._end_stop
-        self._settled = settled
-        self._told = left
-        self._in_turn = in_turn
-        self._audience = audience or (lambda: (self,))
-        self._unheard = unheard or self._unanswered
-        self.heeded = True
-        self._answer_due = math.inf
         self._telegram: TelegramT | None = None
         self._raws: list[int] | None = None     # in it, until it has left
         self._frames_out = 0                    # of which nobody has said what became of them
@@ -112,7 +86,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` has something to do."""
-        due, expires_at = self.timer.due, self._session.setpoints.expires_at
+        due, expires_at = self.timer.due, self.session.setpoints.expires_at
         if expires_at < due:
             due = expires_at
         return due if due < self._answer_due else self._answer_due
@@ -122,7 +96,7 @@ class CyclicExchange(Generic[TelegramT]):
         if now < self.timer.due:
             if now >= self._answer_due:
                 self.settle(now)
-            if self._session.gate.expire(now) and self._session.setpoints.changed:
+            if self.session.gate.expire(now) and self.session.setpoints.changed:
                 # a drive has that long for its answer
                 self.timer.no_later(max(now, self.timer.began_at + EXPIRY_SPACING))
             return
@@ -132,7 +106,7 @@ class CyclicExchange(Generic[TelegramT]):
             self.settle(now)
         if self.timer.due == math.inf:  # what was missed has ended the cycles
             return
-        session = self._session
+        session = self.session
         session.gate.expire(now)
         control = session.control
         telegram = self._telegram
@@ -148,12 +122,11 @@ class CyclicExchange(Generic[TelegramT]):
         """
         Let the first cycle follow, a period after the last one at least.
 
-        :param now: infinity: none follows, but answers to frames of others may be expected.
         :param in_turn: it waits for the turn of this drive, if it has one.
         """
         self._plan(-1)
         self.forget()
-        period, phase = self._session.configuration.period, self._session.phase
+        period, phase = self.session.configuration.period, self.session.phase
         first = max(now, self.timer.began_at + period)
         if in_turn and phase is not None:
             first += (phase - first) % period
@@ -162,10 +135,8 @@ class CyclicExchange(Generic[TelegramT]):
     def stop(self) -> None:
         """Send nothing more, and expect no answer; one on its way is no surprise, though."""
         self._plan(-1)
-        self.forget()
         self.timer.stop()
-        self.book.expect_nothing()
-        self._answer_due = math.inf
+        super().stop()
 
     def hurry(self, now: float, *, setpoints: bool) -> None:
         """
@@ -173,10 +144,10 @@ class CyclicExchange(Generic[TelegramT]):
 
         :param setpoints: it does so, too, where only they have changed.
         """
-        control = self._session.control
+        control = self.session.control
         if control is not None and control.stopping and not self._stopping and (
                 self._slot is not None and control.word != self.word
-                or setpoints and self._session.setpoints.changed):
+                or setpoints and self.session.setpoints.changed):
             self.timer.hurry(now)
 
     def hand_out_neutral(self, now: float) -> None:
@@ -186,14 +157,22 @@ class CyclicExchange(Generic[TelegramT]):
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def put(self, frame: Frame, *to: 'CyclicExchange[Any]') -> None:
+    def put(self, frame: Frame, *to: Answers) -> None:
         """
         Hand out a frame of the cycle that has begun.
 
         :param to: whose drives it may start, where that is not only this one.
         """
         self._frames_out += 1
-        self._session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
+        self.session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
+
+    def expect_answer(self, now: float, until: float = math.inf) -> None:
+        """
+        Record that the drive itself was sent the cycle.
+
+        :param until: when the answer counts as missed; infinity: with the next cycle.
+        """
+        self.expect(now, until, runs=self.runs)
 
     def await_frame(self) -> Left:
         """Count a frame to the cycle that somebody else hands out, and tells what became of."""
@@ -204,7 +183,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._left((self,), sent, now)
 
     def _make(self) -> TelegramT:
-        session = self._session
+        session = self.session
         raws = [setpoint.raw for setpoint in session.setpoints.items]
         self.runs = not session.setpoints.at_rest
         control = session.control
@@ -217,25 +196,26 @@ class CyclicExchange(Generic[TelegramT]):
         self._raws = raws
         return self._encode(raws)
 
-    def _left(self, to: 'Iterable[CyclicExchange[Any]]', sent: bool, now: float) -> None:
+    def _left(self, to: Iterable[Answers], sent: bool, now: float) -> None:
         """
         Record a frame.
 
         One that may start somebody counts even alone; otherwise a cycle counts only when the bus
         has taken every frame of it.
         """
-        session = self._session
+        session = self.session
         self._frames_out -= 1
         if not sent:
             self._whole = False
         elif self.runs:
             for each in to:
-                each._session.duty.channel(CYCLE, Happened.RUN_LEFT)
+                each.book.doubt()   # also of those who are not asked by it
+                each.session.duty.channel(CYCLE, Happened.RUN_LEFT)
         if self._frames_out or not self._whole:
             return
         if not self.runs:
-            for each in self._audience():
-                each._session.duty.channel(CYCLE, Happened.STOP_LEFT)
+            for each in self.audience:
+                each.session.duty.channel(CYCLE, Happened.STOP_LEFT)
             session.neutral_stop.all_left()
         if self._raws is not None:      # the first time that it left
             session.sent.take(self._raws)
@@ -248,92 +228,10 @@ class CyclicExchange(Generic[TelegramT]):
                 session.control_changed(now)
             if control.pulsing:
                 self.timer.no_later(now + self.timer.stop_spacing)
-        if self._told is not None:
-            self._told()
         if self.cycles_left > 0:
             self.cycles_left -= 1
             if self.cycles_left == 0:
                 self._last_left(now)
-
-    # -- answers ----------------------------------------------------------------------------------
-
-    def expect_answer(self, now: float, until: float = math.inf, *,
-                      runs: bool | None = None) -> None:
-        """
-        Record that the drive was sent a cycle.
-
-        :param until: when the answer counts as missed; infinity: with the next cycle.
-        :param runs: it holds anything but neutral and ``disable``; None: as the cycle of this
-            exchange does.
-        """
-        self.book.asked(now, runs=self.runs if runs is None else runs)
-        self._answer_due = until
-
-    def expects(self, what: str, now: float, received_at: float) -> bool:
-        """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
-        if self.wanted:
-            return True
-        late = self.book.late(received_at)
-        if late is not None or not self.book.take_stale():
-            self._session.report.unasked(sentences.unasked(what), late, now)
-        self._heed()
-        return False
-
-    def answered(self, received_at: float) -> None:
-        """Record the answer to the last cycle."""
-        book = self.book
-        missed = not book.awaiting
-        book.answered(received_at)
-        book.heard(received_at)
-        if missed:
-            self._session.report.unasked(NOTHING, book.overdue, received_at)
-        self._heed()
-
-    @property
-    def wanted(self) -> bool:
-        """
-        An answer would belong to the last cycle.
-
-        Of a stop, all do that may still come; of drives that are asked in turn, also one that is
-        missed, as long as the next has not been asked for.
-        """
-        book = self.book
-        return book.awaiting or book.outstanding and (
-            self._in_turn or self._session.stage is Stage.STOPPING)
-
-    def _heed(self) -> None:
-        """Record that the drive has shown to have heard what it was told last, if it has."""
-        if self.heeded and self.book.stop_shown:
-            self._session.duty.happened(Happened.ANSWERED)
-        if self.book.stop_shown:
-            self._session.neutral_stop.answered()
-
-    def settle(self, now: float) -> None:
-        """End an exchange: what has not arrived by now does not count for it any more."""
-        self._answer_due = math.inf
-        if self._settled is not None:
-            self._settled()
-        book, session = self.book, self._session
-        if book.awaiting:
-            too_many = book.missed()
-            if session.stage is not Stage.STOPPING:
-                limit = session.configuration.missed_limit
-                self._missed(sentences.silent_for_cycles(self._silence, limit) if too_many else
-                             NOTHING, now)
-
-    def forget(self) -> None:
-        """Count anew what is missed."""
-        self.book.missed_in_row = 0
-
-    def _lose(self, reason: Sentence, now: float) -> None:
-        if reason:
-            self.forget()
-            session = self._session
-            if session.online:
-                session.lose(reason, now)
-            elif session.duty.happened(Happened.UNANSWERED) is Do.STOP_BY_NUMBER:
-                session.report.warn(sentences.stop_not_answered(), may_run=True)
-            session.report.advice = sentences.silent(self._silence, self._advice)
 
     # -- the end ----------------------------------------------------------------------------------
 
@@ -365,7 +263,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _last_left(self, now: float) -> None:
         """Come to an end, at once or when somebody has answered."""
-        self._waiting = self._stopping and self._unheard()
+        self._waiting = self._stopping and self._unheard
         if self._waiting:
             self.timer.start(now + LAST_ANSWER)
         else:
@@ -373,19 +271,19 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _insist(self, now: float) -> bool:
         """Begin with more cycles for who has not shown to have heard one; False: that is all."""
-        if self.insisting or not self._unheard():
+        if self.insisting or not self._unheard:
             self._end(now)
             return False
         self._waiting, self.insisting = False, True
         self.cycles_left = MORE_CYCLES
-        if self._session.configuration.period <= LAST_ANSWER:   # late answers have come by now
-            for each in self._audience():
+        if self.session.configuration.period <= LAST_ANSWER:   # late answers have come by now
+            for each in self.audience:
                 each.book.forget_asked()
         return True
 
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""
-        if (self._waiting or self.insisting) and not self._unheard():
+        if (self._waiting or self.insisting) and not self._unheard:
             self._end(now)
 
     def _end(self, now: float) -> None:
@@ -395,13 +293,17 @@ class CyclicExchange(Generic[TelegramT]):
 
     def _end_stop(self, now: float) -> None:
         self.doubt_the_end()
-        self._session.stop_left()
+        for each in self.audience:
+            if not each.session.stopped:
+                each.session.stop_left()
 
-    def _unanswered(self) -> bool:
-        """Tell whether a drive that ran has not shown to have heard one of the last cycles."""
-        return self._session.unshown
+    @property
+    def _unheard(self) -> bool:
+        """Whether somebody who ran has not shown to have heard one of the last cycles."""
+        return any(each.session.unshown for each in self.audience)
 
     def doubt_the_end(self) -> None:
-        """Record a drive that ran, and has answered none of its last cycles."""
-        if self._unanswered():
-            self._session.duty.happened(Happened.SILENT)
+        """Record who ran, and has answered none of the last cycles."""
+        for each in self.audience:
+            if each.session.unshown:
+                each.session.duty.happened(Happened.SILENT)

@@ -130,7 +130,7 @@ class Cannord(Family):
         return Talk(CannordSession, CannordObserver, CannordScout, CannordProber)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
-        from drive_can_bridge.protocols.cannord.group import make_group
+        from drive_can_bridge.protocols.cannord.session import make_group
         made: dict[str, Session] = {
             session.configuration.name: session for group in groups(drives)
             for session in make_group(group)}

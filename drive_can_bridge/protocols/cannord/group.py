@@ -1,171 +1,221 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Broadcast groups: several inverters that are told the same.
+The conversation with the inverters that are told the same: a broadcast group, or one alone.
 
 Each cycle one broadcast frame carries control word and setpoints for all. Nobody answers it, so
 one inverter of the group, in turn, also gets the frame to itself, and its answer brings its status
-and actual values: with four inverters each is heard every fourth period.
+and actual values: with four inverters each is heard every fourth period. An inverter that is
+addressed by itself is a group of one without a broadcast: it gets each frame to itself.
 
-The inverter with the lowest station leads. Its session sends everything and has the setpoints;
-its services bring the whole group to a state. The sessions of the others receive, serve the
-parameters of their inverter, and refuse what only the leader can do; but who stops one of
-them stops all.
+There is one cyclic exchange and one control word. The inverter with the lowest station leads: the
+setpoints are its, and its services bring the whole group to a state. What concerns one inverter
+only (status, samples, parameters, whether it is there, what it is owed) is with its session. The
+others refuse what only the leader can do; but whoever stops one of them stops all.
 
-All sessions of a group live on one bus, under one lock, so that they may call each other.
+All sessions of a group live on one bus, under one lock, so that they may be called from here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.session import Stage
-from drive_can_bridge.core.stop_duty import Happened
+from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
-from drive_can_bridge.protocols.cannord.process_data import values_needed
-from drive_can_bridge.protocols.cannord.session import CannordSession
-from drive_can_bridge.protocols.cyclic_exchange import STOP_CYCLES
+from drive_can_bridge.protocols.cannord.process_data import (
+    encode_extra, encode_main, main_length, MAIN_VALUES, values_needed,
+)
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, STOP_CYCLES
+
+_SILENCE = 'no answer to process data'
+_ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'
+_STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
+_SERVICES = {ControlAction.ENABLE: 'enable', ControlAction.RESET_FAULT: 'reset_fault'}
 
 
-def make_group(drives: Sequence[DriveConfiguration]) -> list[CannordSession]:
+@dataclass(frozen=True)
+class Member:
     """
-    Make the sessions of a group.
+    An inverter of a group.
 
-    :param drives: the leader first.
+    :ivar identifier: of the process frames that it gets to itself.
+    :ivar answers: what it answers to those.
+    :ivar expect: (now, when the answer counts as missed): it was sent them.
     """
-    group = Group(drives)
-    for member in group.members:
-        member.partners = [other for other in group.members if other is not member]
-    return group.members
+
+    session: Session
+    identifier: int
+    answers: Answers
+    expect: Callable[[float, float], None]
 
 
 class Group:
     """
-    What the sessions of a group have in common.
+    What is told to all inverters of a group, and what becomes of it.
 
-    :param drives: the leader first.
-    :ivar members: all sessions of the group, in the same order.
-    :ivar broadcast: the identifier of frames for all.
-    :ivar places: how many values the frames hold at least.
+    :param drives: the leader first, as it joins first.
+    :ivar exchange: the cycles of all; the answers of the leader.
     :ivar control: the control word of all, and what they report.
+    :ivar length: of main frames, in bytes.
+    :ivar extra: an additional frame follows each main frame.
     """
 
+    exchange: CyclicExchange[list[bytes]]
+
     def __init__(self, drives: Sequence[DriveConfiguration]) -> None:
-        self._lead = own = drives[0]
-        self.broadcast = broadcast_identifier(own) or 0
-        self.places = max(values_needed(drive) for drive in drives)
+        self._lead = lead = drives[0]
+        self._broadcast = broadcast_identifier(lead)
+        self._extended: bool = lead.options.extended_identifiers
+        self._swap: bool = lead.options.swap_setpoints_2_3
+        places = max(values_needed(drive) for drive in drives)
+        self.length = main_length(min(places, MAIN_VALUES))
+        self.extra = places > MAIN_VALUES
         self.control = make_control(
-            parameter_set=own.options.parameter_set, timeout=own.control_timeout,
-            members=[drive.name for drive in drives], unheard=self._unheard)
-        self._asked_by: dict[ControlRequest, CannordSession] = {}
+            parameter_set=lead.options.parameter_set, timeout=lead.control_timeout,
+            members=[] if self.alone else [drive.name for drive in drives],
+            unheard=self._unheard)
+        self._asked_by: dict[ControlRequest, Session] = {}
         self._turn = 0
         self._turn_begun = 0    # what it was when this cycle began
-        self.members: list[CannordSession] = []
-        self.members = [CannordSession(drive, self) for drive in drives]
+        self._members: list[Member] = []
+        self._sessions: list[Session] = []
 
-    def is_leader(self, drive: DriveConfiguration) -> bool:
-        """Tell whether an inverter leads the group."""
-        return drive is self._lead
+    def join(self, session: Session, identifier: int, expect: Callable[[float, float], None],
+             settled: Callable[[], None] | None) -> Answers:
+        """
+        Take an inverter in.
+
+        :param expect: as of :class:`Member`.
+        :param settled: as of :class:`.Answers`.
+        """
+        answers: Answers
+        if not self._members:
+            answers = self.exchange = CyclicExchange(
+                session, self._encode, self._send, slot=0, silence=_SILENCE, advice=_ADVICE,
+                settled=settled, in_turn=not self.alone)
+        else:
+            answers = Answers(session, silence=_SILENCE, advice=_ADVICE, settled=settled,
+                              in_turn=True)
+            self.exchange.audience.append(answers)
+            session.sent = self._leader.sent
+        self._members.append(Member(session, identifier, answers, expect))
+        self._sessions.append(session)
+        session.partners = self._sessions
+        return answers
 
     @property
-    def leader(self) -> CannordSession:
-        """The session that sends for all."""
-        return self.members[0]
+    def alone(self) -> bool:
+        """It is one inverter that is addressed by itself."""
+        return self._broadcast is None
+
+    @property
+    def leads(self) -> str:
+        """Name of the inverter that takes the commands for all."""
+        return self._lead.name
+
+    @property
+    def _leader(self) -> Session:
+        return self._members[0].session
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def send(self, payloads: list[bytes], now: float) -> None:
+    def _encode(self, raws: list[int]) -> list[bytes]:
+        word, *values = raws
+        words = [setpoint.parameter.word_from_raw(raw)
+                 for setpoint, raw in zip(self._leader.setpoints.items, values)]
+        payloads = [encode_main(word, words[:MAIN_VALUES], length=self.length, swap=self._swap)]
+        if self.extra:
+            payloads.append(encode_extra(words[MAIN_VALUES:]))
+        return payloads
+
+    def _send(self, payloads: list[bytes], now: float) -> None:
         """Send a cycle: to all, and to one or some of them alone."""
-        leader, members = self.leader, self.members
-        exchange, count = leader.exchange, len(members)
-        stopping = leader.stage is Stage.STOPPING
+        exchange, members = self.exchange, self._members
+        if self._broadcast is None:
+            self._put(members[0].identifier, payloads)
+            members[0].expect(now, math.inf)
+            return
+        stopping, count = self._leader.stage is Stage.STOPPING, len(members)
         if stopping and exchange.again:     # nobody of a stop is left out for that
             self._turn = self._turn_begun
         self._turn_begun = self._turn
-        leader.send(self.broadcast, payloads, *(member.exchange for member in members))
+        self._put(self._broadcast, payloads, *exchange.audience)
         if exchange.insisting:
-            alone = [member for member in members if member.unshown]
+            alone = [member for member in members if member.session.unshown]
         else:   # a stop reaches also those that do not listen to broadcasts
             turns = math.ceil(count / STOP_CYCLES) if stopping else 1
             alone = [members[(self._turn + place) % count] for place in range(turns)]
             self._turn = (self._turn + turns) % count
         for member in alone:
-            leader.send(member.request_identifier, payloads, member.exchange)
-            member.exchange.settle(now)
-            member.expect_answer(now, now + leader.configuration.period, runs=exchange.runs)
+            self._put(member.identifier, payloads, member.answers)
+            member.answers.settle(now)
+            member.expect(now, now + self._lead.period)
 
-    def cycle_left(self) -> None:
-        """Record that a cycle has left: it told everybody the same."""
-        for member in self.members[1:]:
-            member.sent.raws = self.leader.sent.raws
-
-    # -- the end of a stop ------------------------------------------------------------------------
-
-    def unheard(self) -> bool:
-        """Tell whether an inverter that ran has not answered since all were told to stop."""
-        return any(member.unshown for member in self.members)
-
-    def stop_left(self, now: float) -> None:
-        """End the stop of all: who ran and did not answer may still be running."""
-        for member in self.members:
-            member.duty.happened(Happened.SILENT)
-            if not member.stopped:
-                member.stop_left()
+    def _put(self, identifier: int, payloads: list[bytes], *to: Answers) -> None:
+        for payload in payloads:
+            self.exchange.put(Frame(identifier, payload, self._extended), *to)
 
     # -- what becomes of its members --------------------------------------------------------------
 
-    def member_found(self, member: CannordSession) -> None:
-        """Record that an inverter of the group came online: it must not jump."""
-        self.leader.setpoints.disarm()
-        self.control.member_found(member.configuration.name)
+    def forget(self, session: Session) -> None:
+        """Record that what an inverter reported before the bridge ended is outdated."""
+        self.control.member_lost(session.configuration.name)
 
-    def member_lost(self, member: CannordSession) -> None:
-        """Record that an inverter of the group is offline."""
-        if member.active:       # else the bridge ends: what it reported last is to be told
-            self.control.member_lost(member.configuration.name)
-            self.leader.gate.follow()
+    def found(self, session: Session) -> None:
+        """Record that an inverter came online: those of a group must not jump."""
+        if not self.alone:
+            self._leader.setpoints.disarm()
+            self.control.member_found(session.configuration.name)
+
+    def lost(self, session: Session) -> None:
+        """Record that an inverter is offline."""
+        if session.active:      # else the bridge ends: what it reported last is to be told
+            self.control.member_lost(session.configuration.name)
+            self._leader.gate.follow()
 
     def end(self, reason: Sentence, now: float) -> None:
         """Record that all are stopped: that, and no member that goes, takes the enable back."""
         self.control.withdraw(reason, now, lost=False)
 
-    def member_status(self, member: CannordSession, word: int, now: float) -> None:
-        """Take the status word of an inverter that is led."""
-        self.control.status_received(word, now, member.configuration.name)
-        self.leader.control_changed(now)
+    def status(self, session: Session, word: int, now: float) -> None:
+        """Take the status word of an inverter."""
+        self.control.status_received(word, now, '' if self.alone else session.configuration.name)
+        self._leader.control_changed(now)
 
     def _unheard(self) -> Sentence:
         """Say which inverters were told to run, and have not answered since they were stopped."""
-        names = [member.configuration.name for member in self.members
-                 if member.unshown and not member.online]
+        names = [session.configuration.name for session in self._sessions
+                 if session.unshown and not session.online]
         return sentences.members_may_run(names) if names else NOTHING
 
     # -- what the leader does for all -------------------------------------------------------------
 
-    def control_refusal(self, member: CannordSession, action: ControlAction,
+    def control_refusal(self, session: Session, action: ControlAction,
                         refusal: Sentence) -> Sentence:
         """
         Say why a control action cannot be asked for; '' if it can.
 
         :param refusal: what would be said of an inverter alone.
         """
-        if member is not self.leader and action not in _STOPS:
-            lead = self._lead.name
-            return sentences.group_is_led(lead, _SERVICES[action])
+        if session is not self._leader and action not in _STOPS:
+            return sentences.group_is_led(self.leads, _SERVICES[action])
         # a stop is good for those that are there
-        there = any(each.online for each in self.members)
+        there = any(each.online for each in self._sessions)
         return NOTHING if refusal.code == 'drive_offline' and there else refusal
 
-    def stop_for(self, member: CannordSession, request: ControlRequest, now: float) -> None:
+    def stop_for(self, session: Session, request: ControlRequest, now: float) -> None:
         """Stop all, as a user of an inverter that is led has asked for: none stops alone."""
-        self._asked_by[request] = member
+        self._asked_by[request] = session
         self.control.request(request, now)
-        self.leader.control_changed(now)
+        self._leader.control_changed(now)
 
     def delivered(self, events: list[Event]) -> list[Event]:
         """Hand the outcomes of such requests to whom they belong; return all other events."""
@@ -173,33 +223,23 @@ class Group:
             return events
         others = []
         for event in events:
-            member = (self._asked_by.pop(event.request, None)
-                      if isinstance(event, ControlCompleted) else None)
-            if member is None:
+            session = (self._asked_by.pop(event.request, None)
+                       if isinstance(event, ControlCompleted) else None)
+            if session is None:
                 others.append(event)
             else:
-                member.report.note(event)
+                session.report.note(event)
         return others
 
     def cyclic_refusal(self, parameter: Parameter) -> Sentence:
         """Say why a setpoint of an inverter that is led is not written by request."""
-        return sentences.sent_by_group(parameter.name, self._lead.name)
+        return sentences.sent_by_group(parameter.name, self.leads)
 
-    @property
-    def leads(self) -> str:
-        """Name of the inverter that takes the commands for all."""
-        return self._lead.name
-
-    def fact(self, member: CannordSession) -> str:
+    def facts(self, session: Session) -> dict[str, str]:
         """Say who leads whom."""
-        if member is not self.leader:
-            return f'led by {self._lead.name}'
-        return f'leads {", ".join(each.name for each in self._others) or "nobody else"}'
-
-    @property
-    def _others(self) -> list[DriveConfiguration]:
-        return [member.configuration for member in self.members[1:]]
-
-
-_STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
-_SERVICES = {ControlAction.ENABLE: 'enable', ControlAction.RESET_FAULT: 'reset_fault'}
+        if self.alone:
+            return {}
+        if session is not self._leader:
+            return {'broadcast': f'led by {self.leads}'}
+        led = ', '.join(each.configuration.name for each in self._sessions[1:])
+        return {'broadcast': f'leads {led or "nobody else"}'}

@@ -808,6 +808,20 @@ def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
         ('lift', says('may_still_be_running', why=says('bus_lost_before_stop')))]
 
 
+def test_a_frame_that_answers_nothing_does_not_show_that_a_stop_was_heard() -> None:
+    """What a member has shown to have heard ends with the next broadcast that may run it."""
+    bus = three()
+    bus.asks(ENABLE)
+    assert [text for _, text in bus.live(0.02)] == ['400#7F040000', '002#7F040000']
+    bus.asks(DISABLE)
+    assert [text for _, text in bus.live(0.02)] == ['400#7E040000', '004#7E040000']
+    bus.hears(f'007#{READY}')       # twice, say: it was asked before enable only
+    for session in bus.sessions:
+        session.bus_down(bus.now, 'unplugged')
+    bus.pump()
+    assert [name for name, _ in worries(bus)] == ['lift', 'turn'], 'hoist has answered its stop'
+
+
 def test_stall_reopened_bus_and_signal() -> None:
     bus = driven()
     for session in bus.sessions:

@@ -1,0 +1,138 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What one drive answers to the cycles that it is told by, whoever sends them.
+
+An answer that does not come in time is missed, and after ``missed_limit`` of those in a row the
+drive is lost. What it answers to cycles of before shows nothing (:mod:`.exchange_book`).
+"""
+
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import Do, Happened
+from drive_can_bridge.protocols.cycle_timer import CycleTimer
+from drive_can_bridge.protocols.exchange_book import ExchangeBook
+
+
+class Answers:
+    """
+    The answers of one drive.
+
+    :param silence: what is said of a drive that does not answer.
+    :param advice: what to look at then.
+    :param missed: (why the drive counts as lost, '' if it does not yet; now): what becomes of a
+        cycle that was not answered, unless the drive is being stopped; None: it is lost.
+    :param settled: called when an exchange ends, answered or not.
+    :param in_turn: not each cycle asks this drive: whoever asks it settles the one before.
+    :param timer: says when cycles are due, where others are in step; None: one of its own.
+    :ivar session: of the drive.
+    :ivar book: counts the cycles, and the answers.
+    :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
+    """
+
+    def __init__(self, session: Session, *, silence: str, advice: str = '',
+                 missed: Callable[[Sentence, float], None] | None = None,
+                 settled: Callable[[], None] | None = None, in_turn: bool = False,
+                 timer: CycleTimer | None = None) -> None:
+        self.session = session
+        self.book = ExchangeBook(session.configuration, session.statistics, timer)
+        self.heeded = True
+        self._silence, self._advice = silence, advice
+        self._missed = missed or self._lose
+        self._settled = settled
+        self._in_turn = in_turn
+        self._answer_due = math.inf
+
+    def next_timer(self) -> float:
+        """Return when an answer counts as missed; infinity: with the next cycle."""
+        return self._answer_due
+
+    def handle_timer(self, now: float) -> None:
+        """Settle what is due."""
+        if now >= self._answer_due:
+            self.settle(now)
+
+    def stop(self) -> None:
+        """Expect no answer; one on its way is no surprise, though."""
+        self.forget()
+        self.book.expect_nothing()
+        self._answer_due = math.inf
+
+    def expect(self, now: float, until: float, *, runs: bool) -> None:
+        """
+        Record that the drive was sent a cycle.
+
+        :param until: when the answer counts as missed; infinity: with the next cycle.
+        :param runs: it holds anything but neutral and ``disable``.
+        """
+        self.book.asked(now, runs=runs)
+        self._answer_due = until
+
+    def expects(self, what: str, now: float, received_at: float) -> bool:
+        """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
+        if self.wanted:
+            return True
+        late = self.book.late(received_at)
+        if late is not None or not self.book.take_stale():
+            self.session.report.unasked(sentences.unasked(what), late, now)
+        self._heed()
+        return False
+
+    def answered(self, received_at: float) -> None:
+        """Record the answer to the last cycle."""
+        book = self.book
+        missed = not book.awaiting
+        book.answered(received_at)
+        book.heard(received_at)
+        if missed:
+            self.session.report.unasked(NOTHING, book.overdue, received_at)
+        self._heed()
+
+    @property
+    def wanted(self) -> bool:
+        """
+        An answer would belong to the last cycle.
+
+        Of a stop, all do that may still come; of drives that are asked in turn, also one that is
+        missed, as long as the next has not been asked for.
+        """
+        book = self.book
+        return book.awaiting or book.outstanding and (
+            self._in_turn or self.session.stage is Stage.STOPPING)
+
+    def _heed(self) -> None:
+        """Record that the drive has shown to have heard what it was told last, if it has."""
+        if self.heeded and self.book.stop_shown:
+            self.session.duty.happened(Happened.ANSWERED)
+        if self.book.stop_shown:
+            self.session.neutral_stop.answered()
+
+    def settle(self, now: float) -> None:
+        """End an exchange: what has not arrived by now does not count for it any more."""
+        self._answer_due = math.inf
+        if self._settled is not None:
+            self._settled()
+        book, session = self.book, self.session
+        if book.awaiting:
+            too_many = book.missed()
+            if session.stage is not Stage.STOPPING:
+                limit = session.configuration.missed_limit
+                self._missed(sentences.silent_for_cycles(self._silence, limit) if too_many else
+                             NOTHING, now)
+
+    def forget(self) -> None:
+        """Count anew what is missed."""
+        self.book.missed_in_row = 0
+
+    def _lose(self, reason: Sentence, now: float) -> None:
+        if reason:
+            self.forget()
+            session = self.session
+            if session.online:
+                session.lose(reason, now)
+            elif session.duty.happened(Happened.UNANSWERED) is Do.STOP_BY_NUMBER:
+                session.report.warn(sentences.stop_not_answered(), may_run=True)
+            session.report.advice = sentences.silent(self._silence, self._advice)
