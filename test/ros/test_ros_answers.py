@@ -232,12 +232,13 @@ def test_rclpy_answers_where_anything_is_other_than_expected(
     for unfit in (_other_place, _no_address, _too_small, _other_fields, _no_library, _no_function,
                   _no_capsule):
         told: list[str] = []
-        answers = Answers(lambda topic, text: told.append(text), told.append, REAL)
+        answers = Answers(lambda _, text, told=told: told.append(text), told.append, REAL)
         with pytest.MonkeyPatch.context() as patched, \
                 called(client, _client_context, answers, f'~/{unfit.__name__}') as caller:
             unfit(patched)
             assert [caller.ask(), caller.ask()] == ['an answer'] * 2, unfit
-            assert len(told) == 1 and told[0].startswith('answers hold up the whole process'), unfit
+            line, = told
+            assert line.startswith('answers hold up the whole process'), unfit
         answers.stop()
 
 
