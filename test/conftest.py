@@ -52,7 +52,7 @@ import real
 from told_again import ToldAgain
 
 sys.path.insert(0, str(Path(__file__).with_name('clocked')))
-import world  # noqa: E402, I100, I202
+import world  # noqa: I100, I202
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'

@@ -47,6 +47,7 @@ class Graph:
 
     def __init__(self, clock: JumpingClock) -> None:
         self.clock = clock
+        self.stamp = clock.stamp    # of the middleware, whatever a story shows the bridge
         self.nodes: list[Node] = []
         self.publishers: list[Publisher] = []
         self.subscriptions: list[Subscription] = []
@@ -444,7 +445,7 @@ class Publisher(TopicEnd):
     def publish_raw(self, data: bytes) -> None:
         """Publish the bytes of a message."""
         self.check()
-        sample = bytes(data), self.graph.clock.stamp(), next(self._number)
+        sample = bytes(data), self.graph.stamp(), next(self._number)
         if self.latched:
             self.kept.append(sample)
         for each in self.peers(self.graph.subscriptions):
@@ -476,7 +477,7 @@ class Subscription(TopicEnd):
         """Take what was published."""
         data, stamp, number = sample
         self._queue.append((data, {
-            'source_timestamp': stamp, 'received_timestamp': self.graph.clock.stamp(),
+            'source_timestamp': stamp, 'received_timestamp': self.graph.stamp(),
             'publication_sequence_number': number, 'reception_sequence_number': None}))
         self.ring()
 
@@ -576,7 +577,7 @@ class Service(Entity):
         if not self._queue:
             return None, None
         data, request = self._queue.popleft()
-        return real.rclpy_deserialize(data, kind), _Info(request, self.graph.clock.stamp())
+        return real.rclpy_deserialize(data, kind), _Info(request, self.graph.stamp())
 
     def service_send_response(self, response: Any, request: RequestId) -> None:
         """Answer; nobody gets the answer to one who has gone."""
@@ -642,7 +643,7 @@ class Client(Entity):
         if not self._queue:
             return None, None
         data, request = self._queue.popleft()
-        return _Info(request, self.graph.clock.stamp()), real.rclpy_deserialize(data, kind)
+        return _Info(request, self.graph.stamp()), real.rclpy_deserialize(data, kind)
 
     def service_server_is_available(self) -> bool:
         """Somebody offers it."""
@@ -783,7 +784,7 @@ class Clock(Destroyable):
         elif self._active:
             nanoseconds = self._simulated or 0
         else:
-            nanoseconds = clock.stamp()
+            nanoseconds = self.graph.stamp()
         return real.rcl_time_point_t(nanoseconds, int(self._kind))
 
     def get_ros_time_override_is_enabled(self) -> bool:
@@ -891,7 +892,7 @@ def _log(graph: Graph, severity: Any, name: str, message: str, function: str = '
     graph.tell(f'{name}: {message}')
     for node in graph.nodes:
         if node.rosout is not None and name in node.loggers and node.context.ok():
-            seconds, nanoseconds = divmod(graph.clock.stamp(), 10 ** 9)
+            seconds, nanoseconds = divmod(graph.stamp(), 10 ** 9)
             text = Log(level=int(severity), name=name, msg=message, file=file, function=function,
                        line=line)
             text.stamp.sec, text.stamp.nanosec = seconds, nanoseconds

@@ -218,6 +218,10 @@ class JumpingClock:
         self.wait(self._time + seconds)
         self.check()
 
+    def stand_still(self, seconds: float) -> None:
+        """Let time pass in which nobody runs."""
+        self._time += seconds
+
     def until(self, condition: Callable[[], Any], what: str = '', limit: float = 60.0,
               look: float = 0.001) -> Any:
         """Let time pass until a condition holds; return what it returned."""

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from builders import drive, frame
-from clocks import HandClock, REAL
+from clocks import HandClock
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route
@@ -93,7 +94,7 @@ class Bench:
     """An exchange on the bench."""
 
     def __init__(self, *drives: DriveConfiguration, sessions: Sequence[Session] = (),
-                 real_time: bool = False) -> None:
+                 clock: Clock | None = None) -> None:
         drives = drives or (drive(name='first', station=1), drive(name='second', station=2))
         self.now = 10.0
         self.step = 0.0
@@ -104,7 +105,7 @@ class Bench:
         self.bus_notes = BusNotes()
         self.exchange = BusExchange(
             BusConfiguration('main', 'virtual', 'x'), self.sessions, self.routes, self.bus_notes,
-            REAL if real_time else HandClock(self.clock),
+            clock or HandClock(self.clock),
             overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives])
         self.link = FakeLink()
         self.exchange.link = self.link  # type: ignore[assignment]

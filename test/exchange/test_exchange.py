@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The exchange of one bus, without a bus: routing, time, stops, and who is told what."""
 
-import threading
 import time
 
 from builders import (
@@ -9,9 +8,11 @@ from builders import (
 )
 from clocks import HandClock, REAL
 from exchange_builders import all_routes, Bench, BusNotes
+from jumping import JumpingClock
 import pytest
 from saying import says
 from waiting import wait_for
+import world
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -27,6 +28,11 @@ ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
 ASK_MAP_1, ASK_MAP_2 = f'002007A4#{ZEROS}', f'004007A4#{ZEROS}'
 ANSWER = '103FFFF0#03E800FA00010000'
+
+
+@pytest.fixture(name='clock')
+def _clock(bench: world.World) -> JumpingClock:
+    return bench.clock
 
 
 # -- routing --------------------------------------------------------------------------------------
@@ -258,9 +264,8 @@ def test_deactivate_waits_for_the_neutral_cycles() -> None:
     assert not bench.exchange.active
 
 
-@pytest.mark.real
-def test_deactivate_with_the_timer_thread() -> None:
-    bench = Bench(drive(period=0.005, mapping='assume'), real_time=True)
+def test_deactivate_with_the_timer_thread(clock: JumpingClock) -> None:
+    bench = Bench(drive(period=0.005, mapping='assume'), clock=clock)
     bench.exchange.bus_opened()
     bench.exchange.open()
     assert bench.link.started
@@ -273,7 +278,7 @@ def test_deactivate_with_the_timer_thread() -> None:
     assert bench.sessions[0].stopped
     bench.exchange.close()
     assert bench.link.stopped
-    assert not any(thread.name == 'exchange main' for thread in threading.enumerate())
+    assert not clock.tasks
     assert bench.bus_notes.told == [('opened', 'main')]
 
 
@@ -514,14 +519,13 @@ def test_defect_of_the_reader_is_fatal() -> None:
     assert bench.exchange.bus_state == 'failed'
 
 
-@pytest.mark.real
-def test_defect_in_the_timer_thread_is_told_not_swallowed() -> None:
-    bench = Bench(drive(mapping='assume', period=0.005), real_time=True)
-    failing = threading.Event()
+def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -> None:
+    bench = Bench(drive(mapping='assume', period=0.005), clock=clock)
+    failing = False
 
     class Broken:
         def run(self, now: float) -> float:
-            if failing.is_set():
+            if failing:
                 raise ZeroDivisionError('a defect')
             return now + 0.01
     bench.exchange.errand = Broken()  # type: ignore[assignment]
@@ -529,7 +533,7 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed() -> None:
     bench.exchange.open()
     bench.exchange.activate()
     wait_for(lambda: bench.link.sent)
-    failing.set()
+    failing = True
     wait_for(lambda: len(bench.bus_notes.told) > 1)
     assert bench.bus_notes.told[-1] == (
         'fatal', 'main', 'internal error: ZeroDivisionError: a defect', False)

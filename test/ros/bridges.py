@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A bridge with the drives at the other end of its buses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import copy
 import gc
 import itertools
@@ -20,9 +21,9 @@ import waiting
 import world
 import yaml
 
-from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.executor_thread import ExecutorThread
 from drive_can_bridge.simulation.plant import Mechanics
@@ -69,15 +70,13 @@ class Bridge:
     :param autostart: configure and activate.
     :param key: to whom the parameter file is addressed.
     :param mechanics: what simulated motors carry, by drive.
-    :param clock: of the bridge.
     """
 
     def __init__(self, directory: Path, content: Any = None, *, arguments: tuple[str, ...] = (),
                  simulated: bool = True, autostart: bool = True,
                  key: str = '/**/drive_can_bridge',
-                 mechanics: dict[str, Mechanics] | None = None,
-                 clock: Clock | None = None) -> None:
-        clock = clock or waiting.clock()
+                 mechanics: dict[str, Mechanics] | None = None) -> None:
+        clock = waiting.clock()
         number = next(_COUNTER)
         self.file = directory / f'bridge_{number}.yaml'
         if not isinstance(content, str):
@@ -238,6 +237,16 @@ class ClockedRecorder(Recorder):
     def send(self, identifier: int, data: bytes, *, extended: bool = True) -> None:
         """Send a frame as a stranger."""
         self._wire.carry(Frame(identifier, data, extended))
+
+
+@contextmanager
+def late(exchange: BusExchange) -> Iterator[None]:
+    """Keep an exchange, but nobody else, from going on."""
+    # its own lock is for what does not wait: whoever has it keeps the turn
+    lock = waiting.clock().lock()
+    exchange.lock = lock    # type: ignore[assignment]
+    with lock:
+        yield
 
 
 StartBridge = Callable[..., Bridge]

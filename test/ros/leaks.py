@@ -7,6 +7,7 @@ import time
 
 import can.interfaces.virtual
 from clients import Client, is_client, patience
+import waiting
 
 from drive_can_bridge.ros.drive_node import DriveNode
 
@@ -16,7 +17,8 @@ THREADS = ('bus ', 'exchange ', 'services', 'simulation ', 'stop ')
 
 def threads() -> list[str]:
     """Return the names of running threads of bridges and simulations."""
-    return [thread.name for thread in threading.enumerate() if thread.name.startswith(THREADS)]
+    running = threading.enumerate() if waiting.virtual is None else waiting.virtual.tasks
+    return [thread.name for thread in running if thread.name.startswith(THREADS)]
 
 
 def open_channels() -> list[str]:

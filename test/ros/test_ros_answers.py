@@ -2,6 +2,7 @@
 """Answers to callers that the middleware does not reach, and to all others."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import struct
 import threading
 import time
@@ -14,6 +15,8 @@ import pytest
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
 from std_srvs.srv import Trigger
+from waiting import clock
+from world import World
 
 from drive_can_bridge.ros import answers as answers_module, rcl_response
 from drive_can_bridge.ros.answers import Answers, WAITING_MAX
@@ -22,8 +25,7 @@ from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unr
 from drive_can_bridge.ros.service_thread import ServiceThread
 
 #: what DDS does (test/real.py)
-pytestmark = pytest.mark.real
-
+REAL_DDS = pytest.mark.real
 #: a hundred of them would fit into the wait of the middleware
 TICK = 0.001
 #: so many show that the interpreter was not held
@@ -64,8 +66,8 @@ def _told() -> list[str]:
 
 
 @pytest.fixture(name='answers')
-def _answers(told: list[str]) -> Iterator[Answers]:
-    answers = Answers(lambda topic, text: told.append(text), told.append, REAL)
+def _answers(told: list[str], bench: World | None) -> Iterator[Answers]:
+    answers = Answers(lambda topic, text: told.append(text), told.append, clock())
     yield answers
     answers.stop()
 
@@ -95,6 +97,7 @@ def _warnings(recwarn: pytest.WarningsRecorder) -> list[str]:
             if issubclass(warning.category, RuntimeWarning)]
 
 
+@REAL_DDS
 def test_no_answer_of_the_process_holds_the_interpreter_for_a_caller_out_of_reach(
         bridge: StartBridge, client: Client, ticks: Ticks, monkeypatch: pytest.MonkeyPatch,
         recwarn: pytest.WarningsRecorder, capfd: pytest.CaptureFixture[str]) -> None:
@@ -129,6 +132,7 @@ def test_no_answer_of_the_process_holds_the_interpreter_for_a_caller_out_of_reac
     assert not any(word in shown for word in ('Traceback', 'Warning', 'error_handling')), shown
 
 
+@REAL_DDS
 def test_others_are_answered_as_ever_and_as_by_rclpy(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
@@ -154,11 +158,12 @@ def test_others_are_answered_as_ever_and_as_by_rclpy(
 class Caller:
     """A service in a thread of its own, and somebody who calls it."""
 
-    def __init__(self, client: Client, context: ClientContext, answers: Answers) -> None:
+    def __init__(self, client: Client, context: ClientContext, answers: Answers,
+                 name: str) -> None:
         self.client = client
         self.errors: list[str] = []
         self.service = client.node.create_service(
-            Trigger, '~/asked', lambda *_: None, callback_group=PolledGroup(),
+            Trigger, name, lambda *_: None, callback_group=PolledGroup(),
             qos_profile=qos_profile_parameters)
         self.thread = ServiceThread('control', context.context, self.errors.append, REAL,
                                     send=answers.send)
@@ -176,12 +181,20 @@ class Caller:
         return str(future.result().message)
 
 
-@pytest.fixture(name='caller')
-def _caller(client: Client, _client_context: ClientContext, answers: Answers) -> Iterator[Caller]:
-    caller = Caller(client, _client_context, answers)
+@contextmanager
+def called(client: Client, context: ClientContext, answers: Answers,
+           name: str) -> Iterator[Caller]:
+    """Offer a service, and call it."""
+    caller = Caller(client, context, answers, name)
     yield caller
     caller.thread.stop()
     assert not caller.errors
+
+
+@pytest.fixture(name='caller')
+def _caller(client: Client, _client_context: ClientContext, answers: Answers) -> Iterator[Caller]:
+    with called(client, _client_context, answers, '~/asked') as caller:
+        yield caller
 
 
 def _other_place(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,16 +226,23 @@ def _no_capsule(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rcl_response, '_functions_of', lambda kind: functions(int))
 
 
-@pytest.mark.parametrize('unfit', [
-    _other_place, _no_address, _too_small, _other_fields, _no_library, _no_function, _no_capsule])
+@REAL_DDS
 def test_rclpy_answers_where_anything_is_other_than_expected(
-        caller: Caller, told: list[str], unfit: Callable[[pytest.MonkeyPatch], None],
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    unfit(monkeypatch)
-    assert [caller.ask(), caller.ask()] == ['an answer'] * 2
-    assert len(told) == 1 and told[0].startswith('answers hold up the whole process')
+        client: Client, _client_context: ClientContext) -> None:
+    for unfit in (_other_place, _no_address, _too_small, _other_fields, _no_library, _no_function,
+                  _no_capsule):
+        told: list[str] = []
+        answers = Answers(lambda _, text, told=told: told.append(text), told.append, REAL)
+        with pytest.MonkeyPatch.context() as patched, \
+                called(client, _client_context, answers, f'~/{unfit.__name__}') as caller:
+            unfit(patched)
+            assert [caller.ask(), caller.ask()] == ['an answer'] * 2, unfit
+            line, = told
+            assert line.startswith('answers hold up the whole process'), unfit
+        answers.stop()
 
 
+@REAL_DDS
 def test_python_does_not_warn_where_rclpy_answers(
         caller: Caller, client: Client, answers: Answers, monkeypatch: pytest.MonkeyPatch,
         recwarn: pytest.WarningsRecorder) -> None:
@@ -236,6 +256,7 @@ def test_python_does_not_warn_where_rclpy_answers(
     assert not _warnings(recwarn)
 
 
+@REAL_DDS
 def test_a_service_may_be_destroyed_while_its_answer_is_sent(
         caller: Caller, client: Client, told: list[str], ticks: Ticks,
         monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,7 +292,7 @@ class FakeRcl:
 
     def __init__(self) -> None:
         self.lost = {b'lost'}
-        self.go_on = threading.Event()
+        self.go_on = False
         self.sent: list[tuple[bytes, Any, str]] = []
 
     def prepare(self, service: Any, message: Any, header: bytes) -> Any:
@@ -282,7 +303,7 @@ class FakeRcl:
         """Wait for callers out of reach, but for the first time."""
         late = threading.current_thread().name == 'late answers'
         if late:
-            assert self.go_on.wait(60.0)
+            wait_until(lambda: self.go_on)
         if response.caller in self.lost:
             raise Unreachable
         self.sent.append((response.caller, response.message, 'late' if late else 'at once'))
@@ -300,7 +321,8 @@ class FakeService:
 
 
 def test_a_client_out_of_reach_delays_others_once(
-        answers: Answers, told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+        bench: World, answers: Answers, told: list[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
     rcl = FakeRcl()
     monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
     service: Any = FakeService()
@@ -315,7 +337,7 @@ def test_a_client_out_of_reach_delays_others_once(
         answers.send(service, number, b'lost')
     assert len(told) >= 2 and len(set(told)) == 1
     rcl.lost.clear()                        # it was discovered only halfway
-    rcl.go_on.set()
+    rcl.go_on = True
     wait_until(lambda: (b'lost', 0, 'late') in rcl.sent)
     wait_until(lambda: b'lost' not in answers._waiting)
     answers.send(service, 8, b'lost')
@@ -325,17 +347,17 @@ def test_a_client_out_of_reach_delays_others_once(
 
 
 def test_what_waits_for_clients_out_of_reach_does_not_outlast_the_end(
-        answers: Answers, monkeypatch: pytest.MonkeyPatch) -> None:
+        bench: World, answers: Answers, monkeypatch: pytest.MonkeyPatch) -> None:
     rcl = FakeRcl()
     monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
     service: Any = FakeService()
     for number in range(3):
         answers.send(service, number, b'lost')
     rcl.lost.clear()
-    ending = threading.Thread(target=answers.stop)
+    ending = clock().worker(answers.stop, 'ending')
     ending.start()
     wait_until(lambda: answers._ending)
-    rcl.go_on.set()
+    rcl.go_on = True
     ending.join(60.0)
     assert not ending.is_alive() and len(rcl.sent) <= 1
     answers.send(service, 4, b'other')      # who is in reach is answered to the end

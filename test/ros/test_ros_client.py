@@ -14,7 +14,7 @@ from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import qos_profile_parameters
 from rclpy.task import Future
-from waiting import clock
+from waiting import clock, pause
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled
@@ -150,13 +150,12 @@ def _sees(client: Client, bridge: str, *others: str) -> bool:
     return client.get(bridge, 'bridges') == [list(others)]
 
 
-@pytest.mark.real
 def test_services_that_are_found_one_by_one(client: Client) -> None:
     def greet(_: Any, response: Any) -> Any:
         def later() -> None:
-            timer.cancel()
+            pause(0.5)
             tell()
-        timer = client.node.create_timer(0.5, later)
+        clock().worker(later, 'later').start()
         return response
     tell = answer(client, '/slow/bridge', drives='conveyor lift', greet=greet)
     source = find_source(namespace='slow')

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Clocks say what they like while drives move: nothing happens."""
 
-import threading
+from collections.abc import Callable
 import time
 from typing import Any
 
@@ -16,23 +16,16 @@ from rclpy.clock import Clock
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from waiting import clock
 
 from drive_can_bridge.ros.stamps import Stamps
 
-REAL_TIME, REAL_TIME_NS = time.time, time.time_ns
 
-
-@pytest.mark.real
 @pytest.mark.parametrize('hours', [-48.0, 48.0], ids=['back', 'forward'])
 def test_clock_that_is_set(bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
                            hours: float) -> None:
     offset = [0.0]
-
-    def set_time() -> float:
-        return REAL_TIME() + offset[0]
-    monkeypatch.setattr(time, 'time', set_time)
-    monkeypatch.setattr(time, 'time_ns', lambda: REAL_TIME_NS() + int(offset[0] * 1e9))
-    monkeypatch.setattr('can.bus.time', set_time)
+    set_clock(monkeypatch, lambda true: true + int(offset[0] * 1e9))
     one = bridge(parameters(conveyor=CONVEYOR))
     one.online()
     session = one.node.drives['conveyor'].session
@@ -53,6 +46,12 @@ def test_clock_that_is_set(bridge: StartBridge, client: Client, monkeypatch: pyt
     assert not one.errors
 
 
+def set_clock(monkeypatch: pytest.MonkeyPatch, shown: Callable[[int], int]) -> None:
+    """Have the time of the day shown otherwise from now on: ns since 1970."""
+    true = clock().stamp
+    monkeypatch.setattr(clock(), 'stamp', lambda: shown(true()))
+
+
 def silent(_: str) -> None:
     raise AssertionError('nothing is to be told')
 
@@ -63,7 +62,6 @@ def test_a_stamp_is_that_of_the_moment_not_of_the_look() -> None:
     assert before - 1000.001 <= seconds + 1e-9 * nanoseconds <= time.time() - 999.999
 
 
-@pytest.mark.real
 def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """In all messages with that sample, and as long as it is the last one."""
@@ -79,11 +77,12 @@ def test_a_sample_has_one_stamp_when_the_clock_is_set_behind_it(
     one.played['conveyor'].fault('silent')
     statistics = one.node.drives['conveyor'].session.statistics
     wait_until(lambda: statistics.missed > 5)
-    monkeypatch.setattr(time, 'time_ns', lambda: REAL_TIME_NS() + 3_600_000_000_000)
+    before = clock().stamp()
+    set_clock(monkeypatch, lambda true: true + 3_600_000_000_000)
     topics[2].wait()
     response, joint, joints = (topic.last for topic in topics)
     assert response.stamp == joint.header.stamp == joints.header.stamp
-    assert response.stamp.sec < REAL_TIME() + 60
+    assert response.stamp.sec <= before * 1e-9
 
 
 #: s since 1970 that fit into no stamp: int32, and nothing in ROS takes a negative one
@@ -101,7 +100,6 @@ def test_a_time_that_no_stamp_holds_is_0_and_told_once(monkeypatch: pytest.Monke
     assert stamps.now().sec > 0
 
 
-@pytest.mark.real
 @pytest.mark.parametrize('seconds', [2 ** 31 + 5, 2 ** 33, -5])
 def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
@@ -110,11 +108,10 @@ def test_drives_go_on_when_the_system_clock_says_what_no_stamp_holds(
     one.online()
     client.listen()
     topics = stamped_topics(client)
-    monkeypatch.setattr(time, 'time_ns', lambda: seconds * 10 ** 9)
+    set_clock(monkeypatch, lambda _: seconds * 10 ** 9)
     goes_on_without_stamps(one, client, topics)
 
 
-@pytest.mark.real
 @pytest.mark.parametrize('seconds, nanoseconds', [
     (2 ** 31 - 1, 2 ** 32 - 1), (-1, 0), (-2 ** 31, 0)], ids=['2038', 'negative', 'least'])
 def test_drives_go_on_whatever_simulated_time_is_published(
@@ -124,13 +121,13 @@ def test_drives_go_on_whatever_simulated_time_is_published(
     client.listen()
     topics = stamped_topics(client)
     said = [Time(sec=1000)]
-    ending = threading.Event()
+    ending = clock().alarm()
 
     def publish() -> None:
-        while not ending.wait(0.02):
+        while not ending.wait(clock().now() + 0.02):
             client.publish('/clock', ClockMessage(clock=said[0]))
-    clock = threading.Thread(target=publish)
-    clock.start()
+    worker = clock().worker(publish, 'clock')
+    worker.start()
     try:
         have_stamp(topics, Time(sec=1000))
         said[0] = Time(sec=seconds, nanosec=nanoseconds)
@@ -138,8 +135,8 @@ def test_drives_go_on_whatever_simulated_time_is_published(
         said[0] = Time(sec=2000)
         have_stamp(topics, Time(sec=2000))
     finally:
-        ending.set()
-        clock.join()
+        ending.ring()
+        worker.join()
 
 
 def with_joint() -> dict[str, Any]:

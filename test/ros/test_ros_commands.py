@@ -4,14 +4,14 @@
 import math
 from typing import Any
 
-from bridges import Bridge, CONVEYOR, HASTY, parameters, Recorder, StartBridge
+from bridges import Bridge, CONVEYOR, HASTY, late, parameters, Recorder, StartBridge
 from clients import Client, wait_until
-from clocks import HandClock
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
-from waiting import clock, pause
+from waiting import pause
+from world import World
 
 SPEED, LIMIT = '/conveyor/command/speed_setpoint', '/conveyor/command/torque_limit'
 POSITION = '/conveyor/command/position_setpoint'
@@ -149,7 +149,6 @@ def test_refused_commands_do_not_refresh_the_age(bridge: StartBridge, client: Cl
         wait_until(neutral)
 
 
-@pytest.mark.real
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor=CONVEYOR))
@@ -157,11 +156,9 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
     with one.record() as recorder:
         arm(client, recorder)
         exchange, = one.node.exchanges.values()
-        with exchange.lock:     # as long as the exchange is late, and the process does not stand
-            until = clock().now() + 0.5
+        with late(exchange):
             client.publish(SPEED, Float64(data=200.0))
-            while clock().now() < until:
-                pause(0.01)
+            pause(0.5)
         wait_until(lambda: refused(one))
         client.wait_logged('commands thrown away: the exchange was 0')
         cycles_pass(one)
@@ -337,15 +334,12 @@ def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Cli
                        f'(RELIABILITY): nothing is received from it')
 
 
-@pytest.mark.real
-def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client) -> None:
-    lost = [0.0]
-    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}),
-                 clock=HandClock(lambda: clock().now() + lost[0]))
+def test_lost_time_wants_arming_again(bridge: StartBridge, client: Client, bench: World) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'command_timeout': 0}))
     one.online()
     with one.record() as recorder:
         arm(client, recorder)
-        lost[0] = 3.0       # as if the process had stood still for that long
+        bench.clock.stand_still(3.0)
         until_sent(recorder, 0, 0)
         one.online()
         recorder.clear()

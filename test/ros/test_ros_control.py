@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
 
-import threading
 from typing import Any
 
 from bridges import HASTY, LIFT, parameters, StartBridge
@@ -9,6 +8,7 @@ from clients import Client, wait_until
 import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -215,19 +215,18 @@ def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
     assert enable(client) == (False, 'bridge inactive')
 
 
-@pytest.mark.real
 def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
     client.service('/lift/quick_stop', Trigger)
     assert enable(client)[0]
-    reached, go_on = threading.Event(), threading.Event()
+    reached, go_on = clock().alarm(), clock().alarm()
 
     def be_busy() -> None:
-        reached.set()
-        go_on.wait(60.0)
+        reached.ring()
+        go_on.wait(clock().now() + 60.0)
     one.spinner.executor.create_task(be_busy)
-    assert reached.wait(60.0)
+    assert reached.wait(clock().now() + 60.0)
     try:
         with one.record() as recorder:
             answer = client.ask('/lift/quick_stop', Trigger)
@@ -236,4 +235,4 @@ def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) 
         wait_until(answer.done, what='the answer')
         assert answer.result().success
     finally:
-        go_on.set()
+        go_on.ring()

@@ -4,7 +4,7 @@
 import math
 from typing import Any
 
-from bridges import Bridge, CONVEYOR, parameters, StartBridge
+from bridges import Bridge, CONVEYOR, late, parameters, StartBridge
 from clients import Client, wait_until
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -191,7 +191,6 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
     assert speeds(one)['north'] == 1000
 
 
-@pytest.mark.real
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(two())
@@ -199,11 +198,9 @@ def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
     client.publish(COMMANDS, JointState(name=['wj'], velocity=[0.0]))
     wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)
     exchange = one.node.exchanges['main']
-    with exchange.lock:     # as long as the exchange is late, and the process does not stand
-        until = clock().now() + 0.5
+    with late(exchange):
         client.publish(COMMANDS, JointState(name=['wj'], velocity=[30 * RPM]))
-        while clock().now() < until:
-            pause(0.01)
+        pause(0.5)
 
     def refused() -> int:
         return sum(one.node.drives[name].session.statistics.commands_refused

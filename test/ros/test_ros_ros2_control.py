@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 import math
 from pathlib import Path
 import struct
-import threading
 from typing import Any
 
 from bridges import Bridge, cyclic_identifier, Recorder, StartBridge
@@ -24,9 +23,6 @@ from waiting import clock
 import yaml
 
 from drive_can_bridge.simulation.plant import Mechanics
-
-#: a controller with a thread of its own (test/real.py)
-pytestmark = pytest.mark.real
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 AXES = {'shoulder': 1, 'elbow': 2, 'wrist': 3}
@@ -72,12 +68,12 @@ class Manager:
         self.hardware = HardwareTwin(client.node, self.system)
         self.update: Callable[[], None] = lambda: None
         self.crash = ''
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='controllers')
-        self._thread.start()
+        self._ending = clock().alarm()
+        self._worker = clock().worker(self._run, 'controllers')
+        self._worker.start()
 
     def _run(self) -> None:
-        while not self._ending.wait(0.01):
+        while not self._ending.wait(clock().now() + 0.01):
             try:
                 run(self.hardware, self.update)
             except Exception as error:  # noqa: BLE001  outermost loop of a thread
@@ -85,8 +81,8 @@ class Manager:
                 return
 
     def close(self) -> None:
-        self._ending.set()
-        self._thread.join()
+        self._ending.ring()
+        self._worker.join()
         assert not self.crash
         assert not self.hardware.thrown, 'the component is unconfigured, no controller is active'
 
