@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import math
 
-from jumping import JumpingClock
+import can
+from jumping import EPOCH, JumpingClock
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
@@ -62,10 +63,15 @@ class Wire:
 
 
 class End(EndPoint):
-    """One that is connected to it."""
+    """
+    One that is connected to it.
+
+    :ivar witness: sees every message that arrives, as that of a port does.
+    """
 
     def __init__(self, wire: Wire, routes: Sequence[Route] = ()) -> None:
         super().__init__()
+        self.witness: Callable[[can.Message], None] | None = None
         if wire.down:
             raise BusUnavailable(wire.down)
         self.alarm = wire.clock.alarm()
@@ -91,6 +97,10 @@ class End(EndPoint):
             if due <= clock.now():
                 at, frame = self._coming.popleft()
                 self.age = clock.now() - at
+                if self.witness is not None:
+                    self.witness(can.Message(
+                        timestamp=1e-9 * EPOCH + at, arbitration_id=frame.identifier,
+                        is_extended_id=frame.extended, data=frame.data))
                 return frame
             if clock.now() >= until:
                 return None

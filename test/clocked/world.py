@@ -22,7 +22,7 @@ import waiting
 from drive_can_bridge.core.frame import Frame
 
 #: who opens buses by python-can
-_OPENERS = ('transport.link', 'simulation.simulation', 'cli.scan', 'cli.probe')
+_OPENERS = ('transport.link', 'transport.tap', 'simulation.simulation', 'cli.scan', 'cli.probe')
 #: who makes a clock where nobody hands one in
 _OWN_CLOCK = ('cli.main', 'client', 'simulation.simulation')
 #: lines of a story that are shown

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can simulate`` as a user runs it: a process, its output, its signals, its input."""
+"""``drive_can simulate``: what it refuses, and as a process with output, signals and input."""
 
 from collections.abc import Iterator
 import os
@@ -14,11 +14,9 @@ import can
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
-
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
 
 PARAMETERS = """
 /**/drive_can_bridge:
@@ -69,9 +67,11 @@ class Command:
         """Wait for a line of the output."""
         def find() -> str | None:
             lines = self.errors if errors else self.lines
-            return next((line for line in lines if re.search(pattern, line)), None)
-        return str(wait_for(lambda: find() or self.process.poll() is not None and 'ended',
-                            f'line {pattern}', 30.0))
+            found = next((line for line in lines if re.search(pattern, line)), None)
+            if found is None and self.process.poll() is not None:
+                raise AssertionError(f'it ended without {pattern}: {self.errors}')
+            return found
+        return str(wait_for(find, f'line {pattern}'))
 
     def write(self, text: str) -> None:
         assert self.process.stdin is not None
@@ -102,8 +102,8 @@ def start(tmp_path: Path) -> Iterator[Any]:
         command.close()
 
 
-@pytest.mark.parametrize('signum', [signal.SIGINT, signal.SIGTERM])
-def test_drives_behind_a_pseudo_terminal(start: Any, tmp_path: Path, signum: int) -> None:
+@pytest.mark.real
+def test_drives_behind_a_pseudo_terminal(start: Any, tmp_path: Path) -> None:
     command = start('--pty', '--pty-link', str(tmp_path / 'links'), '--log-frames')
     command.line('drive lift')
     assert re.fullmatch('bus main: slcan /dev/pts/[0-9]+', command.lines[0])
@@ -120,56 +120,54 @@ def test_drives_behind_a_pseudo_terminal(start: Any, tmp_path: Path, signum: int
     assert re.fullmatch(r'\([0-9]+\.[0-9]{6}\) main 003FFFF0#0{16} R',
                         command.line('003FFFF0'))
     assert command.line('103FFFF0').endswith(' T')
-    assert command.end(signum) == 0
+    assert command.end(signal.SIGINT) == 0
     assert command.errors == []
     assert ('conveyor: violation: frame that the manual does not define (ignored): 1 times'
             in command.lines)
     assert list((tmp_path / 'links').iterdir()) == []
 
 
+@pytest.mark.real
 def test_standard_input(start: Any) -> None:
-    command = start('--pty', '--fault', 'conveyor:late=0.15', '--fault', 'lift:off')
+    command = start('--pty', '--fault', 'conveyor:late=0.15', '--fault', 'lift:off', '--axis',
+                    'lift:load=0.3,noise=1')
     assert 'faults: late=0.15' in command.line('drive conveyor')
     assert 'faults: off' in command.line('drive lift')
-    command.write('conveyor ok\nlift nonsense\nconv')
+    command.write('conveyor ok\nlift nonsense\nstatus\nconv')
     command.line('conveyor: no fault any more')
+    command.line('^conveyor: datamodel_extended')
     assert "unknown fault 'nonsense'" in command.line('nonsense', errors=True)
     command.write('eyor trip\n')
     command.line('conveyor: fault trip')
     command.process.stdin.close()
     with pytest.raises(subprocess.TimeoutExpired):
         command.process.wait(0.3)
-    assert command.end() == 0
+    assert command.end(signal.SIGTERM) == 0
     assert len(command.errors) == 1
 
 
-def test_axes_and_wear(start: Any) -> None:
-    command = start('--pty', '--axis', 'lift:load=0.3,noise=1')
+@pytest.mark.real
+def test_without_standard_input(start: Any) -> None:
+    command = start('--interface', 'virtual', '--channel', 'z', stdin=None,
+                    preexec_fn=lambda: os.close(0))
     command.line('drive lift')
-    command.write('status\n')
-    command.line('^conveyor: datamodel_extended')
-    assert command.end() == 0
-    assert command.errors == []
-
-
-@pytest.mark.parametrize('how', ['closed', 'nothing'])
-def test_without_standard_input(start: Any, how: str) -> None:
-    options: dict[str, Any] = {'stdin': subprocess.DEVNULL}
-    if how == 'closed':
-        options = {'stdin': None, 'preexec_fn': lambda: os.close(0)}
-    command = start('--pty', **options)
-    command.line('drive lift')
+    assert command.lines[:2] == ['bus main: virtual z', 'bus second: virtual z']
     with pytest.raises(subprocess.TimeoutExpired):
         command.process.wait(0.3)
     assert command.end() == 0
     assert command.errors == []
 
 
-def test_python_can_interface(start: Any) -> None:
-    command = start('--interface', 'virtual', '--channel', 'z')
-    command.line('drive lift')
-    assert command.lines[:2] == ['bus main: virtual z', 'bus second: virtual z']
-    assert command.end() == 0
+def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str) -> tuple[
+        int, list[str]]:
+    """Run the command in this process; return its exit code, and what it complains of."""
+    file = directory / 'bridge.yaml'
+    file.write_text(PARAMETERS, encoding='utf-8')
+    try:
+        code = front_end.main(['simulate', '--params-file', str(file), *arguments])
+    except SystemExit as end:
+        code = int(str(end.code))
+    return code, capsys.readouterr().err.splitlines()
 
 
 @pytest.mark.parametrize(('arguments', 'status', 'message'), [
@@ -186,22 +184,22 @@ def test_python_can_interface(start: Any) -> None:
     (('--params-file', '/nowhere.yaml'), 1, 'drive_can simulate: /nowhere.yaml: No such file'),
     (('--params-file', '/dev/null'), 1, 'drive_can simulate: /dev/null: not a regular file'),
 ])
-def test_what_cannot_be(start: Any, arguments: tuple[str, ...], status: int, message: str,
-                        ) -> None:
-    command = start(*arguments)
-    assert command.process.wait(30.0) == status
-    assert len(command.errors) == 1
-    assert message in command.errors[0]
+def test_what_cannot_be(capsys: pytest.CaptureFixture[str], tmp_path: Path,
+                        arguments: tuple[str, ...], status: int, message: str) -> None:
+    code, errors = refused(capsys, tmp_path, *arguments)
+    assert code == status
+    assert len(errors) == 1
+    assert message in errors[0]
 
 
-def test_a_bit_rate_that_cannot_be(start: Any) -> None:
-    command = start('--bitrate', '99')
-    assert command.process.wait(30.0) == 2
-    assert command.errors[-1].endswith(
-        '--bitrate: 99: allowed are 1000 to 8000000 bit/s, also as 500k; '
-        'see drive_can simulate --help')
+def test_a_bit_rate_that_cannot_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, errors = refused(capsys, tmp_path, '--bitrate', '99')
+    assert code == 2
+    assert errors[-1].endswith('--bitrate: 99: allowed are 1000 to 8000000 bit/s, also as 500k; '
+                               'see drive_can simulate --help')
 
 
+@pytest.mark.real
 def test_reader_of_the_output_who_left(start: Any) -> None:
     reading, writing = os.pipe()
     command = start('--pty')
@@ -235,19 +233,26 @@ class TestASerialPort:
         for end in ends:
             os.close(end)
 
-    def test_of_a_bridge_is_left_alone(self, start: Any, port: str, tmp_path: Path) -> None:
-        file = tmp_path / 'adapter.yaml'
-        file.write_text(PARAMETERS.replace('virtual, channel: x}', f'slcan, channel: {port}}}'))
+    @pytest.fixture(name='file')
+    def file_fixture(self, port: str, tmp_path: Path) -> str:
+        path = tmp_path / 'adapter.yaml'
+        path.write_text(PARAMETERS.replace('virtual, channel: x}', f'slcan, channel: {port}}}'))
+        return str(path)
+
+    def test_of_a_bridge_is_left_alone(self, capsys: pytest.CaptureFixture[str], port: str,
+                                       file: str, tmp_path: Path) -> None:
         bus = BusConfiguration('main', 'slcan', port)
         with Ownership([(bus, ())], 'drive_can_bridge', END_FIRST):
-            command = start('--params-file', str(file))
-            assert command.process.wait(30.0) == 1
-        assert command.errors == [f'bus main: the serial port {port} is used by process '
-                                  f'{os.getpid()}; end that first']
-        assert command.lines == []
+            code, errors = refused(capsys, tmp_path, '--params-file', file)
+        assert code == 1
+        assert errors == [f'bus main: the serial port {port} is used by process '
+                          f'{os.getpid()}; end that first']
 
-    def test_of_the_simulation_is_its_own(self, start: Any, port: str) -> None:
-        command = start('--interface', 'slcan', '--channel', port)
-        command.line('bus main: slcan')
+    @pytest.mark.real
+    def test_of_the_simulation_is_its_own(self, start: Any, port: str, file: str) -> None:
+        # the other bus is elsewhere: two on one port end the simulation, and with it the lock
+        command = start('--params-file', file)
+        command.line('drive lift')
         with pytest.raises(InUse, match=rf'{command.process.pid} \(drive_can simulate\)'):
             Ownership([(BusConfiguration('main', 'slcan', port), ())], 'x', END_FIRST)
+        assert command.end() == 0

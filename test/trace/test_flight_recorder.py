@@ -4,14 +4,12 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-import queue
-import time
 import tracemalloc
 
 from builders import frame
-from clocks import REAL
 import pytest
-from waiting import wait_for
+from waiting import clock, pause, wait_for
+from world import World
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record, RecordKind
@@ -91,28 +89,23 @@ class Recording:
         bus = BusConfiguration('main', 'virtual', 'x', **{  # type: ignore[arg-type]
             'trace_seconds': 10.0, **keys})
         self.recorder = FlightRecorder([bus], folder, self.said.append, self.complained.append,
-                                       REAL)
+                                       clock())
         kept = self.recorder.ring('main')
         assert kept is not None
         self.ring: Ring = kept
 
     def hear(self, text: str = '003FFFF0#05DC000000000000') -> None:
-        self.ring.note(frame(text), time.monotonic(), True)
+        self.ring.note(frame(text), clock().now(), True)
 
     @property
     def traces(self) -> list[Path]:
         return sorted(self.folder.glob('*.log'))
 
     def save(self) -> tuple[str, str]:
-        answers: queue.Queue[tuple[str, str]] = queue.Queue()
-        self.recorder.save('main', 'asked', lambda *answer: answers.put(answer))
-        return answers.get(timeout=20.0)
-
-
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shorten what is waited for."""
-    monkeypatch.setattr(flight, 'AFTERMATH', 0.05)
+        answers: list[tuple[str, str]] = []
+        self.recorder.save('main', 'asked', lambda *answer: answers.append(answer))
+        wait_for(lambda: answers, 'an answer')
+        return answers[0]
 
 
 @contextmanager
@@ -124,10 +117,9 @@ def recording(folder: Path, **keys: object) -> Iterator[Recording]:
         made.recorder.close()
 
 
-@pytest.mark.real
-def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> None:
+def test_a_trace_has_what_came_before_and_after(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path / 'traces') as made:
-        made.ring.note(frame('111#'), time.monotonic() - 60.0, True)    # too long ago
+        made.ring.note(frame('111#'), clock().now() - 60.0, True)    # too long ago
         made.hear('222#01')
         made.recorder.trigger('main', 'conveyor offline')
         made.hear('333#02')
@@ -136,13 +128,12 @@ def test_a_trace_has_what_came_before_and_after(quick: None, tmp_path: Path) -> 
         assert path.name.startswith('main_20') and path.name.endswith('Z_conveyor_offline.log')
         records = list(read_records(path, pytest.fail))
         assert [record.identifier for record in records] == [0x222, 0x333]
-        assert all(abs(record.time - time.time()) < 60.0 for record in records)
+        assert all(0.0 < 1e-9 * clock().stamp() - record.time < 2.0 for record in records)
         assert made.said == [f'bus main: trace of conveyor offline, 2 frames of the last 10 s: '
                              f'{path}']
 
 
-@pytest.mark.real
-def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
+def test_one_trace_in_ten_seconds(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
         made.recorder.trigger('main', 'lift fault')
@@ -153,81 +144,72 @@ def test_one_trace_in_ten_seconds(quick: None, tmp_path: Path) -> None:
         assert len(made.traces) == 1
 
 
-@pytest.mark.real
-def test_one_trace_in_ten_seconds_for_whoever_asks(quick: None, tmp_path: Path) -> None:
+def test_one_trace_in_ten_seconds_for_whoever_asks(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
         path, refusal = made.save()
         assert path == str(made.traces[0]) and not refusal
         path, refusal = made.save()
         assert not path
-        assert refusal == (f'bus main: one trace in 10 s at most; the last, 0 s ago, is '
+        assert refusal == (f'bus main: one trace in 10 s at most; the last, 1 s ago, is '
                            f'{made.traces[0]}')
         assert len(made.traces) == 1
 
 
-@pytest.mark.real
 def test_a_failure_has_its_trace_whoever_has_asked_for_one(
-        quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(flight, 'SPACING', 2.0)
+        bench: World, tmp_path: Path) -> None:
     with recording(tmp_path, trace_seconds=0.5) as made:
-        asked = time.monotonic()
+        asked = clock().now()
         made.hear('111#')
         assert made.save()[0]
-        while time.monotonic() < asked + 0.6:
-            time.sleep(0.01)
         made.hear('222#')
         made.recorder.trigger('main', 'lift fault')
         path, refusal = made.save()
         assert not path and refusal.startswith(
-            'bus main: one trace in 2 s at most; that of lift fault follows in ')
+            'bus main: one trace in 10 s at most; that of lift fault follows in 10 s')
         assert len(made.traces) == 1, 'one in so many s'
         wait_for(lambda: len(made.traces) == 2, 'the trace of the failure')
-        assert time.monotonic() > asked + 2.0
+        assert clock().now() > asked + flight.SPACING
         assert made.traces[1].name.endswith('_lift_fault.log')
         assert [record.identifier for record in read_records(made.traces[1], pytest.fail)] == [
             0x222], 'what came before the failure, however late it is written'
 
 
-@pytest.mark.real
-def test_a_failure_takes_over_a_trace_that_is_asked_for(tmp_path: Path) -> None:
-    answers: queue.Queue[tuple[str, str]] = queue.Queue()
+def test_a_failure_takes_over_a_trace_that_is_asked_for(bench: World, tmp_path: Path) -> None:
+    answers: list[tuple[str, str]] = []
     with recording(tmp_path, trace_seconds=0.5) as made:
         made.hear('111#')
-        asked = time.monotonic()
-        made.recorder.save('main', 'asked', lambda *answer: answers.put(answer))
-        while time.monotonic() < asked + 0.6 * flight.AFTERMATH:
-            time.sleep(0.01)
+        made.recorder.save('main', 'asked', lambda *answer: answers.append(answer))
+        pause(0.6 * flight.AFTERMATH)
         made.recorder.trigger('main', 'lift fault')
-        failed = time.monotonic()
-        while answers.empty():
+        failed = clock().now()
+        while not answers:
             made.hear('222#')
-            time.sleep(0.01)
-        path, _ = answers.get()
+            pause(0.01)
+        (path, _), = answers
         assert path.endswith('_lift_fault.log')
         records = list(read_records(Path(path), pytest.fail))
-        wall = time.time() - time.monotonic()
+        wall = 1e-9 * clock().stamp() - clock().now()
         # what the caller wanted is in it, and the second that follows the failure
         assert records[0].identifier == 0x111
         assert records[-1].time - wall > failed + 0.9 * flight.AFTERMATH
         assert len(made.traces) == 1
 
 
-@pytest.mark.real
 def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
-        quick: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+        bench: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(flight, '_STEP', 1)
     monkeypatch.setattr(flight, '_PAUSE', 0.01)
     buses = [BusConfiguration(name, 'virtual', name, trace_seconds=10.0)
              for name in ('main', 'other')]
     told: list[str] = []
-    recorder = FlightRecorder(buses, tmp_path, told.append, told.append, REAL)
+    recorder = FlightRecorder(buses, tmp_path, told.append, told.append, bench.clock)
     try:
         for name, count in (('main', 200), ('other', 2)):
             kept = recorder.ring(name)
             assert kept is not None
             for _ in range(count):
-                kept.note(REQUEST, time.monotonic(), True)
+                kept.note(REQUEST, clock().now(), True)
         recorder.save('main', 'asked', lambda *_: None)
         wait_for(lambda: list(tmp_path.glob('*.part')), 'the beginning of a trace')
         recorder.trigger('other', 'lift fault')
@@ -238,8 +220,7 @@ def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
         'bus other: trace of lift fault', 'bus main: trace of asked']
 
 
-@pytest.mark.real
-def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None:
+def test_the_gravest_reason_names_the_trace(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
         made.recorder.trigger('main', 'lift offline', rank=1)
@@ -249,8 +230,7 @@ def test_the_gravest_reason_names_the_trace(quick: None, tmp_path: Path) -> None
         assert made.traces[0].name.endswith('_bus_lost.log')
 
 
-@pytest.mark.real
-def test_nothing_heard_nothing_written(quick: None, tmp_path: Path) -> None:
+def test_nothing_heard_nothing_written(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         assert made.save() == ('', 'bus main: not a single frame in the last 10 s')
         assert not list(tmp_path.iterdir())
@@ -258,8 +238,7 @@ def test_nothing_heard_nothing_written(quick: None, tmp_path: Path) -> None:
         assert made.save()[0]
 
 
-@pytest.mark.real
-def test_first_and_newest_are_kept(quick: None, monkeypatch: pytest.MonkeyPatch,
+def test_first_and_newest_are_kept(bench: World, monkeypatch: pytest.MonkeyPatch,
                                    tmp_path: Path) -> None:
     monkeypatch.setattr(flight, 'SPACING', 0.0)
     numbers = iter(range(100))
@@ -280,19 +259,17 @@ def test_first_and_newest_are_kept(quick: None, monkeypatch: pytest.MonkeyPatch,
         assert len(made.traces) == 9
 
 
-@pytest.mark.real
-def test_the_end_of_the_bridge_writes_what_is_wanted(tmp_path: Path) -> None:
+def test_the_end_of_the_bridge_writes_what_is_wanted(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.hear()
         made.recorder.trigger('main', 'fatal')
-        begun = time.monotonic()
+        begun = clock().now()
         made.recorder.close()
-        assert time.monotonic() - begun < flight.AFTERMATH
+        assert clock().now() - begun < flight.AFTERMATH
         assert len(made.traces) == 1
 
 
-@pytest.mark.real
-def test_a_place_that_cannot_be_written(quick: None, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written(bench: World, tmp_path: Path) -> None:
     blocked = tmp_path / 'file'
     blocked.write_text('')
     with recording(tmp_path, trace_directory=str(blocked / 'below')) as made:
@@ -302,8 +279,7 @@ def test_a_place_that_cannot_be_written(quick: None, tmp_path: Path) -> None:
         assert refusal.startswith('bus main: no trace of asked: Not a directory: ')
 
 
-@pytest.mark.real
-def test_buses_that_are_not_recorded(tmp_path: Path) -> None:
+def test_buses_that_are_not_recorded(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
         made.recorder.trigger('other', 'whatever')
         assert made.recorder.ring('other') is None

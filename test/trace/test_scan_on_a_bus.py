@@ -165,7 +165,7 @@ def test_beside_a_bridge_it_only_listens(place: Place, tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'found.yaml'
     listen = '--listen', 2.0 * SLOWNESS
-    with running(place.configuration()) as bus:
+    with running(place.configuration(), REAL) as bus:
         for name in bus.sessions:
             bus.wait_exchanges(name, 3)
         assert place.scan('--json', '-o', file, *listen) == 0

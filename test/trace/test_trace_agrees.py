@@ -2,21 +2,22 @@
 """
 What the bridge counts, and what a witness counts of the same conversation, agree.
 
-Real sessions and simulated drives of all families on a bus inside this process, and a tap that
-listens to it; drives fall silent and come back. Afterwards the trace is read from a file.
+Sessions and simulated drives of all families on the bench; drives fall silent and come back. What
+was on the wire is the trace, which afterwards is read from a file.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import os
 from pathlib import Path
 from statistics import median
-import time
 
-from clocks import REAL
+from jumping import EPOCH
 import pytest
 from waiting import wait_for
+from world import world
 
-from drive_can_bridge.clock import Mailbox
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.events import Event, RequestCompleted
@@ -29,10 +30,6 @@ from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.trace.files import read_records, TraceWriter
 from drive_can_bridge.trace.lines import LineWriter, Selection
 from drive_can_bridge.trace.tracer import Tracer
-from drive_can_bridge.transport.tap import Tap
-
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
 
 
 class Listener:
@@ -54,30 +51,28 @@ class Listener:
 
 
 class Bus:
-    """Bridge and drives on the bus of a file, and everything that was seen on it."""
+    """Bridge and drives on the bus of a file."""
 
-    def __init__(self, configuration: BridgeConfiguration) -> None:
+    def __init__(self, configuration: BridgeConfiguration, clock: Clock) -> None:
         self.configuration = configuration
+        self.clock = clock
         bus, = configuration.buses.values()
         drives = list(configuration.drives.values())
-        self.records: Mailbox[Record] = Mailbox(REAL)
-        # first: it sees requests before answers
-        self.tap = Tap(bus, 'main', self.records, print, REAL)
-        self.simulation = Simulation(configuration, REAL)
+        self.simulation = Simulation(configuration, clock)
         self.sessions = {drive.name: session for drive, session in zip(
             drives, make_sessions(drives))}
         self.listener = Listener()
         self.exchange = BusExchange(
             bus, list(self.sessions.values()),
             [[claim.route for claim in FAMILIES[drive.protocol].claims(drive)]
-             for drive in drives], self.listener, REAL)
+             for drive in drives], self.listener, clock)
         for session in self.sessions.values():
             self.exchange.attach(session, self.listener)
 
     def look(self) -> None:
         """Keep what the bridge has counted by now: afterwards it waits for no answers."""
         with self.exchange.lock:
-            self.looked_at = time.time()
+            self.looked_at = 1e-9 * self.clock.stamp()
             self.looked = {name: (*self.counted(name), session.statistics.rejected)
                            for name, session in self.sessions.items()}
 
@@ -93,42 +88,40 @@ class Bus:
 
 
 @contextmanager
-def running(configuration: BridgeConfiguration) -> Iterator[Bus]:
-    bus = Bus(configuration)
-    try:
-        with bus.simulation:
-            bus.exchange.open()
-            bus.exchange.activate()
-            try:
-                yield bus
-            finally:
-                bus.exchange.deactivate()
-                bus.exchange.close()
-    finally:
-        bus.tap.close()
+def running(configuration: BridgeConfiguration, clock: Clock) -> Iterator[Bus]:
+    bus = Bus(configuration, clock)
+    with bus.simulation:
+        bus.exchange.open()
+        bus.exchange.activate()
+        try:
+            yield bus
+        finally:
+            bus.exchange.deactivate()
+            bus.exchange.close()
 
 
 @pytest.fixture(scope='module')
 def conversation() -> tuple[Bus, list[Record]]:
-    with running(configuration_from_file(config_file('all_families.yaml'))) as bus:
-        for name in bus.sessions:
-            bus.wait_exchanges(name, 3)
-        for name, played in bus.simulation.drives.items():
-            missed = bus.counted(name)[1]
-            played.fault('silent')
-            wait_for(lambda name=name, missed=missed: bus.counted(name)[1] >= missed + 3,
-                     f'misses of {name}')
-            played.fault('ok')
-            bus.wait_exchanges(name, 3)
-        drive = bus.configuration.drives['conveyor']
-        bus.exchange.submit(bus.sessions['conveyor'], ReadRequest(
-            (drive.profile.parameters['ramp_time'],)))
-        wait_for(lambda: bus.listener.answers, 'an answer')
-        bus.look()
-    records = []
-    while bus.records:
-        records.append(bus.records.get())
-    return bus, records
+    configuration = configuration_from_file(config_file('all_families.yaml'))
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED'])) as bench:
+        with running(configuration, bench.clock) as bus:
+            for name in bus.sessions:
+                bus.wait_exchanges(name, 3)
+            for name, played in bus.simulation.drives.items():
+                missed = bus.counted(name)[1]
+                played.fault('silent')
+                wait_for(lambda name=name, missed=missed: bus.counted(name)[1] >= missed + 3,
+                         f'misses of {name}')
+                played.fault('ok')
+                bus.wait_exchanges(name, 3)
+            drive = bus.configuration.drives['conveyor']
+            bus.exchange.submit(bus.sessions['conveyor'], ReadRequest(
+                (drive.profile.parameters['ramp_time'],)))
+            wait_for(lambda: bus.listener.answers, 'an answer')
+            bus.look()
+        wire = bench.wires.of(str(configuration.buses['main'].channel))
+    return bus, [Record(1e-9 * EPOCH + at, 'main', frame.identifier, frame.data, frame.extended)
+                 for at, frame in wire.frames]
 
 
 def traced(bus: Bus, records: list[Record]) -> tuple[Tracer, list[str]]:

@@ -5,13 +5,12 @@ from collections import deque
 from collections.abc import Callable, Iterator
 import errno
 from pathlib import Path
-import threading
-import time
 from typing import Any
 
-from clocks import REAL
+from jumping import JumpingClock
 import pytest
-from waiting import wait_for
+from waiting import pause, wait_for
+from world import World
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
@@ -20,9 +19,7 @@ from drive_can_bridge.transport import link as link_module
 from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import BusError
 from drive_can_bridge.transport.link import Link
-
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
+from drive_can_bridge.transport.port import open_port
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
 ANSWER = Frame(0x103FFFF0, bytes(8), True)
@@ -53,7 +50,7 @@ class FakePort:
 
     def receive(self, timeout: float) -> Frame | None:
         if not self.coming:
-            time.sleep(0.001)
+            pause(min(timeout, 0.001))
             return None
         found = self.coming.popleft()
         if isinstance(found, BaseException):
@@ -112,8 +109,10 @@ class Listener:
 class Bench:
     """A link on ports of ours; ``ports`` are those that it got."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, kind: type[FakePort] = FakePort, *,
-                 send_timeout: float = 0.01, bus: BusConfiguration = BUS) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, clock: JumpingClock,
+                 kind: type[FakePort] = FakePort, *, send_timeout: float = 0.01,
+                 bus: BusConfiguration = BUS) -> None:
+        self.clock = clock
         self.kind = kind
         self.ports: list[FakePort] = []
         self.refusals: deque[Exception] = deque()
@@ -121,7 +120,7 @@ class Bench:
         self.stations: set[int] = set()
         self.listener = Listener()
         monkeypatch.setattr(link_module, 'open_port', self._open)
-        self.link = Link(bus, [], self.listener, REAL, send_timeout=send_timeout, stations=3)
+        self.link = Link(bus, [], self.listener, clock, send_timeout=send_timeout, stations=3)
         self.link.start()
 
     def _open(self, bus: BusConfiguration, clock: object, routes: object, *,
@@ -150,16 +149,16 @@ class Bench:
 
 
 @pytest.fixture
-def make(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Bench]]:
+def make(bench: World, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Bench]]:
     made: list[Bench] = []
 
     def start(*arguments: Any, **options: Any) -> Bench:
-        made.append(Bench(monkeypatch, *arguments, **options))
+        made.append(Bench(monkeypatch, bench.clock, *arguments, **options))
         return made[-1]
     yield start
-    for bench in made:
-        bench.link.stop()
-        assert not bench.link._thread.is_alive()
+    for each in made:
+        each.link.stop()
+    assert not bench.clock.tasks, 'a thread is left'
 
 
 def test_open_read_send_close(make: Callable[..., Bench]) -> None:
@@ -371,10 +370,10 @@ def test_full_queue_is_looked_at_once_in_a_reconnect_period(make: Callable[..., 
     bench = make(QueuedPort)
     bench.opened()
     bench.port.full = True
-    begun = time.monotonic()
+    begun = bench.clock.now()
     bench.send_until_blocked()
     wait_for(lambda: bench.port.looks >= 6)
-    assert time.monotonic() - begun >= 6 * BUS.reconnect_period
+    assert bench.clock.now() - begun >= 6 * BUS.reconnect_period
 
 
 def test_adapter_that_does_not_tell_is_opened_anew(make: Callable[..., Bench]) -> None:
@@ -448,24 +447,15 @@ def test_rejected_frames_count_as_rejected(make: Callable[..., Bench]) -> None:
     wait_for(lambda: bench.listener.frames_rejected == 3)
 
 
-def test_no_thread_is_left(make: Callable[..., Bench]) -> None:
-    before = threading.active_count()
-    bench = make()
-    bench.opened()
-    bench.link.stop()
-    assert threading.active_count() == before
-
-
-def test_reconnections_leave_no_descriptors(monkeypatch: pytest.MonkeyPatch,
+def test_reconnections_leave_no_descriptors(bench: World, monkeypatch: pytest.MonkeyPatch,
                                             tmp_path: Path) -> None:
     # a device that cannot be opened, a hundred times over
     listener = Listener()
     bus = BusConfiguration('main', 'slcan', str(tmp_path / 'nothing'), reconnect_period=0.001)
-    link = Link(bus, [], listener, REAL, send_timeout=0.01)
+    link = Link(bus, [], listener, bench.clock, send_timeout=0.01)
     attempts = []
-    real = link_module.open_port
     monkeypatch.setattr(link_module, 'open_port',
-                        lambda *a, **o: attempts.append(1) or real(*a, **o))
+                        lambda *a, **o: attempts.append(1) or open_port(*a, **o))
     link.start()
     wait_for(lambda: len(attempts) > 5)
     before = len(list(Path('/proc/self/fd').iterdir()))

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterator
 import errno
 import fcntl
+import itertools
 import os
 from pathlib import Path
 import sys
@@ -21,6 +22,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module
+from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.port import open_port, Port
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
@@ -288,16 +290,16 @@ def slcan(path: str) -> BusConfiguration:
     return BusConfiguration('main', 'slcan', path, bitrate=125_000)
 
 
-@pytest.mark.real
 def test_opening_an_adapter_that_takes_nothing_does_not_hang(
         monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = FullTerminal()
+    seconds = itertools.count()
     # an adapter whose buffer the kernel cannot empty
     monkeypatch.setattr('serial.Serial.reset_output_buffer', lambda port: None)
     try:
         terminal.fill()
         with pytest.raises(BusUnavailable, match='the adapter takes no more data'):
-            open_port(slcan(terminal.path), REAL)
+            open_port(slcan(terminal.path), HandClock(lambda: float(next(seconds))))
     finally:
         terminal.close()
 
@@ -386,26 +388,32 @@ def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
         adapter.answer(taken)
         adapter.receive(refused)
     assert adapter.port.counts.refused == 3
-
-
-@pytest.mark.real
-def test_adapter_that_refuses_everything_is_lost(adapter: Adapter) -> None:
     with pytest.raises(BusUnavailable, match='the adapter refuses frames; no other node'):
         for _ in range(20):
             adapter.port.send(STOP, 0.1)
             adapter.answer(b'\a')
             adapter.receive()
-    assert 4 <= adapter.port.counts.refused < 20
 
 
-@pytest.mark.real
-def test_adapter_that_refuses_some_is_not_lost(adapter: Adapter) -> None:
-    for _ in range(10):
-        for taken in (b'\a', b'\a', b'\a', b'z\r'):
-            adapter.port.send(STOP, 0.1)
-            adapter.answer(taken)
-            adapter.receive()
-    assert adapter.port.counts.refused == 30
+def answered(*lines: str, seconds: float) -> tuple[int, bool]:
+    """Return how many frames were refused, and whether all are, with so many s between them."""
+    answers = AdapterAnswers()
+    for place, line in enumerate(lines):
+        answers.sent()
+        answers.take(line, seconds * place)
+    return answers.refused, answers.takes_nothing(seconds * (len(lines) - 1))
+
+
+def test_adapter_that_refuses_everything_is_lost() -> None:
+    assert answered(*3 * ['\a'], seconds=1.0) == (3, False)
+    assert answered(*4 * ['\a'], seconds=1.0) == (4, True)
+    # as many, within the time of which a full queue is nothing to speak of
+    assert answered(*4 * ['\a'], seconds=0.016) == (4, False)
+    assert answered(*5 * ['\a'], seconds=0.016) == (5, True)
+
+
+def test_adapter_that_refuses_some_is_not_lost() -> None:
+    assert answered(*10 * ['\a', '\a', '\a', 'z\r'], seconds=1.0) == (30, False)
 
 
 def test_absent_adapter(tmp_path: Path) -> None:
