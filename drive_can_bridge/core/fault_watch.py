@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from drive_can_bridge.core.session import Session
 
 
+#: 603Fh: manuals write what is in it, as in emergencies, with four hexadecimal digits
+ERROR_CODE = 0x603F
+
+
 class FaultWatch:
     """
     Watches one drive for faults.
@@ -92,7 +96,8 @@ class FaultWatch:
 
     def _known(self, raw: int) -> None:
         name = self._names.get(raw, '')
-        number = self._parameter.shown(raw)
+        parameter = self._parameter
+        number = f'{raw:04X}h' if parameter.index == ERROR_CODE else parameter.shown(raw)
         self.text = f'{number} {name}' if name else number
         self._tell(sentences.fault_named(number, name))
 
