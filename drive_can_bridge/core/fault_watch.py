@@ -42,6 +42,10 @@ class Watched(Protocol):
         """Where it is asked which one."""
 
 
+#: 603Fh: manuals write what is in it, as in emergencies, with four hexadecimal digits
+ERROR_CODE = 0x603F
+
+
 class FaultWatch:
     """
     Watches one drive for faults.
@@ -113,7 +117,8 @@ class FaultWatch:
 
     def _known(self, raw: int) -> None:
         name = self._names.get(raw, '')
-        number = self._parameter.shown(raw)
+        parameter = self._parameter
+        number = f'{raw:04X}h' if parameter.index == ERROR_CODE else parameter.shown(raw)
         self.text = f'{number} {name}' if name else number
         self._tell(sentences.fault_named(number, name))
 

@@ -413,6 +413,12 @@ def error_code(code: int) -> str:
 
 
 @sentence
+def target_not_acknowledged(timeout: float, expected: int) -> str:
+    return (f'it has not acknowledged its target: bit 12 of the status word is not {expected} '
+            f'after {timeout:g} s; the next target waits for it')
+
+
+@sentence
 def bridge_missed() -> str:
     return 'the drive missed the bridge: reset the fault'
 
@@ -661,6 +667,11 @@ def set_up_unanswered() -> str:
 @sentence
 def found_enabled(state: str) -> str:
     return f'found in state {state}: it is disabled before anything else'
+
+
+@sentence
+def found_braking(state: str) -> str:
+    return f'found in state {state}: it is not touched before that has ended'
 
 
 @sentence

@@ -12,6 +12,7 @@ from test_contract import Partner, PARTNERS
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.profile import FaultTable
 
 CODE = parameter('fault_code', 217, access=RO)
@@ -52,6 +53,20 @@ def text(partner: Partner) -> str:
     watch = partner.talk.session.fault_watch
     assert watch is not None
     return watch.text
+
+
+def test_an_error_code_of_cia402_is_told_as_manuals_write_it() -> None:
+    partner = PARTNERS['cia402']()
+    partner.start()
+    session = partner.talk.session
+    session.configuration = replace(session.configuration, profile=replace(
+        session.configuration.profile, parameters={'fault_code': replace(
+            CODE, number=None, index=0x603F, subindex=0)}))
+    watch = FaultWatch(session, FaultTable('fault_code', ((0x8130, 'heartbeat missed'),), None))
+    for raw, told in ((0x8130, '8130h heartbeat missed'), (0x0042, '0042h')):
+        watch.shows = True
+        watch._known(raw)
+        assert watch.text == told
 
 
 @pytest.mark.parametrize('name', NAMES)

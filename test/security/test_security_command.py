@@ -76,6 +76,18 @@ def allowed(policy: ElementTree.Element, enclave: str, kind: str, verb: str) -> 
     return found
 
 
+def test_an_axis_that_homes_is_asked_by_the_operator_only(tmp_path: Path) -> None:
+    file = config_file('cia402.yaml')
+    assert main(['security', str(file), '-o', str(tmp_path / 'out')]) == 0
+    policy = ElementTree.parse(tmp_path / 'out' / 'policy.xml').getroot()
+    assert '/slide/home' in allowed(policy, '/bridge', 'services', 'reply')
+    assert '/slide/home' in allowed(policy, '/operator', 'services', 'request')
+    assert '/slide/home' not in allowed(policy, '/viewer', 'services', 'request')
+    for enclave in ('/bridge', '/operator'):    # spindle has no homing: true
+        assert '/spindle/home' not in allowed(policy, enclave, 'services', 'reply') | allowed(
+            policy, enclave, 'services', 'request')
+
+
 def test_enclaves_and_what_each_may(tmp_path: Path) -> None:
     policy = written(tmp_path)
     assert (policy.tag, policy.attrib) == ('policy', {'version': '0.2.0'})

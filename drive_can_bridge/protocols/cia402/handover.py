@@ -11,6 +11,11 @@ One after the other, the newest wins. When its commands cease, an axis that is o
 (bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises.
 """
 
+from collections.abc import Callable
+import math
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.control import DriveRules
@@ -22,26 +27,32 @@ class Handover:
     The targets of one drive.
 
     :param rules: get the bits of the control word.
+    :param timeout: s that a drive may take to acknowledge.
+    :param tell: takes in words, once, that it does not.
     """
 
-    def __init__(self, setpoints: Setpoints, rules: DriveRules) -> None:
+    def __init__(self, setpoints: Setpoints, rules: DriveRules, timeout: float,
+                 tell: Callable[[Sentence], None]) -> None:
         mode = MODES['pp']
         self._place = next(place for place, each in enumerate(setpoints.items) if (
             each.parameter.index, each.parameter.subindex or 0) == (mode.index, mode.subindex))
         self._setpoint = setpoints.items[self._place]
-        self._rules = rules
+        self._rules, self._timeout, self._tell = rules, timeout, tell
+        self._waits_since, self._told = math.inf, False
         self._handed: int | None = None     # the drive was given this one
         self._rising = False                # bit 4 has yet to travel
         self._before = 0                    # the bits that travel until then
 
-    def look(self, status: int) -> None:
+    def look(self, status: int, now: float) -> None:
         """Take a status word, before the next control word is chosen."""
         rules, setpoint = self._rules, self._setpoint
         if state_of(status) is not State.OPERATION_ENABLED:
             self._handed, self._rising = None, False
             rules.mode_bits, rules.halted = 0, False
+            self._waits_since, self._told = math.inf, False
             return
         acknowledged = bool(status & states.BIT_12)
+        self._see_to_acknowledge(acknowledged, now)
         if self._rising:
             if not setpoint.armed:      # bit 8 would fall alone
                 rules.mode_bits, self._rising = self._before, False
@@ -54,6 +65,21 @@ class Handover:
         if not setpoint.armed and self._handed is not None:
             rules.mode_bits, self._handed, self._rising = states.HALT, None, False
         rules.halted = rules.mode_bits == states.HALT
+
+    def _see_to_acknowledge(self, acknowledged: bool, now: float) -> None:
+        """Tell once that bit 12 does not rise with bit 4, or does not fall behind it."""
+        setpoint = self._setpoint
+        high = not self._rising and bool(self._rules.mode_bits & states.NEW_SETPOINT)
+        waits = setpoint.armed and (not acknowledged if high else (
+            acknowledged and setpoint.raw != self._handed))
+        if not waits:
+            self._waits_since = math.inf
+            self._told = self._told and not (high and acknowledged)
+            return
+        self._waits_since = min(self._waits_since, now)
+        if now >= self._waits_since + self._timeout and not self._told:
+            self._told = True
+            self._tell(sentences.target_not_acknowledged(self._timeout, int(high)))
 
     def carried(self, word: int, setpoints: list[int]) -> None:
         """Record a telegram that was made: the edge hands over what is in it."""

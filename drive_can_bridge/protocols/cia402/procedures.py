@@ -3,7 +3,8 @@
 Parameters of users by SDO, and the stop.
 
 Every generator here is for :class:`.channel.SdoChannel`. What is written goes to the drive's RAM;
-it is acknowledged, and not read back.
+it is acknowledged, and not read back. No parameter has more than four bytes, so that no download
+takes segments; an object that is longer, which a raw name may find, is refused in words.
 """
 
 from collections.abc import Generator, Sequence

@@ -164,7 +164,10 @@ class Cia402Session(Session):
         self._watch = Watch(self, heartbeat)
         self._bring_up = BringUp(self, self._node, self._rules)
         self.homes = options.homing
-        self._handover = Handover(self.setpoints, self._rules) if options.mode == 'pp' else None
+        self._handover = Handover(
+            self.setpoints, self._rules, drive.control_timeout,
+            lambda text: self.report.note(Noted(text, warning=True)),
+            ) if options.mode == 'pp' else None
         self._homing = Homing(self, control, self._rules, self._channel,
                               MODES[options.mode].number)
         self.look_after(Looks(self._next_look, self._look), self._watch, self._homing,
@@ -420,7 +423,7 @@ class Cia402Session(Session):
             self.be_online()
             self.duty.happened(Happened.ANSWERED)
         if self._handover is not None:
-            self._handover.look(raws[0])
+            self._handover.look(raws[0], now)
         self.gate.status(raws[0], now)
         self._look_at_state(now)
         self.control_changed(now)

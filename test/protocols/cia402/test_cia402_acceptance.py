@@ -95,16 +95,17 @@ def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> Non
     target: Any = SimpleNamespace(parameter=SimpleNamespace(index=0x607A, subindex=None),
                                   armed=True, raw=5000)
     rules: Any = SimpleNamespace(mode_bits=0, halted=False)
-    handover = Handover(SimpleNamespace(items=[target]), rules)     # type: ignore[arg-type]
-    handover.look(0x0027)
+    handover = Handover(
+        SimpleNamespace(items=[target]), rules, 2.0, print)  # type: ignore[arg-type]
+    handover.look(0x0027, 0.0)
     handover.carried(0x003F, [5000])
     target.armed = False
-    handover.look(0x1027)
+    handover.look(0x1027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)
-    handover.look(0x0027)
+    handover.look(0x0027, 0.0)
     target.armed, target.raw = True, 6000
-    handover.look(0x0027)
+    handover.look(0x0027, 0.0)
     assert rules.mode_bits == 0x30
     target.armed = False
-    handover.look(0x0027)
+    handover.look(0x0027, 0.0)
     assert (rules.mode_bits, rules.halted) == (0x100, True)

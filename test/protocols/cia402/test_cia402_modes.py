@@ -10,6 +10,7 @@ from servo_builders import Axis, OBJECTS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 
@@ -72,6 +73,11 @@ def meet(mode: str = 'pp', **options: Any) -> tuple[Axis, PositionDrive]:
     return axis, drive
 
 
+def unacknowledged(axis: Axis) -> list[str]:
+    return [note.text for note in axis.talk.events(Noted)
+            if note.text.code == 'target_not_acknowledged']
+
+
 class TestHandover:
 
     def test_one_after_the_other_and_the_newest_wins(self) -> None:
@@ -99,6 +105,32 @@ class TestHandover:
         axis.live(0.1)
         assert axis.words() == ['3F00', '0F00', '3F00', '0F00']
         assert drive.targets == [2000, 3000]
+
+    def test_one_that_never_acknowledges_is_told_once(self) -> None:
+        axis, drive = meet(control_timeout=0.5, command_timeout=0.0)
+        drive.becomes = lambda state: None      # type: ignore[method-assign]
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.4)
+        assert unacknowledged(axis) == []
+        axis.live(2.0)
+        assert unacknowledged(axis) == [
+            says('target_not_acknowledged', timeout=0.5, expected=1)]
+        axis.commands(3000.0)
+        axis.live(2.0)
+        assert unacknowledged(axis) == []
+
+    def test_one_that_stays_acknowledged_is_told(self) -> None:
+        axis, drive = meet(control_timeout=0.5, command_timeout=0.0)
+        axis.commands(1000.0, 2000.0)
+        axis.live(0.02)
+        drive.becomes = lambda state: None      # type: ignore[method-assign]
+        axis.live(2.0)
+        assert unacknowledged(axis) == []       # nothing waits for it
+        axis.commands(3000.0)
+        axis.live(0.6)
+        assert unacknowledged(axis) == [
+            says('target_not_acknowledged', timeout=0.5, expected=0)]
+        assert drive.targets == [2000]
 
     def test_halted_when_commands_cease_until_it_is_armed_again(self) -> None:
         axis, drive = meet()

@@ -111,6 +111,19 @@ def test_texts_are_no_numbers(axis: Axis) -> None:
         '605#4008100000000000', '605#6000000000000000', '605#7000000000000000']
 
 
+def test_what_is_longer_than_four_bytes_is_not_written(axis: Axis) -> None:
+    """Nothing of a profile is longer, so that no download needs segments."""
+    assert max(kind.bits for kind in ParameterType) == 32
+    answers = {'4008200000000000': '4108200008000000', '6000000000000000': '0053657276696365',
+               '7000000000000000': '1D73000000000000'}
+    sdo = axis.drive._sdo
+    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
+        answers.get(data.hex(), sdo(data).hex()))
+    assert outcomes(axis, write((raw('x2008.0', axis), 1))) == [
+        '8 bytes: only objects of 1 to 4 bytes are numbers']
+    assert not [text for text in axis.take() if text.startswith('605#2')]
+
+
 def test_a_drive_that_gives_up_in_the_middle_of_its_segments(axis: Axis) -> None:
     sdo = axis.drive._sdo
     axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]

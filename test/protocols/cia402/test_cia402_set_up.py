@@ -112,6 +112,19 @@ class TestConfigure:
         axis.start()
         assert '1800h.02h' in differs(axis)
 
+    def test_an_inhibit_time_that_is_refused_is_told_once(self) -> None:
+        axis = Axis('pv', {(0x1800, 3): bytes.fromhex('6400'), (0x1800, 5): bytes(2)},
+                    transmission='event')
+        axis.drive.fixed = {(0x1800, 3): 0x06010002}
+        axis.start()
+        assert '00180332000000' in written(axis)
+        said = notes(axis)
+        assert [text for text in said if '1800h.03h' in text] == [
+            '1800h.03h refused by the drive: 06010002h (write to a read-only object)']
+        axis.live(5.0)      # this drive sends nothing by itself: it is set up again and again
+        assert written(axis).count('00180332000000') > 1
+        assert not [text for text in notes(axis) if '1800h.03h' in text]
+
     def test_two_pdos_each_way(self) -> None:
         axis = Axis(request_pdos=(1, 3), response_pdos=(2, 4), response=(
             POSITION, VELOCITY, TORQUE))
@@ -123,6 +136,33 @@ class TestConfigure:
         assert '605#23031A0210007760' in sent
         sample = axis.talk.samples()[-1]
         assert sample[1:] == (1000, 0, 0)
+
+
+class TestFaultReaction:
+
+    REACTION, FAULT = bytes.fromhex('1F02'), bytes.fromhex('1802')
+
+    def test_it_is_waited_for_before_anything_is_touched(self) -> None:
+        axis = Axis(objects={(0x6041, 0): self.REACTION})
+        axis.start()
+        axis.live(0.5)
+        told = axis.take()
+        assert told.count('605#4041600000000000') > 10
+        assert not [text for text in told if text.startswith(('000#', '605#2', '205#', '080#'))]
+        assert notes(axis) == [says('found_braking', state='fault reaction active')]
+        axis.drive.state = axis.drive.FAULT
+        axis.drive.objects[0x6041, 0] = self.FAULT
+        axis.live(0.5)
+        assert '000#8005' in axis.take()
+        assert axis.session.online
+        assert axis.session.state is DriveState.FAULT
+
+    def test_one_that_does_not_end_is_not_cycled(self) -> None:
+        axis = Axis(objects={(0x6041, 0): self.REACTION}, control_timeout=1.0)
+        axis.start()
+        axis.live(5.0)
+        assert not [text for text in axis.take() if text.startswith(('000#', '605#2', '205#'))]
+        assert axis.session.offline_advice == says('found_braking')
 
 
 class TestWithoutWriting:
@@ -188,6 +228,13 @@ class TestMode:
     def test_interpolation_time(self, period: float, sent: list[str]) -> None:
         axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=period)
         assert [text for text in written(axis) if text.startswith('C260')] == sent
+
+    def test_one_that_is_refused_is_told_and_nothing_else_happens(self) -> None:
+        axis = Axis(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'})
+        axis.drive.fixed = {(0x60C2, 1): 0x06090032}
+        axis.start()
+        assert axis.session.online
+        assert notes(axis) == ['60C2h.01h refused by the drive: 06090032h (value too low)']
 
     def test_a_period_that_it_cannot_say(self) -> None:
         axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=1 / 300)
