@@ -8,9 +8,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
-from drive_can_bridge.protocols.polling import (
-    Chunk, plan_reads, round_time, WriteSchedule,
-)
+from drive_can_bridge.protocols.polling import Chunk, plan_reads, round_time
 
 
 def plan(*numbers: int, size: int = 4, known: set[int] | None = None) -> list[tuple[int, int]]:
@@ -95,59 +93,3 @@ def test_cycles_that_stop_a_drive_are_brought_forward() -> None:
     assert timer.due == pytest.approx(10.105)
     timer.no_later(10.095)
     assert timer.due == 10.095
-
-
-def test_setpoints_are_written_on_change_and_again_after_a_while() -> None:
-    writes = WriteSchedule(2, 0.5)
-    writes.look([0, 7], 10.0)
-    assert [writes.next(), writes.next()] == [0, 1]
-    assert not writes.waiting
-    writes.written(0, 0, 10.0)
-    writes.written(1, 7, 10.001)
-    writes.look([0, 7], 10.4)
-    assert not writes.waiting
-    writes.look([0, 8], 10.42)
-    writes.look([0, 8], 10.44)
-    assert writes.next() == 1
-    writes.written(1, 8, 10.44)
-    writes.look([0, 8], 10.5)
-    assert writes.next() == 0
-    assert not writes.waiting
-
-
-def test_one_may_go_before_the_others() -> None:
-    writes = WriteSchedule(3, 0.0)
-    writes.order(2, first=True)
-    writes.look([1, 2, 3], 10.0)
-    writes.order(2, first=True)
-    assert [writes.next(), writes.next(), writes.next()] == [2, 0, 1]
-
-
-def test_one_may_go_behind_the_others() -> None:
-    writes = WriteSchedule(3, 0.0)
-    writes.look([1, 2, 3], 10.0)
-    writes.order(0, first=False)
-    assert [writes.next(), writes.next(), writes.next()] == [1, 2, 0]
-
-
-def test_without_refresh_only_changes_are_written() -> None:
-    writes = WriteSchedule(1, 0.0)
-    writes.look([3], 10.0)
-    writes.written(writes.next(), 3, 10.0)
-    writes.look([3], 1e6)
-    assert not writes.waiting
-
-
-def test_what_failed_and_what_was_forgotten_is_due_again() -> None:
-    writes = WriteSchedule(2, 0.0)
-    writes.look([1, 2], 10.0)
-    writes.written(writes.next(), 1, 10.0)
-    index = writes.next()
-    writes.failed(index)
-    writes.look([1, 2], 10.1)
-    assert writes.next() == 1
-    assert not writes.waiting
-    writes.written(1, 2, 10.1)
-    writes.forget()
-    writes.look([1, 2], 10.2)
-    assert [writes.next(), writes.next()] == [0, 1]

@@ -13,7 +13,7 @@ refused ``disable`` is tried again and again: a device under local control, say,
 as it is back under remote control.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 import math
 
 from drive_can_bridge.core import sentences
@@ -21,6 +21,7 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
+from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
@@ -28,7 +29,6 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS
-from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 #: s until a ``disable`` that was refused is written again
 RETRY_AFTER = 0.25
@@ -38,36 +38,31 @@ class ControlWriter:
     """
     Writes the control word of one drive.
 
-    :param waits: tells whether setpoints have to be written before it.
     :ivar refusal: why the drive does not take the word, '' if it does.
     """
 
     def __init__(self, session: Session, control: ControlMachine,
-                 channel: MailboxChannel, waits: Callable[[], bool]) -> None:
+                 channel: MailboxChannel, output: AcyclicOutput) -> None:
         drive = session.configuration
         self.refusal = NOTHING
         self._session = session
         self._control = control
         self._channel = channel
-        self._waits = waits
         self._parameter = drive.profile.parameters[control.table.parameter]
         self._disable = control.table.disable   # may be written any number of times
         self._placement = Placement.of(drive)
         self._span = self._placement.span(self._parameter)
         self._refresh: float = (
             drive.options.refresh_interval if self._parameter in drive.cyclic_request else 0.0)
-        self._repetition = WordRepetition(control, acknowledged=True)
+        self._output = output
         self._settled: int | None = None    # the drive has it, or has refused it
         self._settled_at = -math.inf
-        self._retry_at = math.inf           # a refused disable
         self._doubtful: int | None = None   # sent, but not answered
         self._hurried: int | None = None    # the stop that others have made room for
 
     def forget(self) -> None:
         """Record that nothing is known of the drive."""
         self._settled = self._doubtful = self._hurried = None
-        self._retry_at = math.inf
-        self._repetition.forget()
         self.refusal = NOTHING
 
     def update(self, now: float, *, known: bool) -> None:
@@ -78,9 +73,8 @@ class ControlWriter:
             only then: a drive that was off meanwhile, unseen, must not start by a repetition.
         """
         word = self._control.word
-        fresh = now < self._retry_at and (
-            self._refresh <= 0.0 or now < self._settled_at + self._refresh)
-        if self._settled == word and fresh and not self._repetition.due(now):
+        fresh = self._refresh <= 0.0 or now < self._settled_at + self._refresh
+        if self._settled == word and fresh and not self._output.word_due(now):
             return
         repeated = self._settled == word or self._control.operating
         if repeated and not known and word != self._disable:
@@ -98,7 +92,7 @@ class ControlWriter:
         unanswered = 0
         while True:
             word, stopping = self._control.word, self._control.stopping
-            if self._waits():
+            if self._output.holds_word():
                 return
             if word == self._doubtful and not stopping:
                 there = yield from self._read_back(word)
@@ -113,8 +107,8 @@ class ControlWriter:
             # the last has the time that any request has: a slow device is no silent one
             again = stopping and unanswered < STOP_ATTEMPTS - 1
             timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
-            before = self._settled
-            self._repetition.begun(word)
+            before, again_at = self._settled, self._output.again_at
+            self._output.word_begun(word)
             if word != before:
                 self._settled = None    # from now on nobody knows: a stop does not rely on it
             reply = yield from tell(
@@ -127,13 +121,13 @@ class ControlWriter:
                 if reply.sent:
                     self._doubtful = word
                 else:   # as if it had not been begun
-                    self._repetition.left(self._channel.now)
+                    self._output.word_unanswered(self._channel.now)
+                    self._output.again_at = again_at
                 if word == self._control.word and not again:
                     if stopping:
                         self._tell_silence(word)
                     return
                 continue
-            self._retry_at = math.inf
             if isinstance(reply, Refused):
                 self._take_refusal(word, reply.text)
             else:
@@ -162,7 +156,7 @@ class ControlWriter:
         self._doubtful = None
         self._settled, self._settled_at = word, now
         if word == self._disable:
-            self._retry_at = now + RETRY_AFTER
+            self._output.again_at = now + RETRY_AFTER
         self._control.word_refused(word, reason, now)
         self._session.control_changed(now)
 
@@ -178,7 +172,5 @@ class ControlWriter:
         """Record that the drive has a word."""
         self._doubtful = None
         self._settled, self._settled_at = word, self._channel.now
-        self._repetition.left(self._channel.now)
-        if word == self._control.word:
-            self._control.word_sent(self._channel.now)
+        if self._output.word_left(self._channel.now, word):
             self._session.control_changed(self._channel.now)

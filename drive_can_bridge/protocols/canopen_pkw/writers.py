@@ -17,6 +17,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
@@ -24,9 +25,8 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
-from drive_can_bridge.protocols.polling import TOLERANCE, WriteSchedule
+from drive_can_bridge.protocols.polling import TOLERANCE
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
-from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
 from drive_can_bridge.protocols.stop_again import StopAgain
 
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
@@ -50,12 +50,10 @@ class Writers:
         self._channel = channel
         self._placement = Placement.of(drive)
         self._setpoints = session.setpoints
-        self._schedule = WriteSchedule(
-            len(session.setpoints.items), drive.options.refresh_interval)
-        self._first = SetpointsFirst(
-            session, self._schedule, range(len(session.setpoints.items)))
+        self._output = AcyclicOutput(session.control, Acknowledged(), len(session.setpoints.items),
+                                     refresh=drive.options.refresh_interval)
         self.control = None if session.control is None else ControlWriter(
-            session, session.control, channel, waits=self._first.look)
+            session, session.control, channel, self._output)
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
@@ -68,7 +66,7 @@ class Writers:
 
     def forget(self) -> None:
         """Record that nothing is known of the drive."""
-        self._schedule.forget()
+        self._output.forget()
         self._failures.clear()
         self._warned.clear()
         self._silences.clear()
@@ -88,7 +86,7 @@ class Writers:
 
         :param known: the status was read just now, or there is none.
         """
-        waits = self._first.look()
+        waits = self._output.holds_word()
         if self.control is not None and not waits:
             self.control.update(now, known=known)
         if waits or self._setpoints.changed and not self._setpoints.enabled:
@@ -101,15 +99,14 @@ class Writers:
         items = self._setpoints.items
         if not items:
             return
-        self._schedule.look([setpoint.raw for setpoint in items], now, hold=[
+        self._output.look([setpoint.raw for setpoint in items], now, hold=[
             index for index, setpoint in enumerate(items) if not setpoint.known])
-        if self._schedule.waiting and self._channel.is_idle(Lane.SETPOINTS):
+        if self._output.waiting and self._channel.is_idle(Lane.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
 
     def write_all_setpoints(self, now: float) -> None:
         """Write all setpoints at once, whether they have changed or not; others make room."""
-        for index in range(len(self._setpoints.items)):
-            self._schedule.failed(index)
+        self._output.write_all()
         self._channel.make_room(now)
         self.write_setpoints(now)
 
@@ -141,10 +138,10 @@ class Writers:
         But for what takes back a command, each once.
         """
         stopped: set[int] = set()
-        for _ in range(self._schedule.waiting):
-            if not self._schedule.waiting:  # they have to be held back since
+        for _ in range(self._output.waiting):
+            if not self._output.waiting:  # they have to be held back since
                 break
-            index = self._schedule.next()
+            index = self._output.next()
             if (yield from self._write_setpoint(index)):
                 stopped.add(index)
         for index, setpoint in enumerate(self._setpoints.items):
@@ -157,7 +154,7 @@ class Writers:
         raw, reply = yield from self._tell_setpoint(index, setpoint)
         neutral = raw == setpoint.neutral and not setpoint.parameter.limit
         if isinstance(reply, Silence):
-            self._schedule.failed(index)
+            self._output.failed(index)
             if self._silences[index] >= self._session.configuration.missed_limit:
                 self._failed(setpoint, sentences.write_unanswered(setpoint.parameter.name),
                              neutral=neutral)
@@ -173,7 +170,7 @@ class Writers:
         if neutral:     # and acknowledged
             self._session.neutral_stop.left(setpoint.parameter.name)
             self._session.neutral_stop.answered()
-        if self._first.written(index):
+        if self._output.has(index):
             self._session.see_to_control_word(self._channel.now)
         return neutral
 
@@ -190,8 +187,7 @@ class Writers:
             self.expire(self._channel.now)
             raw, begun_at = setpoint.raw, self._channel.now
             alone = self.control is None and self._stops(index, setpoint)
-            # at once: a look while the answer is awaited must not find it due again
-            self._schedule.written(index, raw, begun_at)
+            self._output.written(index, raw, begun_at)
             write = Write.of(
                 self._placement, setpoint.parameter, raw, blind=alone,
                 timeout=min(self._patience, timeout) if alone and left > 0 else timeout)
@@ -221,7 +217,7 @@ class Writers:
         self._warned[name] = self._failures[name] = text
         if control is None:
             return
-        if self._first.look():
+        if self._output.holds_word():
             control.word_refused(control.word, sentences.word_held_back(text), now)
         elif neutral and control.operating:
             control.drop(sentences.neutral_not_taken(text))

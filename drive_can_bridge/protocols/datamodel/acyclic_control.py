@@ -8,21 +8,21 @@ drive takes no notice, the word is written again, less and less often. Where tha
 EEPROM (or may), only a drive that runs on although it shall not gets its word again, a few times.
 A pulse is written as often as it has to leave.
 The status word is read twice a second, and twenty times while a request is under way. What has its
-slot in the cyclic telegrams is none of this module's business.
+slot in the cyclic telegrams is none of this module's business. When a word is written again, says
+:mod:`..acyclic_output`.
 """
 
 import math
 
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
-from drive_can_bridge.protocols.cycle_timer import stop_spacing
+from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, ParameterCourier, Procedure,
 )
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
-from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 #: s between two looks at the status word, while a request is under way and otherwise
 STATUS_PERIOD_PENDING = 0.05
@@ -37,31 +37,27 @@ class AcyclicControl:
 
     :param word: parameter of the control word; None: it is sent cyclically.
     :param status: parameter of the status word; None: it comes cyclically, or there is none.
-    :ivar repetition: of the word.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: AcyclicChannel,
-                 courier: ParameterCourier, numbers: Numbers, *, word: Parameter | None,
-                 status: Parameter | None) -> None:
+                 courier: ParameterCourier, numbers: Numbers, output: AcyclicOutput, *,
+                 word: Parameter | None, status: Parameter | None) -> None:
         self._look_at = math.inf    # when the status word is to be read
-        self._retry_at = math.inf   # when a refused word, or a pulse, is to be written again
         self._session = session
         self._control = control
         self._channel = channel
         self._courier = courier
         self._word = word
         self._status = status
-        self._spacing = stop_spacing(session.configuration.period)
         self._numbers = numbers
-        self.repetition = WordRepetition(
-            control, wears=word is not None and word.storage is not Storage.RAM)
+        self._output = output
         self._reading = False
         self._outdated = False  # what is being read was asked before the word left
         self._watching = False
 
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
-        self.repetition.forget()
+        self._output.forget_word()
         self._watching = True
         if self._status is not None:
             self._look_at = now
@@ -69,7 +65,9 @@ class AcyclicControl:
     def end(self) -> None:
         """Leave the status of a lost drive alone."""
         self._watching = False
-        self._look_at = self._retry_at = math.inf
+        self._look_at = math.inf
+        if self._word is not None:
+            self._output.again_at = math.inf
 
     def stop(self) -> None:
         """Plan nothing any more. The channel was cleared."""
@@ -78,11 +76,10 @@ class AcyclicControl:
 
     def update(self, now: float) -> None:
         """Write the control word if it changed, or if the drive takes no notice of it."""
-        word, repetition = self._control.word, self.repetition
-        if self._word is None or word == repetition.word and not repetition.due(now):
+        word, output = self._control.word, self._output
+        if self._word is None or word == output.word and not output.word_due(now):
             return
-        repetition.begun(word)
-        self._retry_at = math.inf
+        output.word_begun(word)
         write = (self._courier.write_now if self._control.stopping
                  else self._courier.write_first)
         runs = not self._control.at_rest
@@ -93,14 +90,15 @@ class AcyclicControl:
 
     def next_timer(self) -> float:
         """Return when the status is to be looked at, or a word to be written again."""
-        return min(self._look_at, self._retry_at)
+        if self._word is None:
+            return self._look_at
+        return min(self._look_at, self._output.next_timer())
 
     def handle_timer(self, now: float) -> None:
         """Do what is due."""
         if now >= self._look_at:
             self._look(now)
-        if now >= self._retry_at:
-            self._retry_at = math.inf
+        if self._word is not None and self._output.handle_timer(now):
             self._session.see_to_control_word(now)
 
     # -- inside -----------------------------------------------------------------------------------
@@ -115,20 +113,13 @@ class AcyclicControl:
 
     def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
         if not sent:
-            if word == self.repetition.word:
-                self.repetition.word = None
-                self._retry_at = now + REFUSED_PAUSE
+            self._output.word_refused(word, now + REFUSED_PAUSE)
             return
         self._session.duty.channel(
             CONTROL_WORD, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
         self._outdated = self._reading
-        if self._watching:  # else others see to the stop
-            self.repetition.left(now)
-        if word == self._control.word:
-            self._control.word_sent(now)
-            if self._control.pulsing:
-                self.repetition.left(now, self._spacing)
-                self._retry_at = now + self._spacing
+        # of a drive that is lost, others see to the stop
+        self._output.word_left(now, word, again=self._watching)
         self._session.control_changed(now)
 
     def _read(self, status: Parameter) -> Procedure:

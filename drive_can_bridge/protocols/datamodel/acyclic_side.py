@@ -20,7 +20,9 @@ from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
@@ -50,6 +52,7 @@ class AcyclicSide:
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
+    :ivar output: what is written, and when.
     :ivar control_writer: looks after words that have no slot, or None.
     :ivar parts: what acts at times of its own.
     :ivar shows_up: something has arrived since this was reset.
@@ -81,16 +84,22 @@ class AcyclicSide:
         # where rounds are read, it does not come by itself in the end
         at_end = status if self.courier.anonymous or self.status_slot is None else None
         status = status if self.status_slot is None else None
+        wears = word is not None and word.storage is not Storage.RAM
+        polled = self.courier.anonymous     # else setpoints go by cycles
+        self.output = AcyclicOutput(
+            session.control, Judged(stop_spacing(drive.period), wears),
+            len(drive.cyclic_request) if polled else 0, slot=self.control_slot if polled else None,
+            refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
             AcyclicControl(session, session.control, self.channel, self.courier, self.numbers,
-                           word=word, status=status))
+                           self.output, word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, stop_ended, at_end, self._read_status)
         self.shows_up = False
         self.again = StopAgain(
             session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
-            wears=word is not None and word.storage is not Storage.RAM)
+            wears=wears)
 
     def clear(self) -> None:
         """Forget everything acyclic, and whatever waits for its outcome."""

@@ -10,13 +10,9 @@ import math
 
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import Happened
-from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
 from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
-from drive_can_bridge.protocols.polling import WriteSchedule
-from drive_can_bridge.protocols.setpoints_first import SetpointsFirst
-from drive_can_bridge.protocols.word_repetition import WordRepetition
 
 Rounds = PolledExchange[Step, Reply]
 
@@ -38,18 +34,11 @@ class SetpointWriter:
         self._numbers = side.numbers
         self._slot = side.control_slot
         self._parameters = drive.cyclic_request
-        self._schedule = WriteSchedule(len(drive.cyclic_request), drive.options.refresh_interval)
-        self._first = SetpointsFirst(session, self._schedule, [
-            index for index in range(len(drive.cyclic_request)) if index != self._slot])
-        self._spacing = stop_spacing(drive.period)
-        self._repetition = WordRepetition(session.control)
-        self._pulse_at = math.inf  # when the control word is due again, whatever it was
+        self._output = side.output
 
     def stop(self) -> None:
         """Plan nothing any more: nothing is known of the drive."""
-        self._schedule.forget()
-        self._repetition.forget()
-        self._pulse_at = math.inf
+        self._output.forget()
 
     def look(self, now: float, *, unanswered: bool = False, known: bool = False) -> None:
         """
@@ -60,39 +49,36 @@ class SetpointWriter:
             is repeated only then: one that was off meanwhile, unseen, must not start by that.
         """
         self._session.gate.expire(now)      # nothing is handed out that is too old
-        control, slot = self._session.control, self._slot
+        control, slot, output = self._session.control, self._slot, self._output
         stopping = control is not None and control.stopping
         starts = control is not None and not (control.at_rest or stopping)
-        if slot is not None and self._repetition.due(now) and (
+        if slot is not None and output.word_due(now) and (
                 stopping or not self._exchange.reading):
-            self._schedule.failed(slot)
+            output.failed(slot)
         doubt = starts and (self._exchange.silent or unanswered)
         if starts and self._exchange.silent:
-            self._first.forget()
+            output.start_over()
         repeated = starts and control is not None and not (control.word_due or control.pulsing)
         hold = [slot] if doubt or repeated and not known or self.holds_word(now) else []
         unknown = self._session.setpoints.unknown
         if unknown:
             hold += [index for index, parameter in enumerate(self._parameters)
                      if parameter.name in unknown]
-        self._schedule.look(self._raws(), now, hold=hold)
-        if slot is not None and control is not None:
+        output.look(self._raws(), now, hold=hold)
+        if control is not None:
             # a word that starts the drive behind setpoints, also when all are only refreshed
-            self._schedule.order(slot, first=stopping or control.pulsing)
+            output.order_word(first=stopping or control.pulsing)
 
     def holds_word(self, now: float) -> bool:
         """Tell whether the control word waits for setpoints."""
-        by_number = self._side.control_writer
-        repetition = (self._repetition if self._slot is not None or by_number is None
-                      else by_number.repetition)
-        return self._first.look(again=repetition.due(now))
+        return self._output.holds_word(again=self._output.word_due(now))
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
-        if not self._schedule.waiting or now < self._courier.free_at:
+        if not self._output.waiting or now < self._courier.free_at:
             return
         self._session.gate.expire(now)
-        index = self._schedule.next()
+        index = self._output.next()
         parameter, raw = self._parameters[index], self._raws()[index]
         # now: a neutral value that follows the axis may be another one when the frame leaves
         runs = raw != self._raws(neutral=True)[index]
@@ -101,9 +87,7 @@ class SetpointWriter:
             Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
-        if index == self._slot:
-            self._repetition.begun(raw)
-        self._schedule.written(index, raw, now)  # at once: a look meanwhile must not find it due
+        self._output.written(index, raw, now)
 
     def write_word(self, now: float, *, known: bool = False) -> None:
         """
@@ -116,23 +100,19 @@ class SetpointWriter:
 
     def write_all(self, now: float) -> None:
         """Write all setpoints, whether they have changed or not, without waiting for a period."""
-        for index in range(len(self._parameters)):
-            self._schedule.failed(index)
+        self._output.write_all()
         self.write_word(now)
 
     def handle_timer(self, now: float) -> None:
         """Write what is due."""
-        if now >= self._pulse_at and self._slot is not None:
-            self._pulse_at = math.inf
-            self._schedule.failed(self._slot)
+        if self._slot is not None and self._output.handle_timer(now):
             self._session.see_to_control_word(now)
         self.write(now)
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
-        if self._schedule.waiting:
-            return min(self._pulse_at, self._courier.free_at)
-        return self._pulse_at
+        again_at = math.inf if self._slot is None else self._output.next_timer()
+        return min(again_at, self._courier.free_at) if self._output.waiting else again_at
 
     def _raws(self, *, neutral: bool = False) -> list[int]:
         items, control = self._session.setpoints.items, self._session.control
@@ -144,20 +124,16 @@ class SetpointWriter:
     def _left(self, index: int, raw: int, sent: bool, now: float, *, runs: bool) -> None:
         """Record a setpoint, or control word, that left; the refused ones are due again."""
         if not sent:
-            self._schedule.failed(index)
+            self._output.failed(index)
             return
         self._session.duty.channel(index, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
         if not runs:
             self._session.neutral_stop.left(self._parameters[index].name)
         control = self._session.control
         if index != self._slot or control is None:
-            if self._first.written(index):
+            if self._output.has(index):
                 self._session.see_to_control_word(now)
             return
         self.word_written_at = now
-        self._repetition.left(now)
-        if raw == control.word:
-            control.word_sent(now)
-            if control.pulsing:
-                self._pulse_at = now + self._spacing
+        if self._output.word_left(now, raw):
             self._session.control_changed(now)
