@@ -82,6 +82,16 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         self._stopping = False                  # the last cycles are those of a stop
         self._waiting = False                   # they have left, and an answer is waited for
 
+    @property
+    def cycling(self) -> bool:
+        """Cycles are being sent."""
+        return self.timer.due < math.inf
+
+    @property
+    def leaving(self) -> bool:
+        """They are the last ones before silence."""
+        return self.cycles_left >= 0 and self.timer.due < math.inf
+
     # -- the beat ---------------------------------------------------------------------------------
 
     def next_timer(self) -> float:

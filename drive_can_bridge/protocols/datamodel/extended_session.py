@@ -2,12 +2,17 @@
 """
 The conversation with one DataModel drive that uses 29-bit identifiers.
 
+Its life (:meth:`ExtendedSession._life`) is one sequence, begun anew whenever the drive is lost,
+the bus is back, or the process stood still:
+
 .. code-block:: text
 
-    IDLE ──activate, bus up──► CHECKING ──maps agree──► CYCLIC ──missed_limit──► LEAVING
-      ▲                         ▲  │ ▲                    │                        │
-      │                         │  └─┼──maps differ──► DIFFERS (looks again in 1 s) │
-      └──deactivate / bus down──┘    └─────────3 neutral cycles, then silence──────┘
+    read the maps ─nobody answers─► again
+        │      └──differ──► stop, tell or rewrite, look again
+        ▼ agree
+    where are the axes that have to stay there ─not said─► again
+        ▼
+    cycles begin; look at the maps once a second
 
 Whatever was told to run is told to stop: by neutral cycles where the request map is known to
 agree, otherwise by acyclic writes (:mod:`.acyclic_side`), whatever the session is about to do
@@ -17,43 +22,46 @@ A drive reads cyclic words by *its own* maps. So the maps are read before the fi
 every second while cycling, and again after each loss; a drive that does not answer gets no cyclic
 frames beyond three with neutral setpoints, in case it only lost its voice. One that was told to
 run and has not answered those either is told to stop by number, and again when it shows a sign of
-life. With ``mapping: assume`` there is neither CHECKING nor LEAVING: cycling never stops.
+life. With ``mapping: assume`` maps are never read, and cycling never stops.
+
+With ``mapping: configure`` a difference is followed by a rewrite, and the rewrite by another look:
+nothing is believed that was not read. Map entries are kept in EEPROM, whose cells wear. So the
+pause before the next rewrite doubles from one to the next, whether it failed or was undone by
+somebody else, until the maps have been right for a minute.
 """
 
-from enum import Enum
+from collections.abc import Generator
 import math
+from typing import Any
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Event, MappingDiffered, ProcessDataReceived
+from drive_can_bridge.core.events import MappingDiffered, MappingWritten, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
-from drive_can_bridge.protocols.datamodel import extended
+from drive_can_bridge.protocols.datamodel import extended, procedures
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.map_supervision import (
-    MapSupervision, SILENT_LOOKS, Verdict,
-)
-from drive_can_bridge.protocols.datamodel.positions import Positions
+from drive_can_bridge.protocols.datamodel.channel import Procedure
+from drive_can_bridge.protocols.datamodel.mapping import differences, effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
+from drive_can_bridge.protocols.life import Life, Script
 
 #: direction and station of an identifier
 FROM_WHOM = extended.DIR | extended.STATION_MASK
-
-
-class Phase(Enum):
-    """How far the session has come with its drive."""
-
-    IDLE = 'idle'
-    CHECKING = 'checking the maps'
-    DIFFERS = 'maps differ'
-    CYCLIC = 'cycling'
-    LEAVING = 'last neutral cycles'
+#: s between two looks at the maps
+LOOK_PERIOD = 1.0
+#: longest pause between map rewrites
+REWRITE_PAUSE_MAX = 60.0
+#: so many looks at the maps in a row may go unanswered until that is told
+SILENT_LOOKS = 3
+#: s until a position that a setpoint cannot carry is read again
+POSITION_PAUSE = 0.1
 
 
 class ExtendedSession(Session):
@@ -82,49 +90,39 @@ class ExtendedSession(Session):
         self._request_identifier = self._codec.request_identifier
         self._response_identifier = self._codec.response_identifier
         numbers = self._side.numbers
-        self._maps = MapSupervision(
-            self._channel, request_base=options.request_map_base + numbers.offset,
-            response_base=options.response_map_base + numbers.offset,
-            request=numbers.numbers(drive.cyclic_request),
-            response=numbers.numbers(drive.cyclic_response),
-            rewrite=options.mapping == 'configure',
-            emit=self._maps_reported, judged=self._maps_judged)
-        self._positions = Positions(
-            self, self._channel, numbers, known=self._start_cycling, again=self._look_again,
-            # it may have started anew meanwhile, with other maps
-            silent=self._axes_unknown if self._verify else None)
+        self._map_bases = (options.request_map_base + numbers.offset,
+                           options.response_map_base + numbers.offset)
+        self._wanted = numbers.numbers(drive.cyclic_request), numbers.numbers(drive.cyclic_response)
+        self._rewrites: bool = options.mapping == 'configure'
         self._exchange = CyclicExchange(
             self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
             silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left)
         self._exchange.heeded = not self._verify    # otherwise the maps tell who has heard it
-        self.look_after(self._exchange, self._maps, self._positions, *self._side.parts,
-                        channel=self._channel)
-        self._phase = Phase.IDLE
-        self._differs = False  # what the last look at the maps found
+        self._course = Life(self._channel)
+        self.look_after(self._exchange, self._course, *self._side.parts, channel=self._channel)
+        self._differs = False       # what the last look at the maps found
+        self._unread = NOTHING      # nobody knows whether the maps are still right
+        self._told = NOTHING        # which difference
+        self._rewritten_at, self._pause = -math.inf, LOOK_PERIOD
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    @property
-    def _cycling(self) -> bool:
-        return self._phase in (Phase.CYCLIC, Phase.LEAVING)
-
     def prepare_stop(self, now: float) -> bool:
         self._side.clear()
-        self._positions.stop()
-        self._maps.stop()
+        self._course.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
-        return self._cycling or (self.stage is not Stage.IDLE and owes)
+        return self._exchange.cycling or (self.stage is not Stage.IDLE and owes)
 
     def begin_stop(self, now: float) -> bool:
-        if self._cycling:
+        if self._exchange.cycling:
             self._exchange.stop_soon(now)
-        self._side.begin_stop(now, setpoints=not self._cycling)
-        return self._cycling or self._side.stop.running
+        self._side.begin_stop(now, setpoints=not self._exchange.cycling)
+        return self._exchange.cycling or self._side.stop.running
 
     @property
     def longest_stop(self) -> float:
-        by_number = self._side.longest_stop(setpoints=not self._cycling)
-        return by_number + (self._exchange.longest_stop if self._cycling else 0.0)
+        by_number = self._side.longest_stop(setpoints=not self._exchange.cycling)
+        return by_number + (self._exchange.longest_stop if self._exchange.cycling else 0.0)
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
@@ -132,94 +130,166 @@ class ExtendedSession(Session):
         self._differs = self._side.shows_up = False
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._side.begin_stop(now, setpoints=self._verify)
-        if self._verify:
-            self._phase = Phase.CHECKING
-            self._maps.look_afresh(now)
-        else:
-            self._begin_cycles(now)
+        self._course.start(self._life(now), now)
 
     def fall_silent(self) -> None:
         super().fall_silent()
         self._side.clear()
-        self._phase = Phase.IDLE
         self._differs = False
 
-    # -- maps -------------------------------------------------------------------------------------
+    # -- the life of a drive ----------------------------------------------------------------------
 
-    def _maps_judged(self, verdict: Verdict, text: str, now: float) -> None:
-        if verdict is Verdict.AGREE:
-            self._differs = False
-            if self._phase is not Phase.CYCLIC:
-                self._begin_cycles(now)
-            elif self.online:
-                self.duty.happened(Happened.ANSWERED)
-        elif verdict is Verdict.DIFFER:
-            self._differs = True
-            routed = self._maps.request_agrees
-            if not routed:
-                self.duty.channel(CYCLE, Happened.MISROUTED)
-            elif self._phase is Phase.DIFFERS:  # its last cycles were not answered, or it runs
-                self.duty.happened(Happened.SILENT)
-            do = self.duty.happened(Happened.MAPS_DIFFER)
-            self.lose(sentences.mapping_differs(text), now)
-            # a request map that is right still takes neutral cycles, unless it is to be rewritten
-            by_cycles = do is Do.STOP and routed and not self.gate.mute
-            if do is not Do.NOTHING:
-                self._side.begin_stop(now, setpoints=not by_cycles)
-            if by_cycles:
-                self._exchange.book.expect_nothing()
-                self._exchange.heeded = True    # the request map was read just now
-                if self._phase is not Phase.LEAVING:
-                    self._phase = Phase.LEAVING
-                    timer = self._exchange.timer
-                    self._exchange.run_out(max(now, timer.began_at + timer.stop_spacing))
+    def _life(self, now: float) -> Script:
+        """Look at the maps, for ever; cycle while they agree."""
+        exchange, self._unread = self._exchange, NOTHING
+        agreed = differed = False   # what the look before found
+        silent_looks = 0            # so many in a row went unanswered
+        while self._verify:
+            maps: procedures.Maps | None = yield procedures.read_maps(
+                *self._map_bases, needed=self._wanted[0] if agreed else None)
+            now = self._channel.now
+            look_at = now + LOOK_PERIOD
+            found = '' if maps is None else '; '.join(differences(
+                maps.request, maps.response,
+                wanted_request=self._wanted[0], wanted_response=self._wanted[1]))
+            if maps is not None and found:
+                self._differ(found, maps, now, again=differed)
+                agreed, differed, silent_looks = False, True, 0
+                look_at = yield from self._make_fit(found, look_at)
+            elif maps is None or maps.response is None:
+                differed, silent_looks = False, silent_looks + 1
+                if exchange.leaving and not self._differs:
+                    return      # who starts over follows the last of the cycles
+                if not exchange.cycling:
+                    self._nobody_answers(now)
+                    look_at = now   # paced by the time-out of the read
+                elif silent_looks >= SILENT_LOOKS and not exchange.leaving:
+                    # there, the cyclic answers tell who is there
+                    self._unread = sentences.maps_unknown(silent_looks)
+                    if silent_looks == SILENT_LOOKS:
+                        self.report.warn(self._unread)
             else:
-                self._phase = Phase.DIFFERS
-                self._exchange.stop()
-        elif self._phase is Phase.LEAVING:
-            self._maps.look_at = math.inf  # that comes after the last neutral cycle
-        elif self._phase is Phase.CYCLIC:  # there, the cyclic answers tell who is there
-            if self._maps.silent_looks == SILENT_LOOKS:
-                self.report.warn(self._maps.unknown)
-        else:
-            self._phase = Phase.CHECKING
-            self.report.advice = sentences.maps_unread()
-            self._maps.look_at = now  # paced by the time-out of the read
-            if self._side.shows_up:   # and answers a part of what it is asked
-                self._side.shows_up = False
-                self._side.again.heard(now, answered=True)
+                agreed, differed, silent_looks = True, False, 0
+                self._differs, self._unread, self._told = False, NOTHING, NOTHING
+                if now - self._rewritten_at > REWRITE_PAUSE_MAX:
+                    self._pause = LOOK_PERIOD
+                if exchange.cycling and not exchange.leaving:
+                    if self.online:
+                        self.duty.happened(Happened.ANSWERED)
+                elif exchange.leaving and self.setpoints.held:
+                    pass    # a stop takes its course
+                elif (yield from self._find_axes(look_at)):
+                    self._start_cycling(self._channel.now)
+                elif self._channel.now < look_at:   # it has not answered, and may have
+                    agreed = False                  # started anew meanwhile, with other maps
+                    self._side.again.heard(self._channel.now, answered=True)
+                    continue
+            yield look_at
+        # a drive that was told to run has to be told ``disable``, whatever is known of its axes
+        if not (self.setpoints.ever_known and not self.gate.mute) and not self.setpoints.known:
+            yield from self._find_axes(math.inf)
+            now = self._channel.now
+        self._start_cycling(now)
 
-    def _maps_reported(self, event: Event) -> None:
-        if isinstance(event, MappingDiffered):
-            self.report.advice = sentences.mapping_differs(event.text)
-        self.report.note(event)
+    def _find_axes(self, until: float) -> Generator[Any, Any, bool]:
+        """Read where axes are that have to stay there; False: it has not said so by then."""
+        setpoints = self.setpoints
+        if not setpoints.known:
+            self._exchange.timer.stop()
+        while not setpoints.known:
+            raws = yield self._positions()
+            for setpoint, raw in zip(setpoints.held, raws or ()):
+                setpoints.changed |= setpoint.measure(raw)
+            if setpoints.known:
+                break
+            self.report.advice = setpoints.untold_text
+            if raws is None and self._verify:
+                return False
+            now = self._channel.now     # without an answer, the time-out of the read is the pace
+            if raws is not None:        # but the setpoint cannot carry it
+                now = yield min(now + POSITION_PAUSE, until)
+            if now >= until:
+                return False
+        return True
+
+    def _positions(self) -> Procedure:
+        raws: list[int] = []
+        for setpoint in self.setpoints.held:
+            words = yield self._side.numbers.read(setpoint.measured)
+            if words is None:
+                return None
+            raws.append(setpoint.measured.raw_from_word(words[0]))
+        return raws
+
+    def _differ(self, text: str, maps: procedures.Maps, now: float, *, again: bool) -> None:
+        """
+        Have a drive stand still that takes our cycles for something else.
+
+        :param again: the look before found a difference, too.
+        """
+        exchange, self._differs, self._unread = self._exchange, True, NOTHING
+        # cyclic requests reach what they are meant for, and the map stays as it is
+        routed = effective(maps.request) == self._wanted[0] and not self._rewrites
+        if not routed:
+            self.duty.channel(CYCLE, Happened.MISROUTED)
+        elif again and not exchange.cycling:    # its last cycles were not answered, or it runs
+            self.duty.happened(Happened.SILENT)
+        do = self.duty.happened(Happened.MAPS_DIFFER)
+        self.lose(sentences.mapping_differs(text), now)
+        # a request map that is right still takes neutral cycles, unless it is to be rewritten
+        by_cycles = do is Do.STOP and routed and not self.gate.mute
+        if do is not Do.NOTHING:
+            self._side.begin_stop(now, setpoints=not by_cycles)
+        if not by_cycles:
+            exchange.stop()
+            return
+        exchange.book.expect_nothing()
+        exchange.heeded = True      # the request map was read just now
+        if not exchange.leaving:
+            exchange.run_out(max(now, exchange.timer.began_at + exchange.timer.stop_spacing))
+
+    def _make_fit(self, found: str, look_at: float) -> Generator[Any, Any, float]:
+        """Rewrite maps that differ, if that is wanted, or tell; return when to look again."""
+        if not self._rewrites:
+            self._tell(sentences.maps_found(found))
+            return look_at
+        if self._channel.now < self._rewritten_at + self._pause:
+            self._tell(sentences.maps_wait(found, self._pause))
+        elif (yield self._rewrite()):
+            return self._channel.now
+        return self._rewritten_at + self._pause
+
+    def _rewrite(self) -> Procedure:
+        """Rewrite the maps, and note it even if the life has ended meanwhile: cells wear."""
+        if self._rewritten_at > -math.inf:
+            self._pause = min(2 * self._pause, REWRITE_PAUSE_MAX)
+        request, response = self._wanted
+        failure = yield from procedures.write_maps(
+            *self._map_bases, request=request, response=response)
+        self._rewritten_at = self._channel.now
+        if failure:
+            self._tell(sentences.maps_not_written(failure))
+        else:
+            self.report.note(MappingWritten(sentences.maps_written(request, response)))
+            self._told = NOTHING
+        return not failure
+
+    def _tell(self, text: Sentence) -> None:
+        """Report a difference, once."""
+        if text != self._told:
+            self._told = text
+            self.report.advice = sentences.mapping_differs(text)
+            self.report.note(MappingDiffered(text))
+
+    def _nobody_answers(self, now: float) -> None:
+        self.report.advice = sentences.maps_unread()
+        if self._side.shows_up:     # and answers a part of what it is asked
+            self._side.shows_up = False
+            self._side.again.heard(now, answered=True)
 
     # -- cyclic exchange --------------------------------------------------------------------------
 
-    def _begin_cycles(self, now: float) -> None:
-        """Begin to cycle, as soon as it is known where axes are that have to stay there."""
-        if self.setpoints.held and self._phase is Phase.LEAVING:
-            return  # a stop takes its course
-        # a drive that was told to run has to be told ``disable``, whatever is known of its axes
-        at_once = self.setpoints.ever_known and not self._verify and not self.gate.mute
-        if self.setpoints.known or at_once:
-            self._start_cycling(now)
-        else:
-            self._phase = Phase.CHECKING
-            self._exchange.timer.stop()
-            self._positions.read(now)
-
-    def _look_again(self, now: float) -> None:
-        if self._phase is Phase.CHECKING:
-            self._begin_cycles(now)
-
-    def _axes_unknown(self, now: float) -> None:
-        """Handle a drive whose maps agree, but that does not say where its axes are."""
-        self._side.again.heard(now, answered=True)
-        self._maps.look_afresh(now)
-
     def _start_cycling(self, now: float) -> None:
-        self._phase = Phase.CYCLIC
         self._exchange.heeded = not self._verify
         self._exchange.book.forget_asked()
         self._exchange.start(now, in_turn=True)
@@ -238,16 +308,15 @@ class ExtendedSession(Session):
             self._stop_ended()
         elif self._differs:
             self._exchange.stop()
-            self._phase = Phase.DIFFERS
 
     def _stop_ended(self) -> None:
         if (self.stage is Stage.STOPPING and not self._side.stop.running
-                and (self._exchange.cycles_left == 0 or not self._cycling)):
+                and (self._exchange.cycles_left == 0 or not self._exchange.cycling)):
             self._exchange.doubt_the_end()
             self.stop_left()
 
     def _missed(self, reason: Sentence, now: float) -> None:
-        if self._phase is Phase.LEAVING:
+        if self._exchange.leaving:
             if self._exchange.cycles_left == 0:
                 # if nobody answers any more: next it is told by number
                 self.duty.happened(Happened.SILENT)
@@ -266,7 +335,6 @@ class ExtendedSession(Session):
         if self.gate.mute:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
-            self._phase = Phase.LEAVING
             self._exchange.run_out(self._exchange.timer.due)
 
     # -- frames from the drive --------------------------------------------------------------------
@@ -294,7 +362,7 @@ class ExtendedSession(Session):
             self.statistics.short += 1
         self._exchange.answered(received_at)
         if not self.online and self.stage is Stage.RUNNING:
-            if self._phase is Phase.LEAVING:
+            if self._exchange.leaving:
                 if not self._differs:  # it is back: look at its maps before anything else
                     self.start_over(now)
                 return
@@ -324,7 +392,7 @@ class ExtendedSession(Session):
         if self.stage is Stage.STOPPING:
             return
         writer = self._side.control_writer
-        if writer is not None and (self.online or self._phase is Phase.CYCLIC):
+        if writer is not None and (self.online or self._exchange.cycling and not self._exchange.leaving):
             writer.update(now)
         self._exchange.hurry(now, setpoints=True)
 
@@ -339,7 +407,7 @@ class ExtendedSession(Session):
 
     @property
     def warning(self) -> Sentence:
-        return self._maps.unknown if self._phase is Phase.CYCLIC else NOTHING
+        return NOTHING if self._exchange.leaving else self._unread
 
     @property
     def state(self) -> DriveState:
