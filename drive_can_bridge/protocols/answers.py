@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What one drive answers to the cycles that it is told by, whoever sends them.
+What one drive answers to the cycles that it is told by, no matter who sends them.
 
 An answer that does not come in time is missed, and after ``missed_limit`` of those in a row the
 drive is lost. What it answers to cycles of before shows nothing (:mod:`.exchange_book`).
@@ -26,7 +26,7 @@ class Answers:
     :param missed: (why the drive counts as lost, '' if it does not yet; now): what becomes of a
         cycle that was not answered, unless the drive is being stopped; None: it is lost.
     :param settled: called when an exchange ends, answered or not.
-    :param in_turn: not each cycle asks this drive: whoever asks it settles the one before.
+    :param in_turn: not each cycle asks this drive: the one that asks it settles the one before.
     :param timer: says when cycles are due, where others are in step; None: one of its own.
     :ivar session: of the drive.
     :ivar book: counts the cycles, and the answers.
