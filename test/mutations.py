@@ -6,8 +6,8 @@ Change the product in one place at a time, and see whether a test is red that kn
 
 Places are drawn by the seed over conditions, comparisons, ``and``/``or`` and constants of
 :data:`FOLDERS`. Each is changed in a copy of the checkout: first the tests run that stand nearest,
-then all others of the deterministic part. What survives is printed with the change, and is the exit
-code's 1: a survivor is a test that is missing, or a place that makes no difference (say which).
+then all others of the deterministic part. What survives is printed with the change, and makes the
+exit code 1: a survivor is a test that is missing, or a place that makes no difference (say which).
 """
 
 import argparse

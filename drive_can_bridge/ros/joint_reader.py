@@ -142,7 +142,7 @@ def _said(layout: Layout) -> list[bool]:
     """
     Return for each byte of a message in plain CDR whether anything is said in it.
 
-    What only fills up to the alignment of the next field, and what follows the last one, is whatever
+    What only fills up to the alignment of the next field, and what follows the last one, is what
     was in the memory of the publisher (rmw_fastrtps clears neither).
     """
     data = layout.constants[0]

@@ -92,7 +92,8 @@ class ExtendedSession(Session):
         numbers = self._side.numbers
         self._map_bases = (options.request_map_base + numbers.offset,
                            options.response_map_base + numbers.offset)
-        self._wanted = numbers.numbers(drive.cyclic_request), numbers.numbers(drive.cyclic_response)
+        self._wanted = (numbers.numbers(drive.cyclic_request),
+                        numbers.numbers(drive.cyclic_response))
         self._rewrites: bool = options.mapping == 'configure'
         self._exchange = CyclicExchange(
             self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
@@ -200,7 +201,7 @@ class ExtendedSession(Session):
             raws = yield self._positions()
             for setpoint, raw in zip(setpoints.held, raws or ()):
                 setpoints.changed |= setpoint.measure(raw)
-            if setpoints.known:
+            if not setpoints.unknown:
                 break
             self.report.advice = setpoints.untold_text
             if raws is None and self._verify:
@@ -392,9 +393,10 @@ class ExtendedSession(Session):
         if self.stage is Stage.STOPPING:
             return
         writer = self._side.control_writer
-        if writer is not None and (self.online or self._exchange.cycling and not self._exchange.leaving):
+        exchange = self._exchange
+        if writer is not None and (self.online or exchange.cycling and not exchange.leaving):
             writer.update(now)
-        self._exchange.hurry(now, setpoints=True)
+        exchange.hurry(now, setpoints=True)
 
     # -- state ------------------------------------------------------------------------------------
 
