@@ -51,6 +51,7 @@ class Place:
 
     def __init__(self) -> None:
         self.contexts: list[Context] = []
+        self.nodes: list[Node] = []
         self.context = self.make_context()
         self.executor = SingleThreadedExecutor(context=self.context)
         self.a, self.b = self.node('a'), self.node('b')
@@ -65,6 +66,7 @@ class Place:
     def node(self, name: str, kind: type[Node] = Node, **options: Any) -> Any:
         options.setdefault('context', self.context)
         node = kind(name, **options)
+        self.nodes.append(node)
         if options['context'] is self.context:
             self.executor.add_node(node)
         return node
@@ -102,6 +104,9 @@ class Place:
         return future.result()
 
     def close(self) -> None:
+        # of two nodes of a process with one name, only the first one's lines reach /rosout
+        for node in self.nodes:
+            node.destroy_node()
         for context in self.contexts:
             context.try_shutdown()
 
