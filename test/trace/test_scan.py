@@ -380,7 +380,7 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
     capsys.readouterr()
 
     # a bridge runs with it
-    with running(found) as bus:
+    with running(found, REAL) as bus:
         for name in found.drives:
             bus.wait_exchanges(name, 3)
 
@@ -451,7 +451,7 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
         capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('all_families.yaml'))
     assert {drive.protocol for drive in played.drives.values()} == set(FAMILIES)
-    with running(played) as bus:
+    with running(played, REAL) as bus:
         for name in bus.sessions:
             bus.wait_exchanges(name, 3)
         foreign = [drive.violations for drive in bus.simulation.drives.values()]
