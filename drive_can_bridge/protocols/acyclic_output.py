@@ -109,7 +109,7 @@ class AcyclicOutput:
 
     def forget(self) -> None:
         """Record that nothing is known of the drive: everything is due at the next look."""
-        self._written[:] = [None] * len(self._written)
+        self.write_all()
         self._due.clear()
         self.start_over()
         self.forget_word()

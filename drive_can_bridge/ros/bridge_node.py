@@ -47,7 +47,6 @@ from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.end_point import EndPoint
 
-
 NODE_NAME = 'drive_can_bridge'
 
 SUCCESS = TransitionCallbackReturn.SUCCESS

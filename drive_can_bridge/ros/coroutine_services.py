@@ -21,7 +21,6 @@ from drive_can_bridge.core.control import ControlAction, ControlCompleted, Contr
 from drive_can_bridge.ros.polled_topics import PolledGroup
 from drive_can_bridge.ros.service_thread import Answer, Callback, ServiceThread
 
-
 AnswerT = TypeVar('AnswerT')
 #: takes request and response, and returns the response
 Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]

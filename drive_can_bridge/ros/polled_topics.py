@@ -29,6 +29,11 @@ from drive_can_bridge.ros.command_topic import CommandTopic
 from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.quality import command_quality, overriding
 
+#: s between two looks at who publishes
+COUNT_PERIOD = 0.05
+#: s between two looks at events of subscriptions
+EVENT_PERIOD = 1.0
+
 
 class PolledGroup(CallbackGroup):
     """Entities of this group are taken by hand; an executor never waits for them."""
@@ -41,12 +46,6 @@ class PolledGroup(CallbackGroup):
 
     def ending_execution(self, entity: Any) -> None:
         pass
-
-
-#: s between two looks at who publishes
-COUNT_PERIOD = 0.05
-#: s between two looks at events of subscriptions
-EVENT_PERIOD = 1.0
 
 
 class Warn(Protocol):

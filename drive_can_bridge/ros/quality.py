@@ -9,7 +9,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-
+#: s between two looks at who subscribes
+COUNT_PERIOD = 0.1
 #: the default policies, and that which makes a topic a latched one
 _OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
                 QoSPolicyKind.DURABILITY)
@@ -60,10 +61,6 @@ def quality_overrides(node: Node) -> list[NodeParameter]:
     """Return what a node's parameters say about the quality of any topic."""
     return [parameter for name, parameter in node._parameter_overrides.items()
             if name.startswith('qos_overrides.')]
-
-
-#: s between two looks at who subscribes
-COUNT_PERIOD = 0.1
 
 
 class Audience:

@@ -23,6 +23,20 @@ from rclpy.service import Service
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.ros.gone import GONE
 
+#: s between two failures: one that comes at once again must not take the machine
+ERROR_PAUSE = 0.05
+#: share of the processor's time for a thread that anybody can keep busy
+MODEST = 0.3
+#: calls of one service that are taken in a row
+TAKE_MAX = 8
+
+#: takes the response; to be called once, from any thread
+Answer = Callable[[Any], None]
+#: takes a request, and whatever is to be called with the response
+Callback = Callable[[Any, Answer], None]
+#: takes service, response and the header of the request
+Send = Callable[[Service, Any, Any], None]
+
 
 class Pace:
     """
@@ -51,21 +65,6 @@ class Pace:
         self._seen, self._used = now, used
         if self._left < 0.0:
             self._clock.wait(now - self._left / self._share)
-
-
-#: s between two failures: one that comes at once again must not take the machine
-ERROR_PAUSE = 0.05
-#: share of the processor's time for a thread that anybody can keep busy
-MODEST = 0.3
-#: calls of one service that are taken in a row
-TAKE_MAX = 8
-
-#: takes the response; to be called once, from any thread
-Answer = Callable[[Any], None]
-#: takes a request, and whatever is to be called with the response
-Callback = Callable[[Any, Answer], None]
-#: takes service, response and the header of the request
-Send = Callable[[Service, Any, Any], None]
 
 
 class ServiceThread:

@@ -175,20 +175,19 @@ class BringUp:
                     _place(states.STATUS_WORD), abort_codes.describe(reply.abort or 0)))
             raw = int.from_bytes(reply.data, 'little')
             state = states.state_of(raw)
-            if state not in (*_RUNNING, State.FAULT_REACTION):
+            reacting = state is State.FAULT_REACTION    # it stops by itself, whatever it is told
+            if not reacting and state not in _RUNNING:
                 break
             if looks * LOOK_PERIOD >= self._drive.control_timeout:
-                raise _End(Outcome(Found.RUNS, (
-                    sentences.found_braking if state is State.FAULT_REACTION else
-                    sentences.found_running)(state.value)))
+                tell = sentences.found_braking if reacting else sentences.found_running
+                raise _End(Outcome(Found.RUNS, tell(state.value)))
             if not looks:
-                self._session.report.note(Noted(
-                    sentences.found_braking(state.value) if state is State.FAULT_REACTION else
-                    sentences.found_enabled(state.value), warning=True))
+                tell = sentences.found_braking if reacting else sentences.found_enabled
+                self._session.report.note(Noted(tell(state.value), warning=True))
             wanted = DISABLE_WORDS[self._options.disable_word]
             if state is State.QUICK_STOP_ACTIVE:    # which takes its course
                 wanted = states.DISABLE_VOLTAGE
-            braking = state is State.FAULT_REACTION or (    # by itself, whatever it is told
+            braking = reacting or (
                 state is State.QUICK_STOP_ACTIVE and (yield from self._brakes(raw)))
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
