@@ -4,7 +4,7 @@
 import math
 import threading
 
-from drive_can_bridge.exchange.errand import Errand
+from drive_can_bridge.exchange.exchange import Errand
 
 
 def test_once_a_period_and_a_little_early_where_a_thread_is_awake() -> None:
