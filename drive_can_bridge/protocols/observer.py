@@ -20,18 +20,11 @@ from typing import NamedTuple, Protocol, TypeVar
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.protocols.telegrams import Direction
 
 T = TypeVar('T')
 KeyT = TypeVar('KeyT')
 Handler = Callable[[bytes, float], None]
-
-
-class Direction(Enum):
-    """Who speaks; the value is what a line of text shows."""
-
-    REQUEST = '>'
-    RESPONSE = '<'
-    NEITHER = '-'
 
 
 class Kind(Enum):

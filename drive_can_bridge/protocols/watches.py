@@ -5,7 +5,8 @@ from collections.abc import Callable, Hashable
 import math
 from typing import Generic, TypeVar
 
-from drive_can_bridge.protocols.observer import Direction, DriveObserver, Kind, Verdict
+from drive_can_bridge.protocols.observer import DriveObserver, Kind, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 
 #: s for which an answer that did not come in time is still known to be one
 LATE_TIME = 10.0

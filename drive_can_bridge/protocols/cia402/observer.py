@@ -7,15 +7,15 @@ nobody asks: an exchange is a complete set of them.
 """
 
 from collections.abc import Sequence
+from functools import partial
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import NmtObserver, node_handlers
-from drive_can_bridge.protocols.canopen.sdo import Kind as Said
+from drive_can_bridge.protocols.canopen.sdo import Kind as Said, Message
 from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo import Pdo
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
@@ -135,47 +135,41 @@ class Cia402Observer(DriveObserver):
 
     def _take_sdo_request(self, data: bytes, now: float) -> None:
         title = 'SDO request'
-        request = self.decoded(sdo.decode_request, data, now, _REQUEST, _PARAMETER, title)
-        if request is None:
-            return
-        place, written, abort = request
-        if place is None:
+        request = self.decoded(partial(sdo.decode, _REQUEST), data, now, _REQUEST, _PARAMETER,
+                               title)
+        if request is None or request.object is None:
             return      # the next segment: the transfer was told
+        place, written = request.object, request.data
         self._transfer = None
-        if abort is not None:
+        if request.kind is Said.ABORT:
             self.tell(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
-                      remark=abort_codes.describe(abort))
+                      remark=abort_codes.describe(request.number))
             return
-        self._requests.ask(place, place, now, None if written is None else [
+        self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
             int.from_bytes(written, 'little'), len(written)])
 
     def _take_sdo_response(self, data: bytes, now: float) -> None:
-        title = 'SDO response'
-        transfer = self._transfer
-        try:
-            answer = sdo.decode_answer(data, segments=transfer is not None)
-        except RemoteProtocolError as error:
-            self.tell(now, _RESPONSE, _PARAMETER, title, verdict=Verdict.MALFORMED,
-                      remark=str(error))
+        answer = self.decoded(
+            partial(sdo.decode, _RESPONSE, segments=self._transfer is not None),
+            data, now, _RESPONSE, _PARAMETER, 'SDO response')
+        if answer is None:
             return
-        if answer.object is None:
+        place = answer.object
+        if place is None:
             self._take_segment(answer, now)
             return
         self._transfer = None
-        place = answer.object
-        asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.WRITTEN)
-        if answer.kind is Said.ABORT:
-            self._requests.answer(place, asked, now, [],
-                                  refusal=abort_codes.describe(answer.number))
-            return
-        if answer.kind is Said.LONG:
+        asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.DOWNLOADED)
+        if answer.kind is Said.UPLOAD_BEGUN:
             self._transfer, self._text = place, b''
-        self._requests.answer(place, asked, now, [] if not answer.data else [
-            int.from_bytes(answer.data, 'little'), len(answer.data)])
+        self._requests.answer(
+            place, asked, now, [] if not answer.data else [
+                int.from_bytes(answer.data, 'little'), len(answer.data)],
+            refusal=abort_codes.describe(answer.number) if answer.kind is Said.ABORT else '')
 
-    def _take_segment(self, answer: sdo.Answer, now: float) -> None:
+    def _take_segment(self, answer: Message, now: float) -> None:
         self._text += answer.data
-        if answer.last and self._transfer is not None:
+        if answer.kind is Said.SEGMENT and answer.last and self._transfer is not None:
             parameters, _ = self._content(self._transfer, None)
             self._transfer = None
             self.tell(now, _RESPONSE, _PARAMETER, 'read', parameters,
