@@ -37,25 +37,25 @@ _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 
 
 class Kind(Enum):
-    """What a client asks for, and what a server says."""
+    """What a client asks for, and what a server says; an abort may answer everything."""
 
     UPLOAD = TelegramType(_REQUEST, 0x40, 0xE0, '<BHB4x', 'head index subindex',
-                          'UPLOADED UPLOAD_BEGUN ABORT')
+                          'UPLOADED UPLOAD_BEGUN')
     UPLOADED = TelegramType(_RESPONSE, 0x42, 0xE2, '<BHB4s', 'head index subindex data')
     UPLOAD_BEGUN = TelegramType(_RESPONSE, 0x40, 0xE2, '<BHBI', 'head index subindex number')
-    SEGMENT_WANTED = TelegramType(_REQUEST, 0x60, 0xE0, '<B7x', 'head', 'SEGMENT ABORT')
+    SEGMENT_WANTED = TelegramType(_REQUEST, 0x60, 0xE0, '<B7x', 'head', 'SEGMENT')
     SEGMENT = TelegramType(_RESPONSE, 0x00, 0xE0, '<B7s', 'head data')
     DOWNLOAD = TelegramType(_REQUEST, 0x22, 0xE2, '<BHB4s', 'head index subindex data',
-                            'DOWNLOADED ABORT')
+                            'DOWNLOADED')
     DOWNLOADED = TelegramType(_RESPONSE, 0x60, 0xE0, '<BHB4x', 'head index subindex')
     DOWNLOAD_BEGUN = TelegramType(_REQUEST, 0x20, 0xE2, '<BHBI', 'head index subindex number',
-                                  'DOWNLOADED ABORT')
-    SEGMENT_SENT = TelegramType(_REQUEST, 0x00, 0xE0, '<B7s', 'head data', 'SEGMENT_TAKEN ABORT')
+                                  'DOWNLOADED')
+    SEGMENT_SENT = TelegramType(_REQUEST, 0x00, 0xE0, '<B7s', 'head data', 'SEGMENT_TAKEN')
     SEGMENT_TAKEN = TelegramType(_RESPONSE, 0x20, 0xE0, '<B7x', 'head')
     ABORT = TelegramType(Direction.NEITHER, 0x80, 0xFF, '<BHBI', 'head index subindex number')
 
     def answers(self, request: 'Kind') -> bool:
-        """Tell whether this may answer a request of the same object."""
+        """Tell whether this says that a request of the same object was carried out."""
         return self.name in request.value.answers.split()
 
 
@@ -149,15 +149,16 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Messa
     fields = kind.value.unpack(data)
     content, number = fields.get('data', b''), fields.get('number', 0)
     if 'index' not in fields:
-        unused = head >> 1 & 0x07
-        return Message(kind, None, content[:SEGMENT_MAX - unused], toggle=head & TOGGLE,
-                       last=bool(head & _LAST))
+        if content:
+            content = content[:SEGMENT_MAX - (head >> 1 & 0x07)]
+        return Message(kind, None, content, toggle=head & TOGGLE,
+                       last=not content or bool(head & _LAST))
     sized = bool(head & _SIZED)
     if content and sized:
         content = content[:EXPEDITED_MAX - (head >> 2 & 0x03)]
     return Message(kind, (fields['index'], fields['subindex']), content,
                    number if sized or kind is Kind.ABORT else 0,
-                   last=sized if content else kind is not Kind.UPLOAD_BEGUN)
+                   last=sized if content else 'number' not in fields or kind is Kind.ABORT)
 
 
 def decode_upload(data: bytes) -> Uploaded:
