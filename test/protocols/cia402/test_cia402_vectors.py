@@ -77,7 +77,8 @@ def test_downloaded(row: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize('row', rows('upload_begun'))
 def test_upload_by_segments_begins(row: dict[str, Any]) -> None:
-    assert decoded(row) == sdo.Message(Kind.UPLOAD_BEGUN, place(row), number=row['size'], last=False)
+    assert decoded(row) == sdo.Message(
+        Kind.UPLOAD_BEGUN, place(row), number=row['size'], last=False)
 
 
 @pytest.mark.parametrize('row', rows('segment_wanted'))
