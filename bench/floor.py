@@ -23,7 +23,7 @@ from std_msgs.msg import Float64
 from topics import DOUBLES, INTEGERS, TYPES
 from unix_bus import INTERFACE, register
 
-from drive_can_bridge.ros.middleware import begin_with_small_histories
+from drive_can_bridge.ros.middleware import set_up_fast_dds
 from drive_can_bridge.ros.prepared import PreparedMessage
 
 CYCLIC = 0x001FFFF0
@@ -140,7 +140,7 @@ class Floor:
 def main() -> None:
     """Obey."""
     register()
-    begin_with_small_histories()    # the middleware is set up as the bridge's
+    set_up_fast_dds()    # the middleware is set up as the bridge's
     rclpy.init(args=[])
     prefix, channel, drives, period, commanded = sys.argv[1:]
     floor = Floor(Node('bench_floor', enable_rosout=False), prefix, channel, int(drives),

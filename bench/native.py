@@ -15,7 +15,7 @@ import sys
 
 from child import HERE
 
-from drive_can_bridge.ros.middleware import begin_with_small_histories
+from drive_can_bridge.ros.middleware import set_up_fast_dds
 
 _LIBRARIES = ('rcl', 'rcutils', 'rosidl_runtime_c', *(
     f'{package}__rosidl_{part}' for package in ('rcl_interfaces', 'std_msgs')
@@ -54,7 +54,7 @@ def build(folder: Path) -> Path:
 def main() -> None:
     """Run the library of the first argument with the others."""
     import rclpy  # noqa: F401  the wheels of ROS set the path of libraries
-    begin_with_small_histories()    # the middleware is set up as the bridge's
+    set_up_fast_dds()    # the middleware is set up as the bridge's
     words = [each.encode() for each in sys.argv[1:]]
     ctypes.CDLL(sys.argv[1]).main(len(words), (ctypes.c_char_p * len(words))(*words))
 

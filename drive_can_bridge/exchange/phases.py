@@ -6,13 +6,13 @@ Drives that are all served at the same instant wait for each other: on the wire,
 fifteen at 1 Mbit/s gets its request after two and its answer after four of five milliseconds, and
 again in this process, where each answer is published before the next one is looked at. So drives
 of the same period are spread over it; but no finer than ``SLOT``, because every turn costs a wake-
-up, and three exchanges at 1 Mbit/s fill a slot.
+up, and five exchanges at 1 Mbit/s fill a slot (docs/performance.md has what other slots cost).
 """
 
 from collections.abc import Sequence
 
 #: s between two turns at least
-SLOT = 0.001
+SLOT = 0.0015
 
 
 def spread(periods: Sequence[float]) -> list[float]:
