@@ -92,7 +92,8 @@ def main() -> None:
     elif sys.argv[1] == 'bare':
         target, arguments = publish_bare, (node, float(sys.argv[2]))
     else:
-        target, arguments = publish_commands, (node, int(sys.argv[2]), float(sys.argv[3]), *sys.argv[4:])
+        target = publish_commands
+        arguments = (node, int(sys.argv[2]), float(sys.argv[3]), *sys.argv[4:])
     threading.Thread(target=target, args=arguments, daemon=True).start()
     serve(commands)
 
