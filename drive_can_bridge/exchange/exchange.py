@@ -32,7 +32,7 @@ from drive_can_bridge.transport.link import Link
 
 Owner = TypeVar('Owner')
 #: s between two turns at least
-SLOT = 0.001
+SLOT = 0.0015
 #: share of a period by which it may come before its time, where a thread is awake just then
 EARLY = 0.1
 #: the timer thread passes at least this often (s), so that a longer gap means lost time
@@ -101,7 +101,8 @@ def spread(periods: Sequence[float]) -> list[float]:
     last of fifteen at 1 Mbit/s gets its request after two and its answer after four of five
     milliseconds, and again in this process, where each answer is published before the next one is
     looked at. So drives of the same period are spread over it; but no finer than ``SLOT``,
-    because every turn costs a wake- up, and three exchanges at 1 Mbit/s fill a slot.
+    because every turn costs a wake-up, and five exchanges at 1 Mbit/s fill a slot
+    (docs/performance.md has what other slots cost).
 
     Drives of a period are taken in the order given; as many of them as need be share a slot.
     """

@@ -283,10 +283,10 @@ def _line_table(all_drives: Sequence[DriveSnapshot], drives: Sequence[DriveSnaps
     wanted = {'sent': sent.width - sent.name, 'actual': actual.width - actual.name, 'rate': 6,
               'trend': _TREND_MIN, 'missed': 6, 'name': actual.name, 'period': 14, 'latency': 14}
     widths = {}
-    for key, columns in wanted.items():
-        if columns and left >= columns + GAP:
-            widths[key] = columns
-            left -= columns + GAP
+    for key, needed in wanted.items():
+        if needed and left >= needed + GAP:
+            widths[key] = needed
+            left -= needed + GAP
     if 'trend' in widths:
         more = min(max(0, left), _TREND_MAX - _TREND_MIN)
         widths['trend'] += more
