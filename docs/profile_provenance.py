@@ -19,9 +19,8 @@ TITLES: dict[bool | None, str] = {True: 'verified', False: 'not verified', None:
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-Which entries of the shipped profiles are backed by a document, and by which. *Verified*: address,
-type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. What
-has no number is in process data only.
+Entries of the shipped profiles, and the documents that back them. *Verified*: address, type, scale
+and unit are backed. *Open*: what nothing backs. None has been compared with a device.
 
 Made by `docs/profile_provenance.py`; edit the profiles ([keys](profiles.md)).
 """
@@ -46,30 +45,31 @@ def _section(checked: Checked) -> Iterator[str]:
     yield ''
     for verified, title in TITLES.items():
         if rows := _rows(checked, verified):
-            yield f'| {title} | open | source |'
-            yield '|---|---|---|'
-            for row, names in rows.items():
-                yield f'| {", ".join(names)} | {" | ".join(row)} |'
+            yield f'### {title}'
             yield ''
+            for (still_open, source), names in rows.items():
+                told = f' Open: {still_open}.' if still_open else ''
+                yield f'* {", ".join(names)}: {source}.{told}'
+            yield ''
+    yield '### Sources'
+    yield ''
     for key, text in checked.sources.items():
         yield f'* **{key}**: {text}'
 
 
-def _rows(checked: Checked, verified: bool | None) -> dict[tuple[str, ...], list[str]]:
+def _rows(checked: Checked, verified: bool | None) -> dict[tuple[str, str], list[str]]:
     """Return the entries, with their addresses, by what is open of them and their sources."""
-    rows: dict[tuple[str, ...], list[str]] = {}
+    rows: dict[tuple[str, str], list[str]] = {}
     for name, entry in checked.entries.items():
         parameter = checked.loaded.profile.parameters[name]
         if parameter.verified is not verified:
             continue
-        row = _cell(entry.get('open', '')), _cell(entry.get('source', ''))
-        address = '' if parameter.number is parameter.index is None else f' {parameter.address}'
+        # what is verified has its address in the profile; the other one is to be compared
+        address = '' if verified or parameter.number is parameter.index is None else (
+            f' {parameter.address}')
+        row = entry.get('open', ''), entry.get('source', '')
         rows.setdefault(row, []).append(f'`{name}`{address}')
     return rows
-
-
-def _cell(text: str) -> str:
-    return text.replace('|', '\\|')
 
 
 def main() -> None:
