@@ -23,9 +23,9 @@ import pytest
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.protocols.cannord import identifiers, parameter_frame, process_data
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen_pkw import pkw
-from drive_can_bridge.protocols.cannord import identifiers, parameter_frame, process_data
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.mapping import effective

@@ -17,7 +17,7 @@ from drive_can_bridge.core.events import Event, MappingDiffered, Noted, StationF
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.ros.diagnostics import Report
-from drive_can_bridge.ros.flight_watch import Occasions
+from drive_can_bridge.ros.fleet import Occasions
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.tracer import Tracer
 
