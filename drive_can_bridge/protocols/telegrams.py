@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a row says in the table of telegrams of a protocol.
+Who speaks, and what a row says in a table of telegrams of different layouts.
 
-The tables are enums whose values are such rows: :class:`.canopen.sdo.Command`,
-:class:`.canopen_pkw.pkw.Function`, :class:`.cannord.parameter_frame.Task` and ``Response``.
-Sessions, simulated drives and ``decode`` read and write frames by them, and take from them which
-answer belongs to which request. ``test/protocols/test_telegrams.py`` wants a frame of a named
-source for every row, and sees every change of one.
+Such a table is an enum whose values are rows (:class:`.canopen.sdo.Kind`). Where all telegrams
+have one layout, a row is a number and what it means (:class:`.canopen_pkw.pkw.Function`,
+:class:`.cannord.parameter_frame.Task`). Sessions, simulated drives and ``decode`` read frames by
+the same rows, so ``test/protocols/test_telegrams.py`` wants a frame of a source for each, and
+that every change of one is seen.
 """
 
 from collections.abc import Mapping

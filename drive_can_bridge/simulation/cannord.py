@@ -19,7 +19,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, Response, Task, VALUE_RESPONSES, WRITES,
+    LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, Response, Task,
 )
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
@@ -40,7 +40,6 @@ from drive_can_bridge.simulation.registers import (
  ) = range(6)
 INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
 
-_ARRAY_READS = (Task.READ_ARRAY, Task.READ_ELEMENTS)
 _NEGATIVE = 0xFFFF
 _LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
@@ -149,16 +148,15 @@ class CannordTable:
         :return: response identifier, and the value, negative where it is.
         :raises Refused: with the error number of the manual.
         """
-        what = task.identifier
-        if what not in list(Task):
+        if task.identifier not in list(Task):
             raise Refused(INVALID_TASK)
+        what = Task(task.identifier)
         if what == Task.NONE:
             return Response.NONE, 0
         group = self._groups.get(task.number)
         if group is None:
             raise Refused(INVALID_NUMBER)
-        array, double, eeprom = WRITES.get(what, (what in _ARRAY_READS, False, False))
-        if array and not group.array:
+        if (what.array or what is Task.READ_ELEMENTS) and not group.array:
             raise Refused(NOT_AN_ARRAY)
         if what == Task.READ_ELEMENTS:
             return Response.ELEMENTS, max(group.members) + 1
@@ -167,11 +165,13 @@ class CannordTable:
         parameter = group.members.get(task.index if group.array else 0)
         if parameter is None:
             raise Refused(WRONG_SUBINDEX)
-        if what in WRITES:
-            self._write(parameter, task.value, double=double, eeprom=eeprom)
+        if what.writes:
+            self._write(parameter, task.value, double=what.double,
+                        eeprom=bool(what.persistent))
         elif not parameter.readable:
             raise Refused(CANNOT_BE_REPRESENTED)
-        response = VALUE_RESPONSES[array, parameter.type.bits == 32]
+        response = next(each for each in what.responses
+                        if each.double is (parameter.type.bits == 32))
         return response, self._registers.raw(parameter.name)
 
     def select_set(self, parameter_set: int) -> None:

@@ -21,7 +21,7 @@ from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    DOUBLE_RESPONSES, ParameterFrame, ParameterLayout, Response, RESPONSES, Task, WRITES,
+    ParameterFrame, ParameterLayout, Response, Task,
 )
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
@@ -80,7 +80,7 @@ class TaskCourier(Courier[Ask, Reply]):
 
         def left(sent: bool, then: float) -> None:
             # a read that the bus refused is repeated when its time is over
-            if not sent and step.task in WRITES:
+            if not sent and step.task.writes:
                 self.end(step, NOT_SENT, then)
         self._send(self._layout.encode(step.task, step.number, step.index, step.value), left)
 
@@ -92,7 +92,7 @@ class TaskCourier(Courier[Ask, Reply]):
             raise Unasked(f'parameter response {response.identifier} for '
                           f'P{response.number}.{response.index} does not belong to '
                           f'task {task.task} for P{task.number}.{task.index}')
-        if task.task in WRITES and response.identifier != Response.REFUSED and not _echoes(
+        if task.task.writes and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
             self.silent = Reply(None, response)
             raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
@@ -105,7 +105,7 @@ class TaskCourier(Courier[Ask, Reply]):
         return _belongs(self._layout.decode(answer), step)
 
     def attempts(self, step: Ask) -> int:
-        return 1 if step.task in WRITES else self.retry.attempts
+        return 1 if step.task.writes else self.retry.attempts
 
     def unanswered(self, step: Ask, reply: Reply) -> bool:
         return reply is self.silent
@@ -124,11 +124,11 @@ def _belongs(response: ParameterFrame, task: Ask) -> bool:
     if response.identifier == Response.REFUSED:
         # whether a refusal repeats the sub-index is not documented
         return response.index in (task.index, 0)
-    return response.identifier in RESPONSES[task.task] and response.index == task.index
+    return response.identifier in task.task.responses and response.index == task.index
 
 
 def _echoes(response: ParameterFrame, task: Ask) -> bool:
     """Tell whether a response to a write holds the value that was written."""
     # the high half of a word says nothing
-    width = 0xFFFFFFFF if response.identifier in DOUBLE_RESPONSES else 0xFFFF
+    width = 0xFFFFFFFF if response.double else 0xFFFF
     return response.value & width == task.value & width

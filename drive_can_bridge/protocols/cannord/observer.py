@@ -15,8 +15,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    DOUBLE_RESPONSES, error_text, ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
-    WRITES,
+    error_text, ParameterFrame, ParameterLayout, Response, Task,
 )
 from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES,
@@ -147,9 +146,8 @@ class CannordObserver(DriveObserver):
     def _take_task(self, told: tuple[ParameterFrame, Task], now: float) -> None:
         frame, task = told
         key = frame.number, frame.index
-        _, double, _ = WRITES.get(task, (False, False, False))
-        words = (frame.value if double else frame.word,) if task in WRITES else None
-        self._requests.ask(key, (key, task, double), now, words, title=_TITLES.get(task, ''))
+        words = (frame.value if task.double else frame.word,) if task.writes else None
+        self._requests.ask(key, (key, task, task.double), now, words, title=_TITLES.get(task, ''))
 
     def _take_task_response(self, told: tuple[ParameterFrame, Response], now: float) -> None:
         frame, response = told
@@ -157,11 +155,11 @@ class CannordObserver(DriveObserver):
         asked = self._requests.about.get(key)
         task: Task = Task.READ if asked is None else asked.span[1]
         refused = response is Response.REFUSED
-        span = None if response is Response.NONE else (key, task, response in DOUBLE_RESPONSES)
-        fits = asked is None or refused or response in RESPONSES[task]
+        span = None if response is Response.NONE else (key, task, response.double)
+        fits = asked is None or refused or response in task.responses
         valued = response not in _ANSWER_TITLES
         self._requests.answer(
-            key, Asked(span, task in WRITES, title=_ANSWER_TITLES.get(response, '')), now,
+            key, Asked(span, task.writes, title=_ANSWER_TITLES.get(response, '')), now,
             (frame.answered,) if valued else None,
             refusal=error_text(frame.word) if refused else '',
             wrong='' if fits else f'response {int(response)} to task {int(task)}',
@@ -182,8 +180,7 @@ class CannordObserver(DriveObserver):
         if span is None:
             return (), []
         (number, index), task, double = span
-        array, _, _ = WRITES.get(task, (task is Task.READ_ARRAY, False, False))
-        subindex = index if array or index else None
+        subindex = index if task.array or index else None
         parameter = self._listed.get((number, subindex))
         if parameter is None or (parameter.type.bits == 32) is not double:
             name = parameter.name if parameter is not None else f'p{number}' + (

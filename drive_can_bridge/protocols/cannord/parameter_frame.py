@@ -39,67 +39,81 @@ _SPONTANEOUS = 0x0800
 _IDENTIFIER_SHIFT = 12
 
 
-class Task(IntEnum):
-    """Task identifiers, master to inverter. 4, 5, 10 and 15 do not exist."""
-
-    NONE = 0
-    READ = 1
-    WRITE_WORD = 2
-    WRITE_DOUBLE = 3
-    READ_ARRAY = 6
-    WRITE_ARRAY_WORD = 7
-    WRITE_ARRAY_DOUBLE = 8
-    READ_ELEMENTS = 9
-    WRITE_ARRAY_DOUBLE_RAM = 11
-    WRITE_ARRAY_WORD_RAM = 12
-    WRITE_DOUBLE_RAM = 13
-    WRITE_WORD_RAM = 14
-
-
 class Response(IntEnum):
-    """Response identifiers, inverter to master."""
+    """
+    Response identifiers, inverter to master.
+
+    :ivar array: it carries the value of an element.
+    :ivar double: it carries a double word.
+    """
+
+    array: bool
+    double: bool
+
+    def __new__(cls, code: int, array: bool = False, double: bool = False) -> 'Response':
+        row = int.__new__(cls, code)
+        row._value_, row.array, row.double = code, array, double
+        return row
 
     NONE = 0
-    WORD = 1
-    DOUBLE = 2
-    ARRAY_WORD = 4
-    ARRAY_DOUBLE = 5
+    WORD = 1, False, False
+    DOUBLE = 2, False, True
+    ARRAY_WORD = 4, True, False
+    ARRAY_DOUBLE = 5, True, True
     ELEMENTS = 6
     REFUSED = 7
 
 
-#: (array, double word) -> response that carries a value
-VALUE_RESPONSES: dict[tuple[bool, bool], Response] = {
-    (False, False): Response.WORD,
-    (False, True): Response.DOUBLE,
-    (True, False): Response.ARRAY_WORD,
-    (True, True): Response.ARRAY_DOUBLE,
-}
-DOUBLE_RESPONSES = (Response.DOUBLE, Response.ARRAY_DOUBLE)
+class Task(IntEnum):
+    """
+    Task identifiers, master to inverter. 4, 5, 10 and 15 do not exist.
+
+    :ivar responses: what may follow when it was carried out.
+    :ivar persistent: of a write: to the EEPROM, not to RAM only; None: it is none.
+    """
+
+    responses: tuple[Response, ...]
+    persistent: bool | None
+
+    def __new__(cls, code: int, responses: str = '',
+                persistent: bool | None = None) -> 'Task':
+        row = int.__new__(cls, code)
+        row._value_, row.persistent = code, persistent
+        row.responses = tuple(Response[name] for name in responses.split())
+        return row
+
+    NONE = 0, 'NONE'
+    READ = 1, 'WORD DOUBLE'
+    WRITE_WORD = 2, 'WORD', True
+    WRITE_DOUBLE = 3, 'DOUBLE', True
+    READ_ARRAY = 6, 'ARRAY_WORD ARRAY_DOUBLE'
+    WRITE_ARRAY_WORD = 7, 'ARRAY_WORD', True
+    WRITE_ARRAY_DOUBLE = 8, 'ARRAY_DOUBLE', True
+    READ_ELEMENTS = 9, 'ELEMENTS'
+    WRITE_ARRAY_DOUBLE_RAM = 11, 'ARRAY_DOUBLE', False
+    WRITE_ARRAY_WORD_RAM = 12, 'ARRAY_WORD', False
+    WRITE_DOUBLE_RAM = 13, 'DOUBLE', False
+    WRITE_WORD_RAM = 14, 'WORD', False
+
+    @property
+    def writes(self) -> bool:
+        """It writes a value."""
+        return self.persistent is not None
+
+    @property
+    def array(self) -> bool:
+        """It is about an element."""
+        return self.responses[0].array
+
+    @property
+    def double(self) -> bool:
+        """It carries a double word."""
+        return self.writes and self.responses[0].double
+
 
 #: (array, double word, EEPROM) -> task
-WRITE_TASKS: dict[tuple[bool, bool, bool], Task] = {
-    (False, False, True): Task.WRITE_WORD,
-    (False, True, True): Task.WRITE_DOUBLE,
-    (True, False, True): Task.WRITE_ARRAY_WORD,
-    (True, True, True): Task.WRITE_ARRAY_DOUBLE,
-    (False, False, False): Task.WRITE_WORD_RAM,
-    (False, True, False): Task.WRITE_DOUBLE_RAM,
-    (True, False, False): Task.WRITE_ARRAY_WORD_RAM,
-    (True, True, False): Task.WRITE_ARRAY_DOUBLE_RAM,
-}
-#: the same the other way round: task -> (array, double word, EEPROM)
-WRITES: dict[int, tuple[bool, bool, bool]] = {task: how for how, task in WRITE_TASKS.items()}
-
-#: what may follow a task when it was carried out
-RESPONSES: dict[Task, tuple[Response, ...]] = {
-    Task.NONE: (Response.NONE,),
-    Task.READ: (Response.WORD, Response.DOUBLE),
-    Task.READ_ARRAY: (Response.ARRAY_WORD, Response.ARRAY_DOUBLE),
-    Task.READ_ELEMENTS: (Response.ELEMENTS,),
-    **{task: (VALUE_RESPONSES[array, double],)
-       for (array, double, _), task in WRITE_TASKS.items()},
-}
+WRITE_TASKS = {(task.array, task.double, task.persistent): task for task in Task if task.writes}
+_DOUBLE = [response for response in Response if response.double]
 
 #: what the error numbers of a refused task mean
 ERRORS: dict[int, str] = {
@@ -139,9 +153,14 @@ class ParameterFrame:
         return self.value & 0xFFFF
 
     @property
+    def double(self) -> bool:
+        """It is a response that carries a double word."""
+        return self.identifier in _DOUBLE
+
+    @property
     def answered(self) -> int:
         """The value of a response: a double word, or else a word."""
-        return self.value if self.identifier in DOUBLE_RESPONSES else self.word
+        return self.value if self.double else self.word
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    DOUBLE_RESPONSES, error_text, ParameterFrame, Response, Task, WRITE_TASKS,
+    error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
 from drive_can_bridge.protocols.placement import OneByOne
 
@@ -64,7 +64,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         answer = yield from self._ask(span)
         if isinstance(answer, Failure):
             return answer
-        double = answer.identifier in DOUBLE_RESPONSES
+        double = answer.double
         if span.width_known and double != (span.type.bits == 32):
             return Failure(_width_text(span, double=double))
         return (answer.answered,)
@@ -98,7 +98,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             answer = yield from self._ask(parameter)
             if isinstance(answer, Failure):
                 return answer
-            double = answer.identifier in DOUBLE_RESPONSES
+            double = answer.double
             if not double and not -0x8000 <= raw <= 0xFFFF:
                 return Failure(sentences.not_in_bits(raw, 16, -0x8000, 0xFFFF))
         if not double and cells(parameter) & self._signed:

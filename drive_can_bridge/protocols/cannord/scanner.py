@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, broadcasts, decode_identifier, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
+    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, Task,
 )
 from drive_can_bridge.protocols.cannord.process_data import decode_main
 from drive_can_bridge.protocols.cannord.states import ACKNOWLEDGE, QUICK_STOP, READY, RUN, state_of
@@ -176,7 +176,7 @@ class CannordProber(Prober):
             wrong = [key for key, each in results.items()
                      if each is not None and each.error == _WRONG_SUBINDEX]
             served = [key for key, each in results.items()
-                      if each is not None and each.response in RESPONSES[Task.READ_ARRAY]]
+                      if each is not None and each.response in Task.READ_ARRAY.responses]
             if len(wrong) == len(served) == 1:
                 return Finding('index_byte', wrong[0], told)
         return Finding('index_byte', None, told)
@@ -186,7 +186,7 @@ class CannordProber(Prober):
     def _ask(self, task: Task, number: int, ind: int = 0) -> _Asking:
         data = ParameterLayout().encode(task, number)
         data = data[:2] + ind.to_bytes(2, 'little') + data[4:]
-        expected = {*RESPONSES[task], Response.REFUSED}
+        expected = {*task.responses, Response.REFUSED}
 
         def fits(answer: bytes) -> bool:
             return (int.from_bytes(answer[_NUMBER_AND_TASK], 'little') & 0xFFF == number

@@ -51,7 +51,7 @@ layout            bytes 0 to 7 (f: toggle and function, s: sub-index)
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 import struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 
@@ -82,21 +82,6 @@ _PLACES = {
 }
 
 
-class Function(IntEnum):
-    """The function codes (bits 14..8 of word 2)."""
-
-    NONE = 0x00
-    READ_REGISTER_16 = 0x25
-    READ_REGISTER_32 = 0x26
-    WRITE_REGISTER_16 = 0x2A
-    WRITE_REGISTER_32 = 0x2B
-    READ_OBJECT_16 = 0x35
-    READ_OBJECT_32 = 0x36
-    WRITE_OBJECT_16 = 0x3A
-    WRITE_OBJECT_32 = 0x3B
-    ERROR = 0x4E
-
-
 @dataclass(frozen=True)
 class Meaning:
     """What a function code asks for."""
@@ -106,17 +91,34 @@ class Meaning:
     count: int
 
 
-_FUNCTIONS = {
-    Meaning(False, False, 1): Function.READ_REGISTER_16,
-    Meaning(False, False, 2): Function.READ_REGISTER_32,
-    Meaning(False, True, 1): Function.WRITE_REGISTER_16,
-    Meaning(False, True, 2): Function.WRITE_REGISTER_32,
-    Meaning(True, False, 1): Function.READ_OBJECT_16,
-    Meaning(True, False, 2): Function.READ_OBJECT_32,
-    Meaning(True, True, 1): Function.WRITE_OBJECT_16,
-    Meaning(True, True, 2): Function.WRITE_OBJECT_32,
-}
-_MEANINGS = {int(code): meaning for meaning, code in _FUNCTIONS.items()}
+class Function(IntEnum):
+    """
+    The function codes (bits 14..8 of word 2).
+
+    :ivar meaning: by CANopen index, writes, registers; None: it asks for nothing.
+    """
+
+    meaning: Meaning | None
+
+    def __new__(cls, code: int, *meaning: Any) -> 'Function':
+        row = int.__new__(cls, code)
+        row._value_, row.meaning = code, Meaning(*meaning) if meaning else None
+        return row
+
+    NONE = 0x00
+    READ_REGISTER_16 = 0x25, False, False, 1
+    READ_REGISTER_32 = 0x26, False, False, 2
+    WRITE_REGISTER_16 = 0x2A, False, True, 1
+    WRITE_REGISTER_32 = 0x2B, False, True, 2
+    READ_OBJECT_16 = 0x35, True, False, 1
+    READ_OBJECT_32 = 0x36, True, False, 2
+    WRITE_OBJECT_16 = 0x3A, True, True, 1
+    WRITE_OBJECT_32 = 0x3B, True, True, 2
+    ERROR = 0x4E
+
+
+_MEANINGS = {int(code): code.meaning for code in Function if code.meaning}
+_FUNCTIONS = {meaning: code for code, meaning in _MEANINGS.items()}
 
 
 class Address(NamedTuple):
@@ -248,7 +250,7 @@ def _request(address: Address, writes: bool, count: int, toggle: bool, words: Wo
         if not 0 <= entry.word <= WORD_MAX or not 0 <= (entry.subindex or 0) <= SUBINDEX_MAX:
             raise LocalProtocolError(f'{entry} does not exist: register numbers and indices are '
                                      f'0 to {WORD_MAX}, sub-indices 0 to {SUBINDEX_MAX}')
-    return Message(address.word, int(function), toggle, address.subindex or 0, words)
+    return Message(address.word, function, toggle, address.subindex or 0, words)
 
 
 # -- bytes ----------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, ParameterFrame, ParameterLayout, Response, RESPONSES, Task,
+    error_text, ERRORS, ParameterFrame, ParameterLayout, Response, Task,
 )
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'cannord.json').read_text(
@@ -209,7 +209,7 @@ def test_fields_out_of_range(identifier: int, number: int, index: int, value: in
 
 
 def test_tasks_and_their_responses() -> None:
-    found = {int(task): [int(entry) for entry in RESPONSES[task]] for task in Task if task}
+    found = {int(task): [int(entry) for entry in task.responses] for task in Task if task}
     assert found == {row['task']: row['answers'] for row in FILE['tasks']}
     assert len(found) == 11
 
