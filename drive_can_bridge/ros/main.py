@@ -108,7 +108,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
 
     from drive_can_bridge.clock import SteadyClock
     from drive_can_bridge.ros.bridge_node import BridgeNode
-    from drive_can_bridge.ros.executor_thread import ExecutorThread
+    from drive_can_bridge.ros.threads import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
     clock = SteadyClock()

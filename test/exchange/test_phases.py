@@ -5,7 +5,7 @@ from builders import drive
 from exchange_builders import Bench
 import pytest
 
-from drive_can_bridge.exchange.phases import spread
+from drive_can_bridge.exchange.exchange import spread
 
 
 def test_one_drive_has_the_bus_for_itself() -> None:
