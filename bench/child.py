@@ -7,7 +7,7 @@ Python lock is shared by what is not shared in real life.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import json
 import os
 from pathlib import Path
@@ -70,8 +70,11 @@ class Child:
 
 def cpu_of(process: int) -> float:
     """Return the CPU time of all threads of a process in s."""
-    return 1e-9 * sum(int((task / 'schedstat').read_text().split()[0])
-                      for task in Path(f'/proc/{process}/task').iterdir())
+    spent = 0
+    for task in Path(f'/proc/{process}/task').iterdir():
+        with suppress(OSError):     # it has ended meanwhile
+            spent += int((task / 'schedstat').read_text().split()[0])
+    return 1e-9 * spent
 
 
 @contextmanager

@@ -25,20 +25,20 @@ class UnixBus(can.BusABC):
     """The measured side."""
 
     def __init__(self, channel: Any = None, can_filters: Any = None, **kwargs: Any) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.connect(channel)
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.socket.connect(channel)
         self.channel_info = f'unix socket {channel}'
         super().__init__(channel=channel, can_filters=can_filters, **kwargs)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         identifier = msg.arbitration_id | EXTENDED if msg.is_extended_id else msg.arbitration_id
-        self._socket.send(CAN_FRAME.pack(identifier, msg.dlc, bytes(msg.data)))
+        self.socket.send(CAN_FRAME.pack(identifier, msg.dlc, bytes(msg.data)))
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        ready, _, _ = select.select([self._socket], [], [], timeout)
+        ready, _, _ = select.select([self.socket], [], [], timeout)
         if not ready:
             return None, False
-        data = self._socket.recv(16)
+        data = self.socket.recv(16)
         if not data:
             raise can.CanOperationError('the drives are gone')
         identifier, length, payload = CAN_FRAME.unpack(data)
@@ -52,7 +52,7 @@ class UnixBus(can.BusABC):
 
     def shutdown(self) -> None:
         super().shutdown()
-        self._socket.close()
+        self.socket.close()
 
 
 def register() -> None:

@@ -8,9 +8,15 @@ service call never waits for a tick. Everything that a frame causes, publishing 
 in the thread that received it: a hop through an executor costs 50 µs and a quarter of a core at
 1,000 frames/s.
 
-The timer is a plain thread that sleeps until the earliest of its sessions' deadlines, which are
-absolute: it needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
+What is due is served in a *pass*. Passes follow the earliest of the sessions' deadlines, which are
+absolute: that needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
 outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:func:`spread`).
+
+Where the adapter wakes the reader in time (``EndPoint.punctual``), the reader makes the passes,
+too: it sleeps once for whatever comes first, a frame or a deadline, and no thread has to wait for
+the other one's lock and interpreter. It says when it will be back. The timer thread makes the
+passes that are due before that, those for which somebody rings, and all of them while no reader is
+back in time: no bus, one that opens, a reader that has died, an adapter that sleeps too long.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -43,6 +49,8 @@ LOST_TIME = 1.0
 LATENESS_MAX = 0.25
 #: s that a command waits at most until it is looked at, however seldom its drive is served
 LOOK_PERIOD = 0.05
+#: s by which the reader may be back too late before the timer thread does its work
+GRACE = 0.02
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
 
@@ -201,12 +209,13 @@ class BusExchange:
         filters = list(dict.fromkeys(chain(*routes, counted, *overheard)))
         self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
                          stations=len(self._sessions), prepare_thread=prepare_thread,
-                         opener=open_bus and (lambda: open_bus(bus)))
+                         opener=open_bus and (lambda: open_bus(bus)), keep_time=self._keep_time)
         for session, phase in zip(sessions, spread(periods)):
             session.phase = phase
         self.errand: Errand | None = None
         self._alarm = clock.alarm()
-        self._wake_at = 0.0
+        self._wake_at = 0.0     # when the next pass is due
+        self._back_at = -math.inf   # when the reader will look after that
         self._meant_at = 0.0    # when the next pass was to be
         self._last_pass = 0.0
         self._tell_at = 0.0
@@ -351,23 +360,46 @@ class BusExchange:
 
     def _ring_if_sooner(self, member: Member) -> None:
         """Wake the timer thread if a drive, or a partner of it, wants to be served before that."""
-        if member.due < self._wake_at or member.partners and any(
-                partner.due < self._wake_at for partner in member.partners):
+        if member.soonest < self._wake_at:
             self._alarm.ring()
 
     # -- the timer thread -------------------------------------------------------------------------
 
     def _run(self) -> None:
+        rung = True
         try:
             self._prepare_thread()
             while not self._closing:
+                if rung or self._clock() >= self._turn():
+                    self._serve()
                 with self.lock:
-                    self._wake_at = self._pass()
-                if self.errand is not None:
-                    self._wake_at = min(self._wake_at, self.errand.run(self._clock()))
-                self._alarm.wait(self._wake_at)
+                    until = self._turn()
+                rung = self._alarm.wait(until)
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
+
+    def _turn(self) -> float:
+        """Return when the next pass is the timer thread's, as things are."""
+        due, back_at = self._wake_at, self._back_at
+        return due if due < back_at else max(due, back_at + GRACE)
+
+    def _keep_time(self, longest: float) -> float:
+        """Serve, in the reader thread, what is due; return how many s it may wait for a frame."""
+        if self._clock() >= self._wake_at:
+            self._serve()
+        with self.lock:
+            now = self._clock()
+            self._back_at = min(self._wake_at, now + longest)
+        return max(0.0, self._back_at - now)
+
+    def _serve(self) -> None:
+        """Make a pass, and see to the errand."""
+        with self.lock:
+            self._wake_at = self._pass()
+        if self.errand is not None:
+            due = self.errand.run(self._clock())
+            with self.lock:
+                self._wake_at = min(self._wake_at, due)
 
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
@@ -432,7 +464,13 @@ class BusExchange:
                 self.frames_rejected += not hearers
                 return
             member.take(member.session.receive_frame, frame, now, now - arrived)
-        self._ring_if_sooner(member)
+            due = member.soonest
+            if due >= self._wake_at:
+                return
+            if now < self._back_at + GRACE:     # this thread keeps time, and looks next
+                self._wake_at = due
+                return
+        self._alarm.ring()
 
     def bus_opened(self) -> None:
         """Begin (again) with every drive."""
@@ -460,6 +498,8 @@ class BusExchange:
 
     def link_failed(self, reason: str) -> None:
         """Give up: the reader thread met a defect."""
+        self._back_at = -math.inf
+        self._alarm.ring()
         self._fail(reason)
 
     def _fail(self, reason: str) -> None:

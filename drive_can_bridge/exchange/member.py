@@ -95,6 +95,14 @@ class Member:
         self._transmit = transmit
         self._clock = clock
 
+    @property
+    def soonest(self) -> float:
+        """When it, or a partner, wants to be called."""
+        due = self.due
+        for partner in self.partners:
+            due = min(due, partner.due)
+        return due
+
     # -- steps ------------------------------------------------------------------------------------
 
     def take(self, step: Callable[..., object], *arguments: object) -> None:

@@ -43,6 +43,7 @@ class EndPoint(ABC):
     One open bus. Whatever an end point has no means to count stays 0.
 
     :ivar age: s between the reception of the last received frame and the return of ``receive``.
+    :ivar punctual: ``receive`` ends when its time-out does, to well below a millisecond.
     :ivar error_frames: error frames seen.
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
@@ -52,6 +53,7 @@ class EndPoint(ABC):
 
     def __init__(self) -> None:
         self.age = 0.0
+        self.punctual = False
         self.error_frames = 0
         self.rejected_frames = 0
         self.last_error: BusError | None = None

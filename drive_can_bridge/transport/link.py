@@ -74,6 +74,8 @@ class Link:
     :param stations: how many drives are on the bus, for each of which a frame may wait.
     :param prepare_thread: called first in the reader thread.
     :param opener: opens the bus; None: python-can, by the configuration.
+    :param keep_time: called in the reader thread before it waits for a frame where the port is
+        punctual: (longest wait in s) -> how many s it may wait; None: nothing is due there.
     :ivar error_witness: sees error frames, in the reader thread; to be set before ``start``.
     :ivar taken: another process has the bus.
     """
@@ -81,8 +83,10 @@ class Link:
     def __init__(self, bus: BusConfiguration, routes: Sequence[Route], listener: LinkListener,
                  clock: Clock, *, send_timeout: float, stations: int = 0,
                  prepare_thread: Callable[[], object] = lambda: None,
-                 opener: Callable[[], EndPoint] | None = None) -> None:
+                 opener: Callable[[], EndPoint] | None = None,
+                 keep_time: Callable[[float], float] | None = None) -> None:
         self.bus = bus
+        self._keep_time = keep_time
         self._open = opener or (lambda: open_port(bus, clock, routes, stations=stations))
         self._clock = clock
         self._now = clock.now
@@ -261,6 +265,7 @@ class Link:
     def _read(self, port: EndPoint, frame: Frame | None) -> None:
         receive = port.receive
         listener = self._listener.frame_received
+        keep_time = self._keep_time if port.punctual else None
         rejected = 0
         while not self._closing:
             if self._loss is not None:
@@ -274,7 +279,7 @@ class Link:
             elif port.rejected_frames != rejected:
                 self._listener.frames_rejected += port.rejected_frames - rejected
                 rejected = port.rejected_frames
-            frame = receive(RECEIVE_TIMEOUT)
+            frame = receive(RECEIVE_TIMEOUT if keep_time is None else keep_time(RECEIVE_TIMEOUT))
 
     def _sit_out(self, port: EndPoint, reason: str) -> None:
         """

@@ -86,6 +86,8 @@ class Port(EndPoint):
         self._writer: SerialWriter | None = getattr(bus, 'drive_can_writer', None)
         self._answers: AdapterAnswers | None = getattr(bus, 'drive_can_answers', None)
         self._socket = RawSocket.below(bus)
+        # it waits by select(); other adapters poll, or set time-outs of a serial port
+        self.punctual = isinstance(getattr(bus, 'socket', None), socket.socket)
         self._lost = False
         self._malformed_in_row = 0
         self._earliest = self._now()   # the next frame cannot have come before

@@ -279,6 +279,63 @@ def test_deactivate_with_the_timer_thread(clock: JumpingClock) -> None:
     assert bench.bus_notes.told == [('opened', 'main')]
 
 
+def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: JumpingClock) -> None:
+    bench = Bench(drive(period=0.005, mapping='assume'), clock=clock)
+    exchange = bench.exchange
+    exchange.bus_opened()
+    exchange.open()
+    exchange.activate()
+    wait_for(lambda: bench.link.sent)
+    passes: list[str] = []
+    make = exchange._pass
+
+    def note() -> float:
+        passes.append(clock.current.name)
+        return make()
+    exchange._pass = note  # type: ignore[method-assign]
+
+    def read(end: float) -> None:
+        while clock.now() < end:
+            clock.wait(clock.now() + exchange._keep_time(0.02))
+    me, begun = clock.current.name, clock.now()
+    read(begun + 0.1)
+    passes.clear()
+    bench.link.take()
+    read(begun + 0.2)
+    assert set(passes) == {me}
+    assert len(bench.link.take()) == 20     # one every 5 ms, as ever
+    # somebody rings: the timer thread does not wait for the reader
+    passes.clear()
+    exchange._alarm.ring()
+    clock.wait(clock.now() + 1e-6)
+    assert passes == ['exchange main']
+    # and it goes on, where the reader does not come back
+    passes.clear()
+    clock.wait(clock.now() + 0.1)
+    assert set(passes) == {'exchange main'}
+    assert len(bench.link.take()) >= 15     # but for the 20 ms in which it was waited for
+    exchange.deactivate()
+    exchange.close()
+
+
+def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
+    bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0,
+                        parameter_timeout=0.02))
+    exchange = bench.exchange
+    exchange.bus_opened()
+    exchange.activate()
+    bench.at(10.0)
+    exchange._keep_time(0.02)
+    while exchange._alarm.wait(0.0):
+        pass
+    for back, rings in ((10.02, False), (9.97, True)):  # it is back; it is not
+        exchange._back_at, exchange._wake_at = back, 20.0
+        bench.hears('7F1#00', 10.001)
+        bench.hears(ANSWER, 10.001)
+        assert exchange._alarm.wait(0.0) is rings
+        assert (exchange._wake_at < 20.0) is not rings
+
+
 def test_deactivate_gives_up_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(drive())
     bench.online()

@@ -56,23 +56,41 @@ def test_a_control_word_without_slot_is_written_at_the_end(bridge: StartBridge,
     wait_until(lambda: one.played['lift'].value('control_word') == 0)
 
 
+def ends_safely(one: Bridge, client: Client, recorder: Recorder) -> None:
+    wait_until(lambda: one.fatal)
+    assert one.fatal == ['buses.main: internal error: RuntimeError: a defect']
+    one.node.stop()
+    wait_until(lambda: last_cycles(recorder) == [(0, 0, 0, 0)] * 3)
+    client.wait_logged('internal error: RuntimeError: a defect', ERROR)
+
+
 def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client: Client,
                                                     monkeypatch: pytest.MonkeyPatch) -> None:
     one = run(bridge, client)
     exchange = one.node.exchanges['main']
-    original = BusExchange._pass
 
-    def fail(exchange: BusExchange) -> float:
-        monkeypatch.setattr(BusExchange, '_pass', original)
+    def fail(_: float) -> bool:
         raise RuntimeError('a defect')
     with one.record() as recorder:
-        monkeypatch.setattr(BusExchange, '_pass', fail)
-        wait_until(lambda: one.fatal)
-        assert one.fatal == ['buses.main: internal error: RuntimeError: a defect']
+        monkeypatch.setattr(exchange._alarm, 'wait', fail)
+        exchange._alarm.ring()
         wait_until(lambda: not exchange._thread.is_alive())
-        one.node.stop()
-        wait_until(lambda: last_cycles(recorder) == [(0, 0, 0, 0)] * 3)
-    client.wait_logged('internal error: RuntimeError: a defect', ERROR)
+        ends_safely(one, client, recorder)
+
+
+def test_a_dead_reader_ends_the_bridge_safely(bridge: StartBridge, client: Client,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    one = run(bridge, client)
+    original = BusExchange._serve
+
+    def fail(exchange: BusExchange) -> None:    # the reader makes the passes
+        monkeypatch.setattr(BusExchange, '_serve', original)
+        raise RuntimeError('a defect')
+    with one.record() as recorder:
+        monkeypatch.setattr(BusExchange, '_serve', fail)
+        wait_until(lambda: one.fatal)
+        assert one.node.exchanges['main']._thread.is_alive()
+        ends_safely(one, client, recorder)
 
 
 @pytest.mark.parametrize('more', [

@@ -18,7 +18,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport import link as link_module
 from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import BusError
-from drive_can_bridge.transport.link import Link
+from drive_can_bridge.transport.link import Link, RECEIVE_TIMEOUT
 from drive_can_bridge.transport.port import open_port
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
@@ -43,12 +43,15 @@ class FakePort:
         self.looks = 0
         self.closed = False
         self.age = 0.0
+        self.punctual = False
+        self.waits: set[float] = set()
         self.counts = Counts()
         self.rejected_frames = 0
         self.last_error: BusError | None = None
         self.controller = ''
 
     def receive(self, timeout: float) -> Frame | None:
+        self.waits.add(timeout)
         if not self.coming:
             pause(min(timeout, 0.001))
             return None
@@ -111,7 +114,8 @@ class Bench:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, clock: JumpingClock,
                  kind: type[FakePort] = FakePort, *, send_timeout: float = 0.01,
-                 bus: BusConfiguration = BUS) -> None:
+                 bus: BusConfiguration = BUS,
+                 keep_time: Callable[[float], float] | None = None) -> None:
         self.clock = clock
         self.kind = kind
         self.ports: list[FakePort] = []
@@ -120,7 +124,8 @@ class Bench:
         self.stations: set[int] = set()
         self.listener = Listener()
         monkeypatch.setattr(link_module, 'open_port', self._open)
-        self.link = Link(bus, [], self.listener, clock, send_timeout=send_timeout, stations=3)
+        self.link = Link(bus, [], self.listener, clock, send_timeout=send_timeout, stations=3,
+                         keep_time=keep_time)
         self.link.start()
 
     def _open(self, bus: BusConfiguration, clock: object, routes: object, *,
@@ -198,6 +203,32 @@ def test_the_same_loss_is_told_again_when_the_bus_was_there_in_between(
         bench.port.coming.append(BusUnavailable('receive: unplugged'))
     bench.opened(4)
     assert bench.listener.told == ['opened', 'lost: receive: unplugged'] * 3 + ['opened']
+
+
+class PunctualPort(FakePort):
+    """One that returns when it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.punctual = True
+
+
+@pytest.mark.parametrize(('kind', 'waits'), [
+    (FakePort, {RECEIVE_TIMEOUT}), (PunctualPort, {RECEIVE_TIMEOUT, 0.004})])
+def test_the_reader_keeps_time_where_the_adapter_lets_it(
+        kind: type[FakePort], waits: set[float], make: Callable[..., Bench]) -> None:
+    asked: list[float] = []
+
+    def keep_time(longest: float) -> float:
+        asked.append(longest)
+        return 0.004
+    bench = make(kind, keep_time=keep_time)
+    bench.opened()
+    bench.port.coming.append(ANSWER)
+    wait_for(lambda: bench.listener.frames == [ANSWER])
+    pause(0.05)
+    assert bench.port.waits == waits    # the first look, and those after it
+    assert set(asked) == ({RECEIVE_TIMEOUT} if kind is PunctualPort else set())
 
 
 class DeadPort(FakePort):

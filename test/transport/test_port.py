@@ -8,6 +8,7 @@ import fcntl
 import itertools
 import os
 from pathlib import Path
+import socket
 import sys
 import termios
 import time
@@ -228,6 +229,12 @@ def test_socket_without_room_gets_nothing(bus: FakeBus) -> None:
     assert socket.waited[-1] == 0.0125
     socket.overflowed_frames = 7
     assert port.counts.overflowed == 7
+
+
+def test_only_what_waits_for_a_socket_is_punctual(bus: FakeBus) -> None:
+    assert not Port(bus, REAL).punctual
+    with socket.socket() as bus.socket:     # type: ignore[attr-defined]
+        assert Port(bus, REAL).punctual
 
 
 def test_controller_that_is_bus_off_is_not_opened(tmp_path: Path,
