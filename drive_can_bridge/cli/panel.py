@@ -56,7 +56,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     """Serve until the end; return whether the addresses were told before it came."""
     try:
         from drive_can_bridge.ros.monitor.client import MonitorClient
-        from drive_can_bridge.ros.monitor.operations import Operations
+        from drive_can_bridge.ros.monitor.client import Operations
     except ImportError as error:
         raise DriveCanError(what_is_missing(COMMAND, error)) from error
     if ended():     # what follows takes seconds, too

@@ -27,9 +27,6 @@ from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTIT
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES
 
-#: a global name is found sooner than a member of an enum
-_ACCEPTED = CommandOutcome.ACCEPTED
-
 
 def _by_hand(command: str, drive: str, node: Node) -> str:
     """
@@ -132,8 +129,6 @@ class CommandIntake:
         except ValueRefused as error:
             name = session.setpoints.items[index].parameter.name
             self._warn(f'refused {name}', f'command {name} refused: {error}')
-            return
-        if outcome is _ACCEPTED:    # nearly all of them
             return
         if outcome is CommandOutcome.DISABLED and session.active:
             name = session.setpoints.items[index].parameter.name

@@ -25,7 +25,7 @@ from drive_can_bridge.ros.middleware import (
 )
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
 from drive_can_bridge.ros.stamps import Stamp, Stamps
-from drive_can_bridge.ros.values import converters, parameter_value, TOPIC_TYPES, VALUE_FIELDS
+from drive_can_bridge.ros.values import parameter_value, TOPIC_TYPES, VALUE_FIELDS
 
 
 class EventTopic:
@@ -79,7 +79,7 @@ class RequestTopic:
     def __init__(self, node: Node, sent: LastSent, stamps: Stamps) -> None:
         self._sent = sent
         self._stamps = stamps
-        self._converters = converters(sent.parameters)
+        self._converters = [each.value_from_raw for each in sent.parameters]
         self._topic = EventTopic(node, '~/request', sent.parameters)
         self._audience = Audience(self._topic.publisher)
 
@@ -196,7 +196,7 @@ class SamplePublisher:
     def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
                  stamp: Callable[[float], Stamp]) -> None:
         self._stamp = stamp
-        self._converters = converters(parameters)
+        self._converters = [parameter.value_from_raw for parameter in parameters]
         self._values = [ValueTopic(node, parameter, slot)
                         for slot, parameter in enumerate(parameters)]
         mapped = drive.cyclic_response

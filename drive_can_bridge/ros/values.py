@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Between drive parameters and ROS messages: one rule for types everywhere."""
 
-from collections.abc import Callable, Sequence
 import re
 from typing import Any
 
@@ -36,18 +35,6 @@ def parameter_value(parameter: Parameter, value: Value) -> ParameterValue:
     """Return a typed ParameterValue."""
     kind = parameter.kind
     return ParameterValue(type=PARAMETER_TYPES[kind], **{VALUE_FIELDS[kind]: value})
-
-
-def converters(parameters: Sequence[Parameter]) -> list[Callable[[int], Value]]:
-    """Return what makes values of raw integers, for the fast paths."""
-    return [_scaler(parameter.scale, parameter.offset) if parameter.scaled
-            else parameter.value_from_raw for parameter in parameters]
-
-
-def _scaler(scale: float, offset: float) -> Callable[[int], float]:
-    if offset:
-        return lambda raw: raw * scale + offset
-    return lambda raw: raw * scale
 
 
 def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str:

@@ -15,8 +15,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot
-from drive_can_bridge.monitor.snapshot import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Outcome, Snapshot, Stop
 
 pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")

@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
-from drive_can_bridge.ros.monitor.operations import Operations, PARAMETER_TIMEOUT
+from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT
 
 
 @contextmanager

@@ -5,33 +5,47 @@ A hidden node that attaches to whatever bridges there are, and fills the model.
 It subscribes and asks, and that is all: no topic, no service, no parameter of its own. Everything
 happens in :meth:`MonitorClient.poll`, in the thread that calls it.
 
-Between messages and the plain values of the model.
+:class:`Operations` is what a person may ask of a drive through it: reads, writes, stops. Nothing
+here can move one.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 import math
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log, ParameterDescriptor, ParameterEvent, ParameterType
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import is_ros_name, Place, Status
+from drive_can_bridge.monitor.snapshot import is_ros_name, Outcome, Place, Status, Stop
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
-    ClientNode, Inbox, latched_quality, log_quality, newest_quality, NodeCalls,
+    ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
-from drive_can_bridge.ros.messages import drive_value, facts_of, limits_of, plain
+from drive_can_bridge.ros.messages import (
+    drive_value, facts_of, limits_of, parameter_message, plain,
+)
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
 _LEVELS = {getattr(Log, name): name
            for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
+#: s for a stop, which answers when the drive's status says so, and for a read or write
+STOP_TIMEOUT = 10.0
+PARAMETER_TIMEOUT = 15.0
+
+#: service and request of each; ``enable`` is asked for its false only
+_STOPS: dict[Stop, tuple[str, Any, Callable[[], Any]]] = {
+    Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request),
+    Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False)),
+}
+_SILENCE = Outcome(False, 'nobody answered: is its bridge still running?')
 
 
 def stamp_of(message: Any) -> float:
@@ -273,3 +287,69 @@ def _text(value: Any) -> str:
 def _number(value: Any) -> float:
     found = drive_value(value)
     return math.nan if found is None else float(found)
+
+
+class Operations:
+    """
+    Services of drives, for those who see them through a monitor's node.
+
+    :param node: of the monitor.
+    """
+
+    def __init__(self, node: HasHandle) -> None:
+        self._node = node
+        self._stops: dict[tuple[str, Stop], Service] = {}
+        self._calls = NodeCalls(node, PARAMETER_TIMEOUT)
+
+    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
+        """Take the answers that have arrived; return whether somebody still waits for one."""
+        wanted = {(drive, stop) for drive, each in stops.items() for stop in each}
+        for gone in self._stops.keys() - wanted:
+            if not self._stops[gone].busy:
+                self._stops.pop(gone).close()
+        for drive, stop in wanted - self._stops.keys():
+            name, kind, _ = _STOPS[stop]
+            self._stops[drive, stop] = Service(self._node, kind, f'{drive}/{name}', STOP_TIMEOUT)
+        for service in self._stops.values():
+            if service.busy:
+                service.look(now)
+        self._calls.look(now)
+        return self._calls.busy or any(service.busy for service in self._stops.values())
+
+    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+        """Stop a drive."""
+        def take(response: Any) -> None:
+            done(_SILENCE if response is None
+                 else Outcome(response.success, printable(response.message)))
+        service = self._stops.get((drive, stop))
+        if service is None:
+            done(Outcome(False, f'nobody offers {drive}/{_STOPS[stop][0]}: no control word, or '
+                                f'its bridge does not run'))
+        else:
+            service.send(_STOPS[stop][2](), take, now)
+
+    def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
+              now: float) -> None:
+        """Write a parameter of a drive."""
+        def take(response: SetParameters.Response | None) -> None:
+            results = [] if response is None else response.results
+            done(Outcome(results[0].successful, printable(results[0].reason)) if results
+                 else _SILENCE)
+        self._ask(drive, 'set_parameters',
+                  SetParameters.Request(parameters=[parameter_message(name, value)]), take, now)
+
+    def read(self, drive: str, names: Sequence[str],
+             done: Callable[[Sequence[Value | None]], None], now: float) -> None:
+        """Read parameters of a drive; None: could not be read."""
+        def take(response: GetParameters.Response | None) -> None:
+            answers = [] if response is None else [drive_value(v) for v in response.values]
+            done((answers + [None] * len(names))[:len(names)])
+        self._ask(drive, 'get_parameters',
+                  GetParameters.Request(names=list(names)), take, now)
+
+    def _ask(self, drive: str, service: str, request: Any, take: Callable[[Any], None],
+             now: float) -> None:
+        if is_ros_name(drive):
+            self._calls.ask(drive, service, request, take, now)
+        else:
+            take(None)
