@@ -2,5 +2,5 @@
 """
 The live view in a terminal, with rich: pages (:mod:`.page`) made of snapshots, and a screen.
 
-A page is a function of the snapshot, of what the user has chosen (:mod:`.keys`), and of the size.
+A page is a function of the snapshot, of what the user has chosen, and of the size.
 """
