@@ -17,6 +17,8 @@ PAGE = 'profile_trust.md'
 #: how the entries of each kind are headed, in the order of the page
 TITLES: dict[bool | None, str] = {True: 'Verified; open', False: 'Not verified; open',
                                 None: 'Not judged; open'}
+#: names that are numbered on, without addresses
+_RUN = re.compile(r'`([a-z_0-9]+)_(\d+)`(?:, `\1_\d+`)+, `\1_(\d+)`')
 
 _HEAD = """\
 # How far the shipped profiles can be trusted
@@ -51,8 +53,9 @@ def _section(checked: Checked) -> Iterator[str]:
             yield f'### {title}'
             yield ''
             for still_open, (names, sources) in groups.items():
-                yield f'* {", ".join(names)}: {still_open} ({", ".join(sources)})' \
-                    if still_open else f'* {", ".join(names)}: nothing'
+                named = _RUN.sub(r'`\1_\2` to `\1_\3`', ', '.join(names))
+                yield f'* {named}: {still_open} ({", ".join(sources)})' \
+                    if still_open else f'* {named}: nothing'
             yield ''
     yield '### Sources'
     yield ''
@@ -72,7 +75,8 @@ def _groups(checked: Checked, verified: bool | None) -> dict[str, tuple[list[str
         address = '' if verified or parameter.number is parameter.index is None else (
             f' {parameter.address}')
         names.append(f'`{name}`{address}')
-        sources += [each for each in re.split(r', (?![^(]*\))', entry.get('source', ''))
+        # which of them backs what stands in the profile, in brackets
+        sources += [each for each in re.sub(r' \([^)]*\)', '', entry.get('source', '')).split(', ')
                     if each not in sources]
     return groups
 

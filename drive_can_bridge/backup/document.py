@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The file of a backup: comments that say what it is of, and the settings as ROS parameters.
+The file of a backup: what it is of, as comments, and the settings as ROS parameters.
 
 .. code-block:: yaml
 
@@ -16,19 +16,12 @@ The file of a backup: comments that say what it is of, and the settings as ROS p
       ros__parameters:
         ramp_time: 2.5  # s
 
-Values of a backup: how they are written, and which raw integer one of them means.
+No settings are setpoints, the control word, what process data alone carry (no command writes
+them), and the bits that the profile's section ``restore`` sets and clears: they say in which mode
+a drive is. A parameter with such bits comes last, as its other bits are written with them.
 
-Which parameters of a drive are settings: what a backup holds, and a restored one brings back.
-
-Setpoints, the control word, and what process data alone carry, are none: no command writes them.
-Neither are the bits that the profile's section ``restore`` sets and clears: they say in which mode
-a drive is, not how it is set up. No file brings them back; a mode that a drive was left in is
-ended. A parameter with such bits comes last, as its other bits are written with them.
-
-Read a backup, strictly: whatever is not plainly one is named, with its line, and nothing is used.
-
-Output of ``ros2 param dump`` is read as well: it has no head, and ``null`` for what a drive did
-not give.
+Reading is strict: whatever is not plainly a backup is named with its line, and nothing is used.
+Output of ``ros2 param dump`` has no head, and ``null`` for what a drive did not give.
 """
 
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE

@@ -5,15 +5,14 @@ Bring the settings of a backup back into a drive.
 .. code-block:: text
 
     before      steps of the profile: a device wants to be in a mode for it
-    rounds      what differs is written and read back; what a drive refused, or did not take, is
-                tried again after the others, as long as that gets on
+    rounds      what differs is written and read back; what was refused, or not taken, is tried
+                again after the others, as long as that gets on
     after       steps of the profile, whatever happened: written without a look, for a drive whose
                 answers get lost may hear them all the same
     read back   everything that is to be as in the file
 
-Nothing in here waits for a signal: ``stopped`` is asked between two writes, so that each write is
-verified before anything ends, and the steps afterwards are always attempted. Before each write the
-drive is asked whether somebody has enabled it: then nothing but those steps follows.
+``stopped`` is asked between two writes, so that each is verified before anything ends. Before each
+the drive is asked whether somebody has enabled it: then only the steps afterwards follow.
 """
 
 from collections.abc import Callable, Mapping, Sequence

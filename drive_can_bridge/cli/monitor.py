@@ -2,8 +2,7 @@
 """
 ``drive_can monitor``: the live view of whatever bridges run.
 
-A ROS client and nothing else: it sees what any node could see, attaches to all bridges there are,
-on this host or others, and detaches again without any of them noticing.
+A ROS client that sees what any node could see; no bridge notices when it comes and goes.
 """
 
 import argparse

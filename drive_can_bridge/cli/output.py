@@ -3,8 +3,7 @@
 Tables and progress bars for people, and JSON for programs.
 
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
-a pipe or a file is plain text in columns, neither cut nor wrapped. Bars are on standard error, in
-a terminal only.
+a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a terminal only.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -3,9 +3,8 @@
 ``drive_can scan``: looking for drives on a bus that nobody has described.
 
 Listening first, then asking what nobody can misunderstand. On 11-bit identifiers a read of one
-family is a command of another. So only families whose questions mean nothing to others are asked
-by default; another one only when it is named, and never once a CANopen node was heard or answered.
-What was found is written as a parameter file, with tables of raw parameters where none is known.
+family is a command of another: such a family is asked only when it is named, and never once a
+CANopen node was heard or answered.
 """
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace

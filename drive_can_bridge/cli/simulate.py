@@ -3,7 +3,7 @@
 ``drive_can simulate``: play every drive of a bridge parameter file on its buses.
 
 Standard output has first the end points, one line per bus, then what the drives do. Standard input
-takes faults while the drives run, see :class:`Console`.
+takes faults while the drives run (:class:`Console`).
 """
 
 import argparse

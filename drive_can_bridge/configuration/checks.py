@@ -4,8 +4,6 @@ The buses and drives of a configuration: each of them, and what drives of a bus 
 
 A drive is built even when parts of it are wrong, with defaults in place of the wrong parts, so
 that everything else about it can be checked in the same run.
-
-The ``joint`` section of a drive: its parameters are exchanged, and their units convert.
 """
 
 from collections.abc import Callable, Iterable, Iterator

@@ -3,10 +3,9 @@
 Find the bridge's parameters in a ROS parameter file.
 
 A file may serve many nodes: ``NODE: {ros__parameters: …}``, the node name possibly split over
-nested namespaces. ``validate`` and ``simulate`` have no node name; they take the one section that
-holds ``buses``, and like rcl all others that are for the same node, such as ``/**``: of what
-stands in several, the last in the file counts. What makes rcl refuse the whole file counts in
-every section, what only garbles parameters counts in ours.
+nested namespaces. ``validate`` and ``simulate`` take the one section that holds ``buses``, and
+like rcl all others for the same node, such as ``/**``: the last in the file counts. What makes rcl
+refuse the whole file counts in every section, what only garbles parameters counts in ours.
 """
 
 from collections.abc import Iterable

@@ -2,10 +2,9 @@
 """
 Problems, and where they are.
 
-A :class:`Tree` is a piece of configuration together with the place it came from: a section of a
-parameter file, a profile, or the parameter overrides of a node (which have no file). All checks
-work on trees and note in them what they find, so that one and the same check names
-``FILE:LINE: key.path`` for a file and ``key.path`` for a node.
+A :class:`Tree` is a piece of configuration with the place it came from: a section of a parameter
+file, a profile, or the overrides of a node (which have no file). All checks note in trees what
+they find, so that the same check names ``FILE:LINE: key.path`` or ``key.path``.
 """
 
 from collections.abc import Iterable
@@ -50,8 +49,7 @@ class Tree:
     Nested mappings, lists and scalars with their places, and what was found in them.
 
     :param lines: line of every key and list item, by path.
-    :param damaged: paths whose value is missing or useless because of a problem that has been
-        noted already. What depends on them is not worth another complaint.
+    :param damaged: paths whose value is missing or useless because of a problem noted already.
     :param incomplete: paths of mappings that had a key nobody could read: what seems to be
         missing in them may have been meant by it.
     :param problems: what is wrong, in the order in which it was found.

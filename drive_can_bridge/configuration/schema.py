@@ -1,17 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The JSON Schemas of the parameter file and of profiles.
+The JSON Schemas of the parameter file and of profiles, and the check of a tree against them.
 
-They serve twice: the check below runs on them, and editors use the shipped files for completion
-(``# yaml-language-server: $schema=…``). The schema of the parameter file is put together from a
-base and from the keys of every protocol family; that of profiles names the families. The results
-are shipped as files, which a test compares. To write them anew:
-``python3 -m drive_can_bridge.configuration.schema``.
+Editors use the shipped files for completion (``# yaml-language-server: $schema=…``); a test
+compares them. To write them anew: ``python3 -m drive_can_bridge.configuration.schema``. The keys
+of every protocol family are put into the schema of the parameter file.
 
-Check a tree against a JSON Schema, and say what is wrong in sentences of our own.
-
-What is wrong is also cut out of the tree and marked as damaged, so that the checks that follow
-find either good values or none.
+What is wrong is told in sentences of our own, cut out of the tree and marked as damaged, so that
+later checks find either good values or none.
 """
 
 from collections.abc import Callable, Iterator, Mapping

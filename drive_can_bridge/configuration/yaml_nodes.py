@@ -1,24 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-YAML files as nodes with lines.
+YAML files as nodes with lines, and from those to plain data, under the rules of ROS parameters.
 
-Nodes are put together from PyYAML's event stream, on which rcl works as well: only there can be
-seen what rcl refuses (PyYAML's composer follows aliases and refuses anchors that stand twice).
-It takes no recursion, so that no nesting of a file ends in the depths of the C stack.
+Nodes are put together from PyYAML's event stream, as rcl does: only there can be seen what rcl
+refuses (aliases, anchors that stand twice). No recursion: no nesting of a file ends in the depths
+of the C stack. Everything wrong is noted and reading goes on.
 
-Read a file that a user names: whatever it is, that ends, and fits the memory.
-
-From the nodes of a YAML mapping to plain data with lines, under the rules of ROS parameters.
-
-Everything wrong is noted and reading goes on, so that one run finds all problems.
-
-rcl does not follow YAML's own rules for the type of a scalar. It compares with a list of words,
-then tries C's ``strtoll`` with base 0, then ``strtod``; what is left is a string. So ``y`` is a
-bool, ``010`` is 8, ``08`` is 8.0, ``1_000``, ``null`` and ``1e400`` are strings, ``inf`` is a
-number. Quotes or the tag ``!!str`` make a string; every other tag is ignored.
-
-A check of a parameter file has to see the values that the node will see, hence this module
-(compared with the real parser by a test).
+rcl compares a scalar with a list of words, then tries C's ``strtoll`` with base 0, then
+``strtod``; what is left is a string. So ``y`` is a bool, ``010`` is 8, ``08`` is 8.0, ``1_000``,
+``null`` and ``1e400`` are strings, ``inf`` is a number. Quotes or the tag ``!!str`` make a string;
+every other tag is ignored. A test compares this with the real parser.
 """
 
 from collections.abc import Iterator

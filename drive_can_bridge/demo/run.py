@@ -3,9 +3,7 @@
 The demo itself: which processes start in which order, and end in the opposite one.
 
 First the drives, so that the bridge finds its buses; the view at once, since it takes a while. At
-the end the bridge stops the drives, neutral frames first, and only then do they lose their bus.
-
-The configuration of the demo: any bridge's, with other buses.
+the end the bridge stops the drives, and only then do they lose their bus.
 """
 
 from collections.abc import Iterator

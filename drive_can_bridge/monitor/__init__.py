@@ -2,7 +2,6 @@
 """
 What bridges and their drives look like from outside, by what any ROS node can see of them.
 
-The model (:mod:`.model`) takes what arrives and gives a snapshot (:mod:`.snapshot`) of plain
-frozen values; time is an argument. Nothing here knows ROS, a terminal or a browser: what fills
-the model and what shows its snapshots stand outside, and there may be several of either.
+The model (:mod:`.model`) takes what arrives and gives a snapshot (:mod:`.snapshot`) of frozen
+values; time is an argument. Nothing here knows ROS, a terminal or a browser.
 """

@@ -4,8 +4,6 @@ The model: takes what arrives from the graph, gives snapshots.
 
 Nothing is believed that arrives: text is made printable, names have to be names, and there is an
 upper limit to everything. ``now`` is the time of a steady clock in s.
-
-What is known of one drive, from all sources together.
 """
 
 from collections import deque

@@ -2,11 +2,8 @@
 """
 How bridges, buses and drives are at one moment: plain values, ready to be shown anywhere.
 
-Text from the graph: anybody can put anything there.
-
-Diagnostics of a bridge, read: who says it, about what, and the numbers in it.
-
-What values were a moment ago, and how fast counters count.
+Diagnostics are read here, and what values and counters were a moment ago is kept. Text from the
+graph is made printable: anybody can put anything there.
 """
 
 from collections import deque

@@ -2,9 +2,7 @@
 """
 Many drives at a glance: colours with one legend for all views, the worst first, and advice.
 
-How to talk to a drive from another terminal: command lines that work as they stand.
-
-Drives in lines of text, for pipes and for the end.
+Also command lines that work as they stand in another terminal, and drives as lines for pipes.
 """
 
 from collections import Counter
@@ -155,10 +153,9 @@ class Lines:
     """
     A line for each drive, again and again.
 
-    That a drive is online is told before its first sample arrives here: on topics of their own, a
-    moment or, on a busy machine, some seconds apart. A line that says ``online`` has the values,
-    so until then it says ``offline``, which is what the model says of samples that stay away, too.
-    Samples that this monitor did not ask for, because there are too many, are not waited for.
+    That a drive is online arrives before its first sample, up to some seconds on a busy machine. A
+    line that says ``online`` has the values, so until then it says ``offline``. Samples that this
+    monitor did not ask for, because there are too many, are not waited for.
     """
 
     def __init__(self) -> None:

@@ -2,13 +2,10 @@
 """
 Who may come in: token, Host and Origin of a request, judged without any input or output.
 
-*Host* keeps out DNS rebinding: a page of somebody else whose name suddenly leads to this machine
-still says its own name. *Origin* and *Sec-Fetch-Site* keep out what other pages of the same
-browser send here with the user's cookie. The *token* says who may look, and who may act.
-
-A page that says one thing, for who is not let in or finds nothing, with a way back.
-
-The ASGI middleware in front of everything: nothing comes in but by :mod:`.access`.
+*Host* keeps out DNS rebinding: a page whose name suddenly leads to this machine still says its own
+name. *Origin* and *Sec-Fetch-Site* keep out what other pages of the same browser send with the
+user's cookie. The *token* says who may look, and who may act. The ASGI middleware lets nothing in
+but by these.
 """
 
 from collections.abc import Iterable, Mapping

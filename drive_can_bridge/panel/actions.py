@@ -5,10 +5,8 @@ What a browser may ask for: each a request of its own, whose role the gate has f
 None of it moves a drive. Answers are JSON, ``{"success": bool, "text": words}`` at least; a stop
 of all gets ``failed``, a line for each drive that does not stand, which ``text`` begins with.
 
-Backups of drives by the commands that a person would use: ``drive_can backup``, ``compare`` ...
-
-Each runs in a process of its own and goes through the running bridge, so that there is one way of
-doing it, with the same rules and the same words, and the panel stays small.
+Backups are made by ``drive_can backup``, ``compare``, ``restore``, each in a process of its own,
+through the running bridge: one way of doing it, with the same rules and words.
 """
 
 import asyncio

@@ -1,13 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-One drive: its values and bits, a chart, its parameters, what diagnostics say.
+One drive: its values and bits, a chart of values of any drives, its parameters, diagnostics.
 
-A chart of values, several in one, of one drive or of several.
-
-The browser keeps the points and draws them; what is sent is what is new. So pausing and zooming
-are the browser's own business, and cost the panel nothing.
-
-The parameters of a drive: searched, read over its bus a page at a time, edited in place.
+The browser keeps and draws the points; what is sent is what is new. So pausing and zooming cost
+the panel nothing. Parameters are read over the bus a page at a time, and edited in place.
 """
 
 from collections.abc import Mapping, Sequence

@@ -2,9 +2,7 @@
 """
 The web application: pages in one frame, files, actions, and the gate in front of all.
 
-All drives and buses at a glance: a few as cards, more as rows, the worst first.
-
-Diagnostics of all bridges, buses and drives, and the log.
+All drives and buses: a few as cards, more as rows, the worst first; diagnostics and the log.
 """
 
 import asyncio

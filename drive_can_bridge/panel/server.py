@@ -50,9 +50,8 @@ class Connection(H11Protocol):
     """
     A connection. It stands outside until the gate has found its token.
 
-    Outside nobody is turned away: where there are too many, the one that has stood there longest
-    has to leave, so that those who say nothing keep nobody from being heard. Inside there is an
-    upper limit, but not for a stop.
+    Where there are too many outside, the one that has stood there longest has to leave, so that
+    those who say nothing keep nobody from being heard. Inside there is a limit, but not for stops.
 
     :param outside: those that have shown no token yet, the oldest first; of all connections.
     """

@@ -3,8 +3,8 @@
 From a table in a text file to the entries of a profile, row by row.
 
 A row is taken whole or not at all: a limit that cannot be read is no reason to let every value
-through. What a table does not say stays unsaid; only the type has to be decided, and the entry
-says so. What each column was taken for is a note; ``--columns`` and ``--decimal`` say it better.
+through. Only the type is decided where it is not told, and the entry says so. What each column was
+taken for is a note; ``--columns`` and ``--decimal`` say it better.
 """
 
 from collections.abc import Mapping, Sequence

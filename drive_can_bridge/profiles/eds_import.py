@@ -2,13 +2,12 @@
 """
 From an EDS or DCF file to the entries of a profile, through the library ``canopen``.
 
-What a section means is the library's business: types, limits with their signs, compact arrays. It
-takes a file as a whole or not at all, and knows no lines. So the file is taken apart here, and
-handed over object by object: a broken section costs that entry and no other.
+The library knows types, limits with their signs, and compact arrays; but it takes a file as a
+whole or not at all, and knows no lines. So the file is handed over object by object: a broken
+section costs that entry and no other.
 
-What a drive of CiA 402 has of the standard is called as in the shipped profile ``cia402_servo``,
-and has its bits, values and units; the units that are every maker's own are taken from the file
-where it says them, and are raw otherwise.
+Standard objects of CiA 402 have names, bits, values and units of the shipped profile
+``cia402_servo``; units that are every maker's own are taken from the file, else raw.
 """
 
 from collections.abc import Sequence

@@ -1,22 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Names for parameters, made from free text by one rule (docs/profiles.md has it with examples).
-
-1. A unit at the end is dropped: ``Ramp time [s]``, ``Drehzahl in 1/min``.
-2. Letters become a to z: umlauts ae, oe, ue, other accents vanish, Greek letters get their names.
-3. Words are what letters and digits form; ``RampTime`` is two. They are joined by ``_``.
-4. At most 60 characters, cut between words.
-5. What cannot be a name gets ``parameter_`` in front (it begins with a digit, or nothing is left:
-   then the number follows) or ``_value`` behind (it is taken by the node of the drive, reads as a
-   raw parameter, or is a word that YAML takes for something else).
-6. Of several equal names the one with the lowest address keeps it; the others get their number
-   behind.
+Names for parameters, made from free text by the rules of docs/profiles.md.
 
 Units that a joint converts get the spelling of :mod:`drive_can_bridge.core.units`, a few others
-the usual one; every other unit stays as it was written.
-
-What is written here is read alike by the bridge (which follows rcl's rules for scalars) and by
-any YAML parser, and one and the same table always gives one and the same text.
+the usual one; every other unit stays as it was written. What is written is read alike by rcl and
+by any YAML parser, and the same table always gives the same text.
 """
 
 from collections.abc import Iterable, Mapping

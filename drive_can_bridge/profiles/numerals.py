@@ -2,9 +2,8 @@
 """
 Numbers as manuals write them: decimal commas, grouped thousands, hexadecimal.
 
-``1.000`` is one or a thousand, depending on who wrote it. What settles that is the rest of the
-same table: a single ``0,5`` makes the comma the decimal sign (:func:`decimal_sign`). Where nothing
-does, such a number is refused rather than guessed.
+``1.000`` is one or a thousand. The rest of the same table settles that: a single ``0,5`` makes the
+comma the decimal sign (:func:`decimal_sign`). Else such a number is refused rather than guessed.
 """
 
 from collections.abc import Iterable

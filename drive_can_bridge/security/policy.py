@@ -3,17 +3,13 @@
 The SROS2 policy of a bridge: three enclaves, and what each may do. Everything else is denied.
 
 ``/bridge``
-    the process of the bridge: its own topics and services, and nothing of anybody else's.
+    the process of the bridge: its own topics and services.
 ``/operator``
     who moves drives: commands, ``~/enable``, parameters; and all that a viewer may.
 ``/viewer``
-    who looks: topics of drives, diagnostics, the log, reading parameters. Nothing that moves
-    or changes anything.
+    who looks: topics of drives, diagnostics, the log, reading parameters.
 
-Access control of DDS knows topics, not what is in them: who may call ``~/enable`` may call it
-with true and with false.
-
-The topics and services of a bridge and its drives, by what they are for.
+Access control of DDS knows topics, not contents: who may call ``~/enable`` may call it with true.
 """
 
 from collections.abc import Iterable

@@ -8,8 +8,8 @@ The two texts that candump writes: its log file (``-l``, ``-L``) and its screen.
      (1700000000.123456)  can0  TX - -  003FFFF0   [8]  05 DC 00 00 00 00 00 00
      (2026-11-21 23:04:38.123456)  can0  003FFFF0   [8]  05 DC 00 00 00 00 00 00
 
-Not read by python-can: its reader takes error frames for data frames unless one certain bit is
-set, ends at the first line that is none of its own, and knows the screen not at all.
+Not by python-can: its reader takes most error frames for data frames, ends at the first line that
+is none of its own, and does not know the screen.
 """
 
 from datetime import datetime

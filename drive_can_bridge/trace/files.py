@@ -3,11 +3,7 @@
 Trace files: which formats there are, what each of them loses, reading and writing them.
 
 Formats are python-can's, by suffix; candump's texts have a reader and writer of their own
-(:mod:`.candump`). What is damaged is told and left out: one line does not cost a trace.
-
-Which bus of a parameter file a trace means by its channel.
-
-Files that traces and tables are written to: whatever goes wrong, it is known with which one.
+(:mod:`.candump`). One damaged line does not cost a trace. Errors of files say which one it was.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -2,17 +2,13 @@
 """
 The flight recorder of a bridge: what came before a failure, on disk before anybody asks.
 
-A thread of its own waits for a second after the event, so that what followed is in the trace, too,
-and writes in small steps between which it gives way: the exchange goes on undisturbed.
-
-A trace that somebody asks for takes nothing from those of failures: one that comes soon behind it
-is written all the same, when a trace of this bus may be written again.
-
-The last seconds of a bus in memory, at next to no cost.
-
 A frame becomes 24 bytes in a block that exists already: nothing is allocated for it, nothing is
-left for the garbage collector to look at, whose work would grow with what is kept. Blocks that are
-full are never touched again, so that writing them to a file needs no copy and no lock.
+left for the garbage collector, whose work would grow with what is kept. Blocks that are full are
+never touched again, so that writing them to a file needs no copy and no lock.
+
+A thread waits for a second after the event, so that what followed is in the trace, too, and writes
+in small steps between which it gives way. A trace that somebody asks for takes nothing from those
+of failures: one that comes soon behind it is written when a trace of this bus may be again.
 """
 
 from collections import deque

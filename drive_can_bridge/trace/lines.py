@@ -8,10 +8,8 @@ Telegrams as lines of text, and as JSON.
     12.341310 +0.020 main conveyor < cyclic response: actual_speed 498.2 rpm [0.8 ms]
     12.380512 +0.040 main conveyor < cyclic response: LOST: no answer in 20 ms
 
-First the time since the trace began; then that since the last telegram of the same kind: of a
-cyclic one its period. At the end, in brackets, what an answer took.
-
-Raw integers as people read them: ``500.0 rpm``, ``0003h (ready, enabled)``.
+First the time since the trace began, then that since the last telegram of the same kind; at the
+end, in brackets, what an answer took.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -2,8 +2,6 @@
 """
 The loop of the live view: look, draw, listen to the keyboard.
 
-The whole terminal, for as long as the view is shown, and its keyboard.
-
 Ctrl-Z gives the terminal back until the process is continued, unless somebody else looks after
 SIGTSTP. A terminal that takes nothing (Ctrl-S) is drawn on when it does again.
 """
