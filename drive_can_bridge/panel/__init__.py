@@ -2,8 +2,9 @@
 """
 The drives in a browser: pages on the model of :mod:`drive_can_bridge.monitor`.
 
-Who may come in is decided at one place, for every request and every WebSocket: :mod:`.access`. What reaches a drive is a POST to one of :mod:`.actions`, where the
-role counts; pages and their WebSocket only show.
+Who may come in is decided at one place, for every request and every WebSocket: :mod:`.access`.
+What reaches a drive is a POST to one of :mod:`.actions`, where the role counts; pages and their
+WebSocket only show.
 """
 
 import sys
