@@ -55,9 +55,8 @@ from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.fleet import Fleet
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
-from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import ExecutorThread
+from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.end_point import EndPoint
 

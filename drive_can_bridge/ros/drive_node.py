@@ -38,11 +38,10 @@ from drive_can_bridge.ros.middleware import GONE, latched_quality, publisher, qu
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
-from drive_can_bridge.ros.service_thread import (
-    control_services, CoroutineServices, Question, ServiceThread,
-)
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import ExecutorThread
+from drive_can_bridge.ros.threads import (
+    control_services, CoroutineServices, ExecutorThread, Question, ServiceThread,
+)
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]

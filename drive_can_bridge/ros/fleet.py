@@ -36,9 +36,8 @@ from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, Report
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import Joints
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.service_thread import ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import ExecutorThread, PeriodicThread
+from drive_can_bridge.ros.threads import ExecutorThread, PeriodicThread, ServiceThread
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.failures import with_outlook

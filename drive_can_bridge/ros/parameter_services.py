@@ -4,7 +4,7 @@ A drive's parameters as the parameters of its node.
 
 The six standard services, so that ``ros2 param`` and rqt_reconfigure work on a drive. Reading and
 writing goes over acyclic frames: the callbacks are coroutines, which wait for the session's answer
-without holding up anybody (:mod:`.service_thread`).
+without holding up anybody (:mod:`.threads`).
 """
 
 from collections.abc import Callable, Sequence
@@ -33,8 +33,8 @@ from drive_can_bridge.core.sentences import bridge_inactive, Sentence
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
-from drive_can_bridge.ros.service_thread import CoroutineServices, Question, ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
+from drive_can_bridge.ros.threads import CoroutineServices, Question, ServiceThread
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
 #: codes of reasons why a read may fail that say nothing about the parameter

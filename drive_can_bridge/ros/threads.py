@@ -1,28 +1,62 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Threads of the bridge: an executor's, which no callback can bring down, and a periodic one's.
+Threads of the bridge: of an executor, of what is periodic, of services that wait for nobody.
 
-A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
-with the executor's wait. Results of other threads are left here.
+An executor serves one callback after the other, and looks at everything else that it has in
+between: several times for each call that has to wait for its drive, and a client that asks for a
+thousand parameters is served before the one who wants a stop. So services of drives are taken
+by threads that have nothing else to do, straight from a wait set of their own; those that stop
+machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
+halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
+
+Callbacks that are coroutines wait for answers without an executor, too: one thread begins a
+coroutine, the one that answers goes on with it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Generator, Mapping
+from contextlib import ExitStack
+from functools import partial
 import threading
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
+from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.clock import Clock, Mailbox, Worker
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.ros.middleware import GONE
+from drive_can_bridge.ros.polled_topics import PolledGroup
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
+#: share of the processor's time for a thread that anybody can keep busy
+MODEST = 0.3
+#: calls of one service that are taken in a row
+TAKE_MAX = 8
+
+#: takes the response; to be called once, from any thread
+Answer = Callable[[Any], None]
+#: takes a request, and whatever is to be called with the response
+Callback = Callable[[Any, Answer], None]
+#: takes service, response and the header of the request
+Send = Callable[[Service, Any, Any], None]
+AnswerT = TypeVar('AnswerT')
+#: takes request and response, and returns the response
+Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]
 
 
 class ExecutorThread:
     """
-    Spins a SingleThreadedExecutor until told to stop.
+    Spins a SingleThreadedExecutor until told to stop; no callback can bring it down.
+
+    A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
+    with the executor's wait. Results of other threads are left here.
 
     :param report: takes one line about an exception that a callback let escape.
     """
@@ -120,3 +154,298 @@ class PeriodicThread:
             except Exception as error:  # noqa: BLE001  outermost loop of a thread
                 self._failed(f'{type(error).__name__}: {error}')
             due = max(due + self._period, self._now())  # never twice to catch up
+
+
+class Pace:
+    """
+    Have one thread pause when it has used more than its share. Made and used by that thread.
+
+    One thread at a time has the interpreter. One that never waits, because callers ask as fast as
+    they are answered, makes the exchange late and stops wait, however high their priority is.
+
+    :param share: of the processor's time, 0 to 1.
+    :param in_hand: s that may be used at once, after a while of little work.
+    """
+
+    def __init__(self, share: float, clock: Clock, in_hand: float = 0.002) -> None:
+        self._clock = clock
+        self._share = share
+        self._in_hand = in_hand
+        self._left = in_hand
+        self._seen = clock.now()
+        self._used = clock.used()
+
+    def keep(self) -> None:
+        """Pause, if it is time to. After each piece of work."""
+        now, used = self._clock.now(), self._clock.used()
+        self._left = min(self._in_hand, self._left + self._share * (now - self._seen)) - (
+            used - self._used)
+        self._seen, self._used = now, used
+        if self._left < 0.0:
+            self._clock.wait(now - self._left / self._share)
+
+
+class ServiceThread:
+    """
+    Serves services whose callback group keeps them from executors.
+
+    Starts with the first service. Answers are awaited by nobody: a callback has to be short.
+
+    :param report: takes one line about an exception that a callback let escape.
+    :param prepare_thread: called first in the thread that takes requests.
+    :param share: of the processor's time that each of its two threads may use; 1: all of it.
+    :param send: sends an answer.
+    """
+
+    def __init__(self, name: str, context: Context, report: Callable[[str], None], clock: Clock,
+                 prepare_thread: Callable[[], object] = lambda: None, *,
+                 share: float = MODEST, send: Send = Service.send_response) -> None:
+        self._name = name
+        self._clock = clock
+        self._send_response = send
+        self._share = share
+        self._context = context
+        self._report = report
+        self._prepare_thread = prepare_thread
+        self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
+        self._changed = False   # what is served
+        self._jobs: Mailbox[Callable[[], None] | None] = Mailbox(clock)
+        self._guard = rclpy_implementation.GuardCondition(context.handle)
+        self._ending = False
+        self._threads: list[Worker] = []
+
+    def serve(self, service: Service, callback: Callback,
+              answered: Callable[[], None] = lambda: None) -> None:
+        """
+        Begin to serve a service.
+
+        :param answered: called after each response was sent.
+        """
+        self._served[service] = callback, answered
+        if not self._threads:
+            self._threads = [
+                self._clock.worker(self._take_all, self._name),
+                self._clock.worker(self._answer_all, f'{self._name}, answering')]
+            for thread in self._threads:
+                thread.start()
+        self._change()
+
+    def later(self, job: Callable[[], None]) -> None:
+        """Have the thread that answers do something. From any thread."""
+        self._jobs.put(job)
+
+    def forget(self, services: list[Service]) -> None:
+        """Stop to serve them; they may be destroyed then."""
+        for service in services:
+            self._served.pop(service, None)
+        self._change()
+
+    def stop(self) -> None:
+        """End, when the answers that there are have been sent."""
+        self._ending = True
+        self._wake()
+        self._jobs.put(None)
+        for thread in self._threads:
+            thread.join(5.0)
+        self._threads.clear()
+        self._guard.destroy_when_not_in_use()
+
+    def _change(self) -> None:
+        self._changed = True
+        self._wake()
+
+    def _wake(self) -> None:
+        try:
+            with self._guard:
+                self._guard.trigger_guard_condition()
+        except GONE:  # stopped
+            pass
+
+    # -- the thread that takes --------------------------------------------------------------------
+
+    def _take_all(self) -> None:
+        self._prepare_thread()
+        pace = Pace(self._share, self._clock)
+        while not self._ending and self._context.ok():
+            try:
+                self._take_while_unchanged(pace)
+            except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+                if self._ending:
+                    return
+                self._report(f'internal error in a callback: {type(error).__name__}: {error}')
+                self._clock.wait(self._clock.now() + ERROR_PAUSE)
+
+    def _take_while_unchanged(self, pace: Pace) -> None:
+        """Take what comes until something else is to be served."""
+        self._changed = False
+        context_handle: Any = self._context.handle
+        with ExitStack() as held:
+            present: dict[int, Service] = {}
+            for service in list(self._served):
+                try:
+                    held.enter_context(service.handle)
+                except InvalidHandle:   # destroyed meanwhile
+                    continue
+                present[service.handle.pointer] = service
+            held.enter_context(self._guard)
+            held.enter_context(context_handle)
+            waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
+            handles = [service.handle for service in present.values()]
+            while not self._changed and not self._ending and self._context.ok():
+                waiting.clear_entities()
+                waiting.add_guard_condition(self._guard)
+                for handle in handles:
+                    waiting.add_service(handle)
+                waiting.wait(-1)
+                for pointer in waiting.get_ready_entities('service'):
+                    self._take(present[pointer])
+                pace.keep()
+
+    def _take(self, service: Service) -> None:
+        kind: Any = service.srv_type
+        for _ in range(TAKE_MAX):
+            served = self._served.get(service)
+            if served is None:
+                return
+            request, header = service.handle.service_take_request(kind.Request)
+            if header is None:
+                return
+            callback, answered = served
+            callback(request, partial(self._answer, service, header, answered))
+
+    # -- the thread that answers ------------------------------------------------------------------
+
+    def _answer(self, service: Service, header: Any, answered: Callable[[], None],
+                message: Any) -> None:
+        """Have an answer sent. From any thread."""
+        self._jobs.put(partial(self._send, service, header, answered, message))
+
+    def _send(self, service: Service, header: Any, answered: Callable[[], None],
+              message: Any) -> None:
+        try:
+            self._send_response(service, message, header)
+        except GONE:   # service or context are gone
+            pass
+        finally:
+            answered()
+
+    def _answer_all(self) -> None:
+        pace = Pace(self._share, self._clock)
+        while self._do_one_job():
+            pace.keep()
+
+    def _do_one_job(self) -> bool:
+        """Do what comes next; the job is forgotten then, and with it the drive that it was for."""
+        job = self._jobs.get()
+        if job is None:
+            return False
+        try:
+            job()
+        except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
+            self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+        return True
+
+
+class Question(Generic[AnswerT]):
+    """
+    What such a coroutine awaits: something that is asked when it is awaited.
+
+    :param ask: takes what is to be called with the answer, once, from any thread, or at once.
+    """
+
+    __slots__ = ('ask',)
+
+    def __init__(self, ask: Callable[[Callable[[AnswerT], None]], None]) -> None:
+        self.ask = ask
+
+    def __await__(self) -> Generator[Any, AnswerT, AnswerT]:
+        return (yield self)
+
+
+class CoroutineServices:
+    """
+    Such services of one node. No two of their coroutines run at the same time.
+
+    :param callbacks: by name, with the type of the service.
+    :ivar calls: how many callers wait for their answer.
+    """
+
+    def __init__(self, node: Node, thread: ServiceThread,
+                 callbacks: Mapping[str, tuple[Any, Serve]]) -> None:
+        self._thread = thread
+        self.calls = 0
+        self._counting = threading.Lock()
+        self._running = threading.Lock()
+        self._services: dict[Service, Callback] = {
+            node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
+                                qos_profile=qos_profile_parameters):
+            partial(self._begin, callback, kind.Response)
+            for name, (kind, callback) in callbacks.items()}
+
+    def serve(self) -> None:
+        """Begin to serve."""
+        for service, callback in self._services.items():
+            self._thread.serve(service, callback, self._ended)
+
+    def destroy(self) -> None:
+        """Let go of the services. Before the node is destroyed."""
+        self._thread.forget(list(self._services))
+
+    def _begin(self, callback: Serve, response: Callable[[], Any], request: Any,
+               answer: Answer) -> None:
+        with self._counting:
+            self.calls += 1
+        self._go_on(callback(request, response()), answer, None)
+
+    def _go_on(self, coroutine: Coroutine[Any, Any, Any], answer: Answer, found: Any) -> None:
+        """Run a coroutine until it asks something, or to its end."""
+        try:
+            with self._running:
+                question: Question[Any] = coroutine.send(found)
+            question.ask(lambda what: self._thread.later(
+                partial(self._go_on, coroutine, answer, what)))
+        except StopIteration as end:
+            answer(end.value)
+        except BaseException:
+            coroutine.close()
+            self._ended()
+            raise
+
+    def _ended(self) -> None:
+        """Record that one caller less waits: it was answered, or nothing comes of it."""
+        with self._counting:
+            self.calls -= 1
+
+
+def _never(_: Any, response: Any) -> Any:
+    raise RuntimeError('such services are taken by a thread of their own')
+
+
+#: hands a request to the session; answered by its outcome
+Submit = Callable[[ControlRequest], Question[ControlCompleted]]
+
+
+def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
+                     controlled: bool, homing: bool = False) -> CoroutineServices:
+    """
+    Return the control services of a drive.
+
+    :param thread: serves them, and those of other drives, but nothing else.
+    :param controlled: it has a control word.
+    :param homing: it can be asked to look for its reference.
+    """
+    def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
+        async def callback(request: Any, response: Any) -> Any:
+            outcome = await submit(ControlRequest(wanted(request)))
+            response.success, response.message = outcome.success, outcome.message
+            return response
+        return callback
+    services: dict[str, tuple[type, Serve]] = {
+        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))}
+    if controlled:
+        services['enable'] = SetBool, serving(
+            lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
+        services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
+    if homing:
+        services['home'] = Trigger, serving(lambda _: ControlAction.HOME)
+    return CoroutineServices(node, thread, services)

@@ -23,7 +23,7 @@ from drive_can_bridge.ros.answers import (
     Answers, RclResponses, Response, Unfit, Unreachable, WAITING_MAX,
 )
 from drive_can_bridge.ros.polled_topics import PolledGroup
-from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.threads import ServiceThread
 
 #: what DDS does (test/real.py)
 REAL_DDS = pytest.mark.real

@@ -5,7 +5,7 @@ import time
 
 from clocks import REAL
 
-from drive_can_bridge.ros.service_thread import Pace
+from drive_can_bridge.ros.threads import Pace
 
 
 def busy(seconds: float) -> None:

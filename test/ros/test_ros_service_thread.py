@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 from waiting import clock
 
 from drive_can_bridge.ros.polled_topics import PolledGroup
-from drive_can_bridge.ros.service_thread import Answer, ServiceThread
+from drive_can_bridge.ros.threads import Answer, ServiceThread
 
 
 @pytest.fixture(name='errors')
