@@ -31,7 +31,7 @@ TOLD = {
     # executables
     'test/system/test_system_families.py::test_run_write_and_stop':
         'bridge, simulator and a client over DDS: each family runs, is written to, and is stopped',
-    'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral[2]':
+    'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral':
         'drive_can demo, and SIGINT',
     'test/demo/test_demo_terminal.py::test_the_view_comes_and_goes':
         'the live view in a terminal',
