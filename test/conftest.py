@@ -193,6 +193,11 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
     return report
 
 
+@pytest.fixture
+def threads() -> None:
+    """Let a test have threads that are handed their events, and need no time limit."""
+
+
 # -- beside each other ----------------------------------------------------------------------------
 
 
