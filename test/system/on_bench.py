@@ -18,7 +18,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 import ros_client
-from slcan_peer import Answers, answer_to, Line
+from slcan_peer import answer_to, Answers, Line
 from waiting import DEADLINE, wait_for
 from world import World
 

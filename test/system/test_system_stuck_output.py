@@ -12,7 +12,7 @@ from processes import Client, command_line, Processes
 import pytest
 from stuck_output import StuckOutput
 from test_system_reconnection import start_moving
-from waiting import wait_for, wait_for_end
+from waiting import wait_for_end
 
 REQUEST = '003FFFF0'
 
@@ -76,8 +76,8 @@ def test_whoever_closes_its_outputs_gets_a_bridge_all_the_same(
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)
     bridge = processes.start(
-        ['sh', '-c', 'exec "$@" <&- >&- 2>&-', 'sh', *command_line('drive_can_bridge'), '--ros-args',
-         '--params-file', str(file), '-r', f'__ns:=/{namespace}'], 'bridge')
+        ['sh', '-c', 'exec "$@" <&- >&- 2>&-', 'sh', *command_line('drive_can_bridge'),
+         '--ros-args', '--params-file', str(file), '-r', f'__ns:=/{namespace}'], 'bridge')
     start_moving(client, f'/{namespace}/conveyor')
     assert bridge.end(signal.SIGTERM) == 0
     wait_for_end(lambda: simulator.frames(f'^{REQUEST}.* R$'),
