@@ -9,7 +9,7 @@ import signal
 import subprocess
 
 import pytest
-from running import Running
+from running import Running, Terminal
 from waiting import wait_for
 
 from drive_can_bridge.cli import main as front_end
@@ -45,6 +45,7 @@ Start = Callable[..., Running]
 Refused = Callable[..., tuple[int, str, list[str]]]
 
 
+@pytest.mark.usefixtures('programs')
 def test_a_directory_with_the_name_of_the_package_does_not_matter(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / 'drive_can_bridge').mkdir()
@@ -113,12 +114,15 @@ def test_it_ends_after_its_time_and_stays_on_this_machine(start: Start) -> None:
     assert f'drive_can demo: ROS domain {domain}, on this machine only' in demo.errors
 
 
-def test_any_parameter_file_will_do(start: Start, tmp_path: Path) -> None:
+def test_any_parameter_file_will_do_and_a_dumb_terminal_gets_lines(
+        start: Start, tmp_path: Path, terminal: Terminal) -> None:
     file = tmp_path / 'bridge.yaml'
     file.write_text(OWN_FILE, encoding='utf-8')
-    demo = start('--params-file', str(file))
-    assert re.fullmatch(r'axis online actual_speed=-?\d+\.\d rpm', demo.line('^axis online'))
+    demo = start('--params-file', str(file),
+                 **{**terminal.options, 'environment': {'TERM': 'dumb'}})
+    terminal.shows(r'axis online actual_speed=-?\d+\.\d rpm\r?\n')
     assert demo.end(signal.SIGTERM) == 0
+    assert '\x1b[?' not in terminal.read()
 
 
 def test_it_ends_when_nobody_reads(start: Start, tmp_path: Path) -> None:
@@ -148,7 +152,8 @@ def test_a_silent_drive_is_offline_and_two_signals_in_one_breath_are_one_stop(
 
 
 @pytest.fixture
-def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
+def refused(threads: None, monkeypatch: pytest.MonkeyPatch,
+            capsys: pytest.CaptureFixture[str]) -> Refused:
     """Return what runs a demo that is refused, in this process: code, output, errors."""
     for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
         monkeypatch.setenv(name, os.environ[name])      # put back afterwards
@@ -169,6 +174,7 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     (['--fault', 'lift:slient'], 2, "unknown fault 'slient' (nearest: silent)"),
     (['--fault', 'lift:stuck=nothing'], 2, 'nothing'),
     (['--params-file', 'nowhere.yaml'], 1, 'nowhere.yaml: No such file or directory'),
+    (['--log-frames', '/nowhere/frames.log'], 1, '/nowhere/frames.log: No such file'),
 ])
 def test_a_mistake_is_one_line(refused: Refused, arguments: list[str], code: int,
                                words: str) -> None:

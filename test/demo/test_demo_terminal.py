@@ -99,18 +99,3 @@ def test_what_the_demo_dies_of_its_processes_end(demo: Running) -> None:
     children = demo.children()
     demo.end(signal.SIGKILL)
     wait_for(lambda: all_gone(children), 'the end of all processes')
-
-
-def test_a_dumb_terminal_gets_lines(start: Start, terminal: Terminal) -> None:
-    options = {**terminal.options, 'environment': {'TERM': 'dumb'}}
-    demo = start(**options)
-    terminal.shows('conveyor online actual_speed=')
-    assert demo.end(signal.SIGTERM) == 0
-    assert '\x1b[?' not in terminal.read()
-
-
-def test_a_mistake_is_seen(start: Start, terminal: Terminal) -> None:
-    demo = start('--log-frames', '/nowhere/frames.log', **terminal.options)
-    assert demo.process.wait(60.0) == 1
-    assert '/nowhere/frames.log: No such file' in terminal.read()
-    assert ENTERED not in terminal.read()

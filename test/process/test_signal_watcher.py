@@ -173,7 +173,7 @@ with SignalWatcher(SteadyClock(), keep=True) as watcher:
 """
 
 
-@pytest.mark.real
+@pytest.mark.usefixtures('programs')
 def test_signals_wait_for_the_watcher_and_leaving_loses_no_output() -> None:
     done = subprocess.run([sys.executable, '-c', LEAVING], capture_output=True, text=True,
                           check=False, env={**os.environ, 'PYTHONUNBUFFERED': ''})

@@ -188,7 +188,7 @@ assert os.open(os.devnull, os.O_RDONLY) > 2
 """
 
 
-@pytest.mark.real
+@pytest.mark.usefixtures('programs')
 def test_streams_that_somebody_closed_go_to_nobody() -> None:
     """Each at once; what a bridge does then: system/test_system_stuck_output.py."""
     done = subprocess.run(['sh', '-c', 'exec "$@" <&- >&-', 'sh', sys.executable, '-c', CLOSED],

@@ -586,6 +586,7 @@ def test_which_drive(words: list[str], told: str, tmp_path: Path,
     assert 'which drive? There are: ' in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures('bench')
 @pytest.mark.parametrize(('answer', 'code', 'told'), [
     ('n\n', 2, 'Ask all the same? [y/N] drive_can probe: nothing was sent\n'), ('', 2, 'sent'),
     ('y\n', 1, 'Ask all the same? [y/N] ')])

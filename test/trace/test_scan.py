@@ -409,6 +409,7 @@ def test_what_is_there_is_asked_for(bench: World, tmp_path: Path,
     assert frames
 
 
+@pytest.mark.usefixtures('bench')
 def test_nothing_found_nothing_written(tmp_path: Path,
                                        capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'found.yaml'
@@ -488,6 +489,7 @@ def test_what_was_not_asked_is_named_with_the_next_command(
         assert capsys.readouterr().err.splitlines()[-1] == f'next: drive_can validate {output}'
 
 
+@pytest.mark.usefixtures('bench')
 def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ('scan', '--interface', 'virtual', '--channel', 'scan_named', '--listen', 0.1,
