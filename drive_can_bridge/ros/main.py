@@ -77,7 +77,7 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from drive_can_bridge.ros.middleware import begin_with_small_histories
+    from drive_can_bridge.ros.middleware import set_up_fast_dds
 
     try:
         with _quiet_rcl():
@@ -92,7 +92,7 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
         print(f'drive_can_bridge: {rest[0]}: only ROS arguments are taken '
               f'(drive_can_bridge --ros-args --params-file FILE)', file=sys.stderr)
         return 2
-    begin_with_small_histories()
+    set_up_fast_dds()
     try:
         with _quiet_rcl():
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -115,7 +115,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
     import rclpy
 
     from drive_can_bridge.ros.bridge_node import BridgeNode
-    from drive_can_bridge.ros.executor_thread import ExecutorThread
+    from drive_can_bridge.ros.threads import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),

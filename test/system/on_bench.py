@@ -22,11 +22,11 @@ from slcan_peer import answer_to, Answers, Line
 from waiting import DEADLINE, wait_for
 from world import World
 
+from drive_can_bridge.cli.simulate import Console
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.ros import main as executable
-from drive_can_bridge.simulation.console import Console
 from drive_can_bridge.simulation.simulation import Simulation
 
 RUNNING = -1
