@@ -7,7 +7,6 @@ from dataclasses import replace
 import os
 from typing import Any
 
-import can
 from clocks import REAL
 from jumping import JumpingClock
 import pytest

@@ -2,8 +2,8 @@
 """
 What ``processes.py`` and ``slcan_peer.py`` have, on the bench (``clocked/``): no process, no wait.
 
-The bridge is what its executable runs, with a watcher that is handed its signals; the client is the
-script ``ros_client.py``. A second signal, which ends a process, nobody can send here.
+The bridge is what its executable runs, with a watcher that is handed its signals; the client is
+the script ``ros_client.py``. A second signal, which ends a process, nobody can send here.
 """
 
 from collections import deque
