@@ -161,6 +161,14 @@ class Process(Told):
         """Send a signal."""
         self.process.send_signal(number)
 
+    def suspend(self) -> None:
+        """Have it stand still; it does when this returns."""
+        self.send(signal.SIGSTOP)
+        tasks = Path(f'/proc/{self.pid}/task')
+        wait_for(lambda: all(
+            (task / 'stat').read_text().rpartition(')')[2].split()[0] == 'T'
+            for task in tasks.iterdir()), f'{self.name} to stand still')
+
     def wait(self, timeout: float = DEADLINE) -> int:
         """Wait for the end; return the exit code."""
         try:

@@ -143,7 +143,7 @@ def test_drives_that_a_second_signal_leaves_unstopped_are_named(
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
-    simulator.send(signal.SIGSTOP)
+    simulator.suspend()
     try:
         bridge.send(signal.SIGINT)
         client.ask('rest', seconds=0.1)     # twice in the same breath is one signal
@@ -164,7 +164,7 @@ def test_process_that_stood_still(processes: Processes, client: Client, namespac
     bridge = processes.bridge(file, namespace)
     drive = f'/{namespace}/conveyor'
     start_moving(client, drive)
-    bridge.send(signal.SIGSTOP)
+    bridge.suspend()
     client.ask('rest', seconds=0.3)     # what was on its way when it stopped arrives
     simulator.write('list')
     simulator.line('^conveyor: ')
@@ -193,7 +193,7 @@ def test_what_was_sent_while_it_stood_still_is_thrown_away(
     bridge = processes.bridge(file, namespace)
     topic = f'/{namespace}/conveyor/command/speed_setpoint'
     start_moving(client, f'/{namespace}/conveyor')
-    bridge.send(signal.SIGSTOP)
+    bridge.suspend()
     client.publish(topic, 200.0, rate=100.0)
     client.ask('rest', seconds=0.1)
     client.silence(topic)       # whoever said 200 has changed his mind long before it goes on
