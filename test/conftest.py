@@ -22,7 +22,8 @@ mark ``alone``: nothing else of the test run happens meanwhile.
 *The wall clock.* What runs against it has the mark ``real`` (``real.py`` says what that is, and
 which of them ``make test`` tells): these stories are told one after the other, when all others
 have been. One that fails is told again where the machine itself stood still (``told_again.py``).
-Nothing else excuses a stalled machine.
+Nothing else excuses a stalled machine. ``guard.py`` sees that no other test starts a process or a
+thread, unless it says by a fixture, ``programs`` or ``threads``, that it needs no time limit.
 
 *Seed.* All that is random follows DRIVE_CAN_TEST_SEED, by default another one in each run. Behind
 the failures stand the commands that run each of them alone, with the seed.
@@ -52,7 +53,8 @@ import real
 from told_again import ToldAgain
 
 sys.path.insert(0, str(Path(__file__).with_name('clocked')))
-import world  # noqa: I100, I202
+from guard import Guard  # noqa: I100, I202
+import world
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'
@@ -132,6 +134,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.getoption('--hypothesis-seed') is None:
         hypothesis_core.global_force_seed = int(os.environ[SEED])
     config.pluginmanager.register(ToldAgain(config))
+    config.pluginmanager.register(Guard(config))
     if config.getoption('dist', 'no') != 'no':
         return  # only starts those who run the tests
     os.environ['ROS_DOMAIN_ID'] = _domain(False)
@@ -191,6 +194,16 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[Any]:
     if report.failed and world.current is not None:
         report.sections.append(('story', world.current.story()))
     return report
+
+
+@pytest.fixture
+def threads() -> None:
+    """Let a test have threads that are handed their events, and need no time limit."""
+
+
+@pytest.fixture
+def programs() -> None:
+    """Let a test run programs to their ends, however long that takes."""
 
 
 # -- beside each other ----------------------------------------------------------------------------

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 #: directory -> fixtures that put a test at the mercy of the wall clock
 FIXTURES = {
-    'test/system/': {'processes', 'client', 'bench'},
     'test/demo/': {'start', 'demo', 'terminal'},
     'test/monitor/': {'run'},
     'test/panel/': {'site', 'run', 'browser', 'phone', 'somebody'},
@@ -29,9 +28,9 @@ FIXTURES = {
 #: what make test tells -> what it shows
 TOLD = {
     # executables
-    'test/system/test_system_families.py::test_run_write_and_stop':
-        'bridge, simulator and a client over DDS: each family runs, is written to, and is stopped',
-    'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral[2]':
+    'test/system/test_system_families.py::test_run_write_and_stop[datamodel_extended]':
+        'bridge, simulator and a client over DDS: it runs, is written to, and is stopped',
+    'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral':
         'drive_can demo, and SIGINT',
     'test/demo/test_demo_terminal.py::test_the_view_comes_and_goes':
         'the live view in a terminal',
@@ -48,7 +47,7 @@ TOLD = {
     'test/system/test_system_parameters.py::test_both_ways_show_the_same':
         'drive_can read and write, directly and through a bridge',
     # the machine
-    'test/system/test_system_signals.py::test_while_active[SIGTERM]':
+    'test/system/test_system_signals.py::test_while_active':
         'signals end a bridge in order',
     'test/system/test_system_signals.py::test_process_that_stood_still':
         'a process that was suspended',
@@ -56,8 +55,7 @@ TOLD = {
         'a process that was killed, and locks between processes',
     'test/system/test_system_stall.py::test_adapter_that_takes_nothing':
         'an adapter that takes no more data',
-    'test/system/test_system_stuck_output.py::test_a_drive_falls_silent_and_the_bridge_is_stopped'
-    '[stderr]':
+    'test/system/test_system_stuck_output.py::test_a_drive_falls_silent_and_the_bridge_is_stopped':
         'standard error that nobody reads',
     'test/system/test_system_reconnection.py::test_simulator_is_killed_and_restarted':
         'an adapter that is unplugged',

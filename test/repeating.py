@@ -3,24 +3,26 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-import threading
+
+import waiting
 
 
 @contextmanager
 def again_and_again(action: Callable[[], object], period: float = 0.05, *,
                     after: float = 0.0) -> Iterator[None]:
     """Do it after some seconds and every ``period`` s, until the block ends."""
-    ending = threading.Event()
+    clock = waiting.clock()
+    ending = clock.alarm()
 
     def run() -> None:
         pause = after
-        while not ending.wait(pause):
+        while not ending.wait(clock.now() + pause):
             action()
             pause = period
-    thread = threading.Thread(target=run, daemon=True)
+    thread = clock.worker(run, 'again and again')
     thread.start()
     try:
         yield
     finally:
-        ending.set()
+        ending.ring()
         thread.join()

@@ -9,6 +9,8 @@ from drive_can_bridge.clock import Mailbox, SteadyClock
 
 CLOCK = SteadyClock()
 
+pytestmark = pytest.mark.usefixtures('threads')
+
 
 def test_ring_before_the_sleep_is_kept() -> None:
     alarm = CLOCK.alarm()

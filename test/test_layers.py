@@ -25,7 +25,7 @@ INTERNAL: dict[str, set[str]] = {
     '': set(),
     'resources': {''},
     'clock': {''},
-    'process': {''},
+    'process': {'', 'clock'},
     'core': {''},
     'protocols': {'', 'core'},
     'configuration': {'', 'core', 'protocols', 'resources'},

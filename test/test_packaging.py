@@ -184,6 +184,7 @@ sys.exit({function}())
 """
 
 
+@pytest.mark.usefixtures('programs')
 @pytest.mark.parametrize(('name', 'words', 'code', 'errors'), [
     ('drive_can', ['validate', 'nothing.yaml'], 130, 'drive_can validate: interrupted\n'),
     ('drive_can', ['monitor'], 0, ''), ('drive_can_bridge', ['--help'], 0, '')])
@@ -195,7 +196,7 @@ def test_interrupt_while_it_is_loaded(arguments: dict[str, Any], name: str, word
     module, function = scripts[name].split(':')
     done = subprocess.run(
         [sys.executable, '-c', EARLY_INTERRUPT.format(module=module, function=function), *words],
-        capture_output=True, text=True, check=False, timeout=60)
+        capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (code, errors)
 
 

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """
     # before the imports, which take their time: a signal counts from the very beginning
     suspension = Event()
-    with SignalWatcher(refuse=suspension.set) as watcher:
+    with SignalWatcher(args.clock, refuse=suspension.set) as watcher:
         environment.prepare(args.domain_id)
         try:
             # what the other processes import: better to know now

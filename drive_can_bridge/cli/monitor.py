@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     """
     refusal = _Refusal(args.refuse_to_suspend, args.clock.now)
     # a second signal ends the process at once
-    with SignalWatcher(keep=True,
+    with SignalWatcher(args.clock, keep=True,
                        refuse=refusal.begin if args.refuse_to_suspend else None) as watcher:
         try:
             from drive_can_bridge.ros.monitor.client import MonitorClient

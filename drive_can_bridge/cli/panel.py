@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     :return: 0 after SIGINT or SIGTERM.
     :raises DriveCanError: no ROS, no NiceGUI, the port is taken.
     """
-    with SignalWatcher(keep=True) as watcher:
+    with SignalWatcher(args.clock, keep=True) as watcher:
         if not _serve(args, lambda: watcher.signalled):
             print(f'{COMMAND}: ended before it served a page', file=sys.stderr)
         leave(watcher.exit_code(0))

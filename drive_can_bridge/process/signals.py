@@ -17,16 +17,16 @@ Steps that a signal does not break off in the middle.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import math
 import os
-import queue
 import signal
 import socket
 import sys
 import threading
-import time
 from types import TracebackType
 from typing import Any, NoReturn
 
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
 
 #: s after the first signal that the drives have to come to a stop, whatever follows. Who stops a
@@ -48,23 +48,26 @@ class SignalWatcher:
 
     Use as a context manager in the main thread, before other threads start.
 
+    :param clock: by which signals are one or two.
     :param keep: go on after the context: in the rest of the process's life, a first signal changes
         nothing any more, and a second still ends it.
     :param refuse: called in a thread of the watcher when somebody wants to suspend the process
         (Ctrl-Z), to say why that is refused, without waiting; None: it is not.
     :ivar last_steps: what is done, in this order, when a second signal ends the process. Each is
-        told by when (of :func:`time.monotonic`) it ends.
+        told by when (of the clock) it ends.
     """
 
-    def __init__(self, *, keep: bool = False,
+    def __init__(self, clock: Clock, *, keep: bool = False,
                  refuse: Callable[[], object] | None = None) -> None:
         self.last_steps: list[Callable[[float], object]] = []
+        self._clock = clock
         self._keep = keep
         self._refuse = refuse
-        self._reasons: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._reasons: Mailbox[str] = Mailbox(clock)
         self._read, self._write = socket.socketpair()
         self._write.setblocking(False)
         self._first = self._second = 0
+        self._came = 0.0    # the first
 
     def __enter__(self) -> 'SignalWatcher':
         self._old_fd = signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
@@ -106,38 +109,38 @@ class SignalWatcher:
         """End the process for a reason of its own. From any thread."""
         self._reasons.put(reason)
 
-    def wait(self, timeout: float | None = None) -> str | None:
+    def wait(self, timeout: float = math.inf) -> str | None:
         """
         Wait for the end.
 
+        :param timeout: s.
         :return: '' after a signal, the reason after a fatal error, None after the time-out.
         """
         try:
-            return self._reasons.get(timeout=timeout)
-        except queue.Empty:
+            return self._reasons.get(self._clock.now() + timeout)
+        except TimeoutError:
             return None
 
-    def _watch(self) -> None:
-        first = 0.0
-        while True:
-            received = self._read.recv(1)
-            if not received:
-                return
-            number, now = received[0], time.monotonic()
-            if number == signal.SIGTSTP and self._refuse is not None:
-                _attempt(self._refuse)
-            if number not in SIGNALS:
-                continue
-            if self._first:
-                if now - first < SAME_BREATH:
-                    continue
-                self._second = number
-                time.sleep(max(0.0, first + GRACE - now))
-                for step in self.last_steps:
-                    _attempt(step, now + GRACE)
-                os._exit(128 + number)
-            first, self._first = now, number
+    def take(self, number: int) -> None:
+        """Take a signal that came now; does not return where it is a second one."""
+        now = self._clock.now()
+        if number == signal.SIGTSTP and self._refuse is not None:
+            _attempt(self._refuse)
+        if number not in SIGNALS:
+            return
+        if not self._first:
+            self._came, self._first = now, number
             self._reasons.put('')
+        elif now - self._came >= SAME_BREATH:
+            self._second = number
+            self._clock.wait(self._came + GRACE)
+            for step in self.last_steps:
+                _attempt(step, now + GRACE)
+            os._exit(128 + number)
+
+    def _watch(self) -> None:
+        while received := self._read.recv(1):
+            self.take(received[0])
 
 
 def leave(code: int) -> NoReturn:

@@ -24,7 +24,8 @@ import os
 import select
 import termios
 import threading
-import time
+
+from drive_can_bridge.clock import Clock
 
 #: s after which nobody takes what is being written
 PATIENCE = 2.0
@@ -42,7 +43,7 @@ class Taking:
     :param now: the steady time.
     """
 
-    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
         self._since: float | None = None
 
@@ -73,11 +74,13 @@ class Output:
 
     Not across ``exec``: the pipe would go along, but not who empties it.
 
+    :param clock: says how long nobody has taken anything.
     :param name: of the output, in words.
     :param descriptors: all of them go where the first one does.
     """
 
-    def __init__(self, name: str, *descriptors: int) -> None:
+    def __init__(self, clock: Clock, name: str, *descriptors: int) -> None:
+        self._now = clock.now
         self._name = name
         self._descriptors = descriptors
         self._real = self._source = -1
@@ -86,7 +89,7 @@ class Output:
         self._dropped = 0
         self._ending = False
         self._changed = threading.Condition()
-        self._taking = Taking()
+        self._taking = Taking(clock.now)
 
     def __enter__(self) -> 'Output':
         try:
@@ -122,7 +125,7 @@ class Output:
         """
         Wait until all is written that was, unless nobody takes it.
 
-        :param deadline: of :func:`time.monotonic`, at the latest; None: however long that takes.
+        :param deadline: of the clock, at the latest; None: however long that takes.
         :return: False: it is not.
         """
         if self._real < 0:
@@ -130,7 +133,7 @@ class Output:
         with self._changed:
             while not self._changed.wait_for(
                     lambda: not (self._size or self._dropped or self._unread()), MOMENT):
-                if self._taking.nobody or deadline is not None and time.monotonic() > deadline:
+                if self._taking.nobody or deadline is not None and self._now() > deadline:
                     return False
         return True
 
@@ -200,15 +203,16 @@ class StandardOutputs:
 
     Where both are the same, they go through the same pipe, so that lines keep their order.
 
+    :param clock: of both.
     :ivar output: standard output.
     :ivar error: standard error.
     """
 
-    def __init__(self) -> None:
-        self.error = Output('standard error', 2)
-        self.output = Output('standard output', 1)
+    def __init__(self, clock: Clock) -> None:
+        self.error = Output(clock, 'standard error', 2)
+        self.output = Output(clock, 'standard output', 1)
         if _same(1, 2):
-            self.error = self.output = Output('standard error', 2, 1)
+            self.error = self.output = Output(clock, 'standard error', 2, 1)
         self._open = ExitStack()
 
     def __enter__(self) -> 'StandardOutputs':

@@ -19,6 +19,7 @@ import sys
 import tempfile
 from typing import TYPE_CHECKING
 
+from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.sentences import ends_before_stop, may_still_be_running
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
@@ -37,11 +38,12 @@ def main(args: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv if args is None else args)
     be_punctual()
     # in a process of our own, signals are looked after to the very end
-    with (SignalWatcher(keep=args is None, refuse=_refuse_to_suspend) as watcher,
-          StandardOutputs() as outputs):
+    clock = SteadyClock()
+    with (SignalWatcher(clock, keep=args is None, refuse=_refuse_to_suspend) as watcher,
+          StandardOutputs(clock) as outputs):
         watcher.last_steps.append(outputs.flush)
         _tell_rcutils(outputs)
-        code = watcher.exit_code(_main(watcher, arguments))
+        code = watcher.exit_code(run(watcher, clock, arguments))
         if args is None:
             sys.stdout.flush()
             sys.stderr.flush()
@@ -63,7 +65,13 @@ def _refuse_to_suspend() -> None:
     print(f'drive_can_bridge: {NOT_SUSPENDED}', file=sys.stderr, flush=True)
 
 
-def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
+def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
+    """
+    Run the bridge until its watcher says so.
+
+    :param arguments: those of the command line, the program's name first.
+    :return: what the process ends with unless a signal says otherwise.
+    """
     import rclpy
     from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
@@ -92,7 +100,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         print(f'drive_can_bridge: {_parse_error(error, arguments)}', file=sys.stderr)
         return 1
     try:
-        return _run(watcher, arguments)
+        return _run(watcher, clock, arguments)
     except ExternalShutdownException:
         return 0
     finally:
@@ -103,15 +111,13 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         gc.collect()
 
 
-def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
+def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
     import rclpy
 
-    from drive_can_bridge.clock import SteadyClock
     from drive_can_bridge.ros.bridge_node import BridgeNode
     from drive_can_bridge.ros.threads import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
-    clock = SteadyClock()
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context(), clock)
     try:

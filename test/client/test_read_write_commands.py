@@ -270,7 +270,7 @@ def test_completion(tmp_path: Path, completions: Callable[[str], list[str]]) -> 
     assert completions(f'drive_can read --params-file {file}x conv') == []
 
 
-@pytest.mark.real
+@pytest.mark.usefixtures('programs')
 def test_a_shell_is_answered_by_its_descriptor(tmp_path: Path) -> None:
     pytest.importorskip('argcomplete')
     file = parameter_file(tmp_path, {'conveyor': CONVEYOR})
@@ -278,7 +278,7 @@ def test_a_shell_is_answered_by_its_descriptor(tmp_path: Path) -> None:
     script = (f'import os; os.dup2({far}, 8); os.dup2(2, 9); '
               'from drive_can_bridge.cli.start import main; main()')
     process = subprocess.run(
-        [sys.executable, '-c', script], pass_fds=[far], capture_output=True, timeout=60,
+        [sys.executable, '-c', script], pass_fds=[far], capture_output=True,
         env={**os.environ, **typed(f'drive_can read --params-file {file} conveyor ram')})
     os.close(far)
     with open(near, encoding='utf-8') as answer:

@@ -22,6 +22,7 @@ from typing import Any, ClassVar, NamedTuple
 from jumping import JumpingAlarm, JumpingClock
 from rcl_interfaces.msg import Log
 from rclpy.impl.implementation_singleton import rclpy_implementation as real
+from rclpy.logging import LoggingSeverity
 from rclpy.qos import (
     DurabilityPolicy, HistoryPolicy, qos_profile_services_default, QoSPolicyKind, QoSProfile,
     ReliabilityPolicy,
@@ -54,6 +55,7 @@ class Graph:
         self.services: list[Service] = []
         self.clients: list[Client] = []
         self.levels: set[str] = set()
+        self.written: list[str] = []    # lines of all logs
         self.tell: Callable[[str], None] = _nothing
 
 
@@ -890,6 +892,8 @@ def _log(graph: Graph, severity: Any, name: str, message: str, function: str = '
     """Write a line to standard error, as rcl does, and publish it."""
     real_log(severity, name, message, function, file, line)
     graph.tell(f'{name}: {message}')
+    graph.written.append(f'[{LoggingSeverity(severity).name}] [{1e-9 * graph.stamp():.9f}] '
+                         f'[{name}]: {message}')
     for node in graph.nodes:
         if node.rosout is not None and name in node.loggers and node.context.ok():
             seconds, nanoseconds = divmod(graph.stamp(), 10 ** 9)

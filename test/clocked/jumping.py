@@ -33,6 +33,10 @@ class _Over(BaseException):
     """The story is over: ends a thread that waits."""
 
 
+class TurnThread(threading.Thread):
+    """A thread that runs when it is its turn: no wall clock says when."""
+
+
 class Task:
     """
     A thread that runs when it is its turn.
@@ -53,7 +57,7 @@ class Task:
     def start(self) -> None:
         """Begin, when it is its turn."""
         self._begun = True
-        threading.Thread(target=self._live, name=self.name, daemon=True).start()
+        TurnThread(target=self._live, name=self.name, daemon=True).start()
         self._clock.tasks.append(self)
         self._clock.wake(self)
 

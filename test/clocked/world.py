@@ -34,11 +34,16 @@ current: 'World | None' = None
 
 
 class World:
-    """Everything that a story has."""
+    """
+    Everything that a story has.
+
+    :ivar graph: that of ROS; None where it has none.
+    """
 
     def __init__(self, clock: JumpingClock) -> None:
         self.clock = clock
         self.wires = Wires(clock, self._see)
+        self.graph: Any = None
         self._story: list[tuple[float, str]] = []
 
     def tell(self, text: str) -> None:
@@ -75,8 +80,8 @@ def world(seed: int, *, ros: bool = False) -> Iterator[World]:
         stack.enter_context(patch.object(os, 'sched_setscheduler', lambda *_: None))
         if ros:
             from graph import pretending, Responses
-            graph: Any = stack.enter_context(pretending(clock))
-            graph.tell = made.tell
+            made.graph = stack.enter_context(pretending(clock))
+            made.graph.tell = made.tell
             stack.enter_context(patch('drive_can_bridge.ros.answers.RclResponses', Responses))
         stack.enter_context(patch.object(sys.modules[__name__], 'current', made))
         yield made

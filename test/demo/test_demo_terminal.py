@@ -67,14 +67,6 @@ def test_it_is_not_suspended(demo: Running, terminal: Terminal) -> None:
     assert terminal.echoes
 
 
-def test_whoever_has_seen_enough_ends_everything(demo: Running, terminal: Terminal) -> None:
-    children = demo.children()
-    terminal.type('q')
-    assert demo.process.wait(60.0) == 0
-    assert 'has ended' not in terminal.read()
-    assert all_gone(children)
-
-
 def test_without_its_view_the_bridge_runs_on_and_it_is_said(demo: Running,
                                                             terminal: Terminal) -> None:
     children = demo.children()
@@ -107,18 +99,3 @@ def test_what_the_demo_dies_of_its_processes_end(demo: Running) -> None:
     children = demo.children()
     demo.end(signal.SIGKILL)
     wait_for(lambda: all_gone(children), 'the end of all processes')
-
-
-def test_a_dumb_terminal_gets_lines(start: Start, terminal: Terminal) -> None:
-    options = {**terminal.options, 'environment': {'TERM': 'dumb'}}
-    demo = start(**options)
-    terminal.shows('conveyor online actual_speed=')
-    assert demo.end(signal.SIGTERM) == 0
-    assert '\x1b[?' not in terminal.read()
-
-
-def test_a_mistake_is_seen(start: Start, terminal: Terminal) -> None:
-    demo = start('--fault', 'lift:stuck=nothing', **terminal.options)
-    assert demo.process.wait(60.0) == 2
-    assert 'drive_can demo: --fault' in terminal.read()
-    assert ENTERED not in terminal.read()

@@ -4,6 +4,8 @@
 import math
 import threading
 
+import pytest
+
 from drive_can_bridge.exchange.exchange import Errand
 
 
@@ -39,6 +41,7 @@ def test_what_was_missed_is_left_out() -> None:
     assert done == [7.5]
 
 
+@pytest.mark.usefixtures('threads')
 def test_no_thread_waits_for_another() -> None:
     begun, go_on = threading.Event(), threading.Event()
     done: list[float] = []

@@ -346,6 +346,7 @@ def test_deactivate_gives_up_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None
     assert 0.5 < bench.now - started < 1.0
 
 
+@pytest.mark.usefixtures('threads')
 def test_a_stop_that_somebody_else_has_begun_is_waited_for() -> None:
     bench = Bench(drive(rearm_immediate=True))
     bench.online()

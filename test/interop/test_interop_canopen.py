@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from builders import drive, read, text_of, write
-from clocks import REAL
 import pytest
-from waiting import wait_for
+from waiting import clock, wait_for
 
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import (
@@ -26,9 +25,6 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
-
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
 
 canopen = pytest.importorskip('canopen')
 objectdictionary = pytest.importorskip('canopen.objectdictionary')
@@ -99,7 +95,7 @@ def ltmr(channel: str, states: list[int]) -> Iterator[PlayedDrive]:
     """Return a simulated LTMR on the bus, switched on after somebody listened."""
     configuration = BridgeConfiguration(
         buses={'main': bus_of(channel)}, drives={'pump': ltmr_configuration()})
-    with Simulation(configuration, REAL) as simulation:
+    with Simulation(configuration, clock()) as simulation:
         yield simulation.drives['pump']
     assert not simulation.failure
 
@@ -257,7 +253,7 @@ class Registers:
 
 
 class Bridge:
-    """The part of a bridge that is about one bus: an exchange with real threads."""
+    """The part of a bridge that is about one bus: its exchange."""
 
     def __init__(self, channel: str, **options: Any) -> None:
         configuration = drive(
@@ -268,7 +264,7 @@ class Bridge:
         self.session: Session
         self.session, = make_sessions([configuration])
         routes = [claim.route for claim in FAMILIES['canopen_pkw'].claims(configuration)]
-        self.exchange = BusExchange(bus_of(channel), [self.session], [routes], self, REAL)
+        self.exchange = BusExchange(bus_of(channel), [self.session], [routes], self, clock())
         self.exchange.attach(self.session, self)
         self.samples: list[tuple[int, ...]] = []
         self.events: list[Event] = []

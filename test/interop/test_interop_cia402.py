@@ -15,9 +15,9 @@ from typing import Any
 
 from builders import drive, read, text_of, write
 import can
-from clocks import REAL
 import pytest
-from waiting import wait_for
+from waiting import clock, wait_for
+from world import World
 
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -34,9 +34,6 @@ from drive_can_bridge.simulation.terminal import SlcanTerminal
 canopen = pytest.importorskip('canopen')
 objectdictionary = pytest.importorskip('canopen.objectdictionary')
 p402 = pytest.importorskip('canopen.profiles.p402')
-
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
 
 NODE = 5
 #: s after which a thing that has not happened never will
@@ -104,7 +101,7 @@ def servo(channel: str) -> Iterator[PlayedDrive]:
         request=names('target_velocity'), response=names('actual_velocity'), mode='csv')
     with Simulation(BridgeConfiguration(
             buses={'main': bus_of(channel)}, drives={'axis': configuration}),
-            REAL) as simulation:
+            clock()) as simulation:
         yield simulation.drives['axis']
     assert not simulation.failure
 
@@ -230,21 +227,28 @@ class TerminalBus(can.BusABC):
             is_extended_id=frame.extended), False
 
 
-@pytest.fixture(params=['virtual', 'serial', pytest.param('socketcan', marks=on_socketcan)])
-def place(request: pytest.FixtureRequest, channel: str) -> Iterator[tuple[BusConfiguration, Any]]:
+@pytest.fixture(params=[
+    'virtual', pytest.param('serial', marks=pytest.mark.real),
+    pytest.param('socketcan', marks=(pytest.mark.real, *on_socketcan))])
+def place(request: pytest.FixtureRequest, channel: str, world: World | None,
+          ) -> Iterator[tuple[BusConfiguration, Any]]:
     """Return a bus as the bridge opens it, and a network of the other stack on it."""
     connected = canopen.Network()
     connected.NOTIFIER_CYCLE = 0.05
     terminal = None
     bus = bus_of(channel)
     if request.param == 'serial':
-        terminal = SlcanTerminal(REAL.now, 1_000_000)
+        terminal = SlcanTerminal(clock().now, 1_000_000)
         bus = BusConfiguration('main', 'slcan', terminal.path, bitrate=1_000_000,
                                reconnect_period=0.05)
         connected.bus = TerminalBus(terminal)
     elif request.param == 'socketcan':
         bus = BusConfiguration('main', 'socketcan', VCAN, bitrate=1_000_000, reconnect_period=0.05)
-    connected.connect(interface=bus.interface, channel=bus.channel)
+    if world is not None:
+        from canopen_bench import connect
+        connect(connected, world, channel)
+    else:
+        connected.connect(interface=bus.interface, channel=bus.channel)
     if request.param == 'socketcan':    # heartbeats from a thread: this kernel may have no can-bcm
         connected.bus._send_periodic_internal = partial(
             can.BusABC._send_periodic_internal, connected.bus)
@@ -322,7 +326,7 @@ class Device:
 
 
 class Bridge:
-    """The part of a bridge that is about one bus: an exchange with real threads."""
+    """The part of a bridge that is about one bus: its exchange."""
 
     def __init__(self, bus: BusConfiguration, **options: Any) -> None:
         configuration = drive(
@@ -332,7 +336,7 @@ class Bridge:
             command_timeout=DEADLINE, heartbeat_timeout=5.0, **options)
         self.session, = make_sessions([configuration])
         routes = [claim.route for claim in FAMILIES['cia402'].claims(configuration)]
-        self.exchange = BusExchange(bus, [self.session], [routes], self, REAL)
+        self.exchange = BusExchange(bus, [self.session], [routes], self, clock())
         self.exchange.attach(self.session, self)
         self.events: list[Event] = []
         self.samples: list[tuple[int, ...]] = []
@@ -383,7 +387,7 @@ class Bridge:
 
     def command(self, value: float) -> None:
         with self.exchange.lock:
-            self.session.users.command(0, value, REAL.now())
+            self.session.users.command(0, value, clock().now())
 
 
 def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration, Any]) -> None:

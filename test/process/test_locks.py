@@ -70,7 +70,7 @@ def test_many_who_want_it_do_not_wear_it_out() -> None:
     assert holder(key('a')) is None
 
 
-@pytest.mark.real
+@pytest.mark.usefixtures('threads')
 def test_of_many_at_once_one_gets_it() -> None:
     start = threading.Barrier(8)
     won: list[list[HostLock]] = []
@@ -93,6 +93,7 @@ def test_of_many_at_once_one_gets_it() -> None:
         lock.release()
 
 
+@pytest.mark.real
 def test_a_subprocess_does_not_inherit_it() -> None:
     lock = HostLock(key('a'), 'x')
     sleeper = subprocess.Popen([sys.executable, '-c', 'input()'], stdin=subprocess.PIPE,

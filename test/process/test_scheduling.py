@@ -45,6 +45,7 @@ def test_be_punctual(monkeypatch: pytest.MonkeyPatch, handover: float, interval:
         gc.set_threshold(*thresholds)
 
 
+@pytest.mark.usefixtures('threads')
 def test_a_handover_is_measured_there_and_back(monkeypatch: pytest.MonkeyPatch) -> None:
     # one round of 80 us among slower ones
     times = iter([0.0, 0.001] + [1.0, 1.00008] + 18 * [2.0, 2.5])
@@ -77,6 +78,7 @@ def test_a_system_that_does_not_allow_it(monkeypatch: pytest.MonkeyPatch) -> Non
     assert scheduling.raise_priority().startswith('no real-time priority, ')
 
 
+@pytest.mark.usefixtures('threads')
 def test_threads_that_a_real_time_thread_starts_are_ordinary() -> None:
     policies: list[int] = []
 

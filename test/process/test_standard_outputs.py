@@ -1,184 +1,180 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Standard outputs that keep nobody waiting, in a process of their own."""
+"""Standard outputs that keep nobody waiting: any descriptors will do, and a clock by hand."""
 
+from collections.abc import Iterator
+from contextlib import suppress
+import ctypes
+import fcntl
 import os
 from pathlib import Path
 import subprocess
 import sys
-import textwrap
+import threading
 import time
 
+from clocks import HandClock
 import pytest
 
-#: against the wall clock (test/real.py)
-pytestmark = pytest.mark.real
+from drive_can_bridge.process.standard_outputs import Output, PATIENCE
 
-HEAD = """
-import ctypes, os, sys, threading, time
-from drive_can_bridge.process.standard_outputs import Output, StandardOutputs
-libc = ctypes.PyDLL(None)      # holds the interpreter while it writes, as rcutils does
-"""
+pytestmark = pytest.mark.usefixtures('threads')
 
-
-def run(program: str, **options: object) -> 'subprocess.CompletedProcess[bytes]':
-    return subprocess.run([sys.executable, '-c', HEAD + textwrap.dedent(program)], timeout=60,
-                          stdout=subprocess.PIPE, check=False, **options)  # type: ignore[call-overload,no-any-return]
+#: holds the interpreter while it writes, as rcutils does
+LIBC = ctypes.PyDLL(None)
+#: bytes of the smallest pipe, and of one write
+PIECE = 4096
 
 
-def start(program: str, standard_error: int) -> 'subprocess.Popen[bytes]':
-    return subprocess.Popen([sys.executable, '-c', HEAD + textwrap.dedent(program)],
-                            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                            stderr=standard_error)
+class Time:
+    """
+    A time that stands still.
+
+    :ivar now: s.
+    :ivar step: s that pass with each look at it.
+    """
+
+    def __init__(self) -> None:
+        self.now = self.step = 0.0
+        self.clock = HandClock(self._look)
+
+    def _look(self) -> float:
+        self.now += self.step
+        return self.now
 
 
-def test_everything_arrives_whoever_writes_it() -> None:
-    done = run("""
-        with Output('standard error', 2) as output:
+@pytest.fixture
+def hand() -> Time:
+    return Time()
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    """Return a small pipe: where it is read, and where it is written."""
+    read, write = os.pipe()
+    fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, PIECE)
+    yield read, write
+    for descriptor in (read, write):
+        with suppress(OSError):
+            os.close(descriptor)
+
+
+def put(descriptor: int, data: bytes) -> None:
+    """Write all of it as a library does; what an output cannot take yet is tried again."""
+    while LIBC.write(descriptor, data, len(data)) != len(data):
+        time.sleep(0)       # its threads go on
+
+
+def test_everything_arrives_whoever_writes_it(hand: Time, tmp_path: Path) -> None:
+    with (tmp_path / 'written').open('w') as file:
+        number = file.fileno()
+        with Output(hand.clock, 'standard error', number) as output:
             assert not output.is_terminal
-            print('python', file=sys.stderr)
-            os.write(2, b'descriptor\\n')
-            libc.write(2, b'library\\n', 8)
-            for number in range(20_000):
-                libc.write(2, b'x' * 99 + b'\\n', 100)
-                if number % 100 == 99:
-                    assert output.flush(time.monotonic() + 30.0)
-        os.write(2, b'afterwards\\n')
-        """, stderr=subprocess.PIPE)
-    lines = done.stderr.decode().splitlines()
-    assert (done.returncode, lines[:3], lines[-1]) == (
-        0, ['python', 'descriptor', 'library'], 'afterwards')
+            print('python', file=file, flush=True)
+            os.write(number, b'descriptor\n')
+            put(number, b'library\n')
+            for count in range(20_000):
+                put(number, b'x' * 99 + b'\n')
+                if count % 100 == 99:
+                    assert output.flush()
+        os.write(number, b'afterwards\n')
+    lines = (tmp_path / 'written').read_text().splitlines()
+    assert (lines[:3], lines[-1]) == (['python', 'descriptor', 'library'], 'afterwards')
     assert lines[3:-1] == ['x' * 99] * 20_000
 
 
-def test_flushed_is_written(tmp_path: Path) -> None:
-    with (tmp_path / 'written').open('wb') as file:
-        done = run("""
-            sys.setswitchinterval(1e-6)
-            real = os.dup(2)
-            with Output('standard error', 2) as output:
+def test_flushed_is_written(hand: Time, tmp_path: Path) -> None:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with (tmp_path / 'written').open('wb') as file:
+            real = os.dup(file.fileno())
+            with Output(hand.clock, 'standard error', file.fileno()) as output:
                 for number in range(1, 5001):
-                    os.write(2, b'x' * 9 + b'\\n')
-                    assert output.flush(time.monotonic() + 30.0)
+                    os.write(file.fileno(), b'x' * 9 + b'\n')
+                    assert output.flush()
                     assert os.fstat(real).st_size == 10 * number, number
-            """, stderr=file)
-    assert done.returncode == 0, (tmp_path / 'written').read_text()[-1000:]
+            os.close(real)
+    finally:
+        sys.setswitchinterval(before)
 
 
-def test_nobody_reads() -> None:
-    read, write = os.pipe()
-    process = start("""
-        output = Output('standard error', 2).__enter__()
-        ticks = []
-        threading.Thread(target=lambda: [ticks.append(time.monotonic()) or time.sleep(0.001)
-                                         for _ in range(500)], daemon=True).start()
-        for number in range(40_000):    # 4 MB
-            while libc.write(2, b'x' * 99 + b'\\n', 100) != 100:   # nobody's, if lost here
-                time.sleep(0.001)
-        while len(ticks) < 500:
-            time.sleep(0.01)
-        assert not output.flush(time.monotonic() + 0.05)
-        print('on its way', flush=True)
-        sys.stdin.read()
-        """, write)
-    os.close(write)
-    assert process.stdin is not None and process.stdout is not None
-    # it got that far without a reader
-    assert process.stdout.readline() == b'on its way\n'
-    text = b''
-    while b'left out here' not in text:
-        text += os.read(read, 65536)
+def test_nobody_reads(hand: Time, pipe: tuple[int, int]) -> None:
+    read, write = pipe
+    with Output(hand.clock, 'standard error', write) as output:
+        for _ in range(40_000):     # 4 MB: it gets that far without a reader
+            put(write, b'x' * 99 + b'\n')
+        assert not output.flush(hand.now - 1.0)
+        text = b''
+        while b'left out here' not in text:
+            text += os.read(read, 65536)
     lines = text.decode().splitlines()
     told = next(line for line in lines if 'left out here' in line)
     kept = sum(line == 'x' * 99 for line in lines)
     assert kept + int(told.split()[1]) == pytest.approx(40_000, abs=100)
     assert 5_000 < kept < 15_000
-    process.kill()
-    process.wait()
-    process.stdin.close()
-    process.stdout.close()
-    os.close(read)
 
 
 @pytest.mark.parametrize('end', ['closed', 'gone'])
-def test_nobody_is_there(end: str) -> None:
-    program = """
-        with Output('standard error', 2) as output:
-            for _ in range(1000):
-                libc.write(2, b'x' * 1000, 1000) if end == 'gone' else None
-                time.sleep(0)
-            assert output.flush()
-        print('through')
-        """
+def test_nobody_is_there(hand: Time, pipe: tuple[int, int], end: str) -> None:
+    read, write = pipe
+    os.close(read)
     if end == 'closed':
-        command = [sys.executable, '-c', f'{HEAD}\nend = "closed"\n{textwrap.dedent(program)}']
-        done = subprocess.run(['sh', '-c', 'exec "$@" 2>&-', 'sh', *command], timeout=60,
-                              stdout=subprocess.PIPE, check=False)
-    else:
-        read, write = os.pipe()
-        os.close(read)
-        done = run('\nend = "gone"\n' + textwrap.dedent(program), stderr=write)
         os.close(write)
-    assert (done.returncode, done.stdout) == (0, b'through\n')
+    with Output(hand.clock, 'standard error', write) as output:
+        for _ in range(1000):
+            if end == 'gone':
+                put(write, b'x' * 1000)
+        assert output.flush()
 
 
-def test_last_words_wait_until_they_are_taken_unless_nobody_takes_them() -> None:
+def test_last_words_wait_until_they_are_taken_unless_nobody_takes_them(
+        hand: Time, pipe: tuple[int, int]) -> None:
     """However long that takes: a reader that reads slowly reads."""
-    program = """
-        output = Output('standard error', 2).__enter__()
-        libc.write(2, b'x' * 200_000, 200_000)
-        print('flushing', flush=True)
-        print(output.flush(), flush=True)
-        libc.write(2, b'x' * 200_000, 200_000)
-        print(output.flush(), flush=True)
-        sys.stdin.read()
-        """
-    read, write = os.pipe()
-    process = start(program, write)
-    os.close(write)
-    assert process.stdin is not None and process.stdout is not None
-    assert process.stdout.readline() == b'flushing\n'
-    taken = 0
-    while taken < 200_000:
-        taken += len(os.read(read, 4096))
-        time.sleep(0.03)    # 1.5 s for all of it
-    assert process.stdout.readline() == b'True\n'
-    assert process.stdout.readline() == b'False\n'
-    process.kill()
-    process.wait()
-    process.stdin.close()
-    process.stdout.close()
-    os.close(read)
+    read, write = pipe
+    with Output(hand.clock, 'standard error', write) as output:
+        put(write, b'x' * 50 * PIECE)
+
+        def read_slowly() -> None:
+            for _ in range(50):
+                assert len(os.read(read, PIECE)) == PIECE
+                hand.now += 0.75 * PATIENCE
+        reader = threading.Thread(target=read_slowly)
+        reader.start()
+        assert output.flush()
+        reader.join()
+        assert hand.now == 50 * 0.75 * PATIENCE
+        put(write, b'x' * 50 * PIECE)
+        hand.step = 0.1 * PATIENCE
+        begun = hand.now
+        assert not output.flush()
+        assert hand.now - begun > PATIENCE
+        os.close(read)      # who would read it all has gone: the writing thread ends, too
 
 
-@pytest.mark.parametrize('number', [1, 2])
-def test_neither_output_keeps_anybody_waiting(number: int) -> None:
-    read, write = os.pipe()
-    streams = {1: {'stdout': write, 'stderr': subprocess.PIPE},
-               2: {'stdout': subprocess.PIPE, 'stderr': write}}[number]
-    process = subprocess.Popen([sys.executable, '-c', HEAD + textwrap.dedent(f"""
-        with StandardOutputs() as outputs:
-            for _ in range(10):
-                libc.write({number}, b'x' * 100_000, 100_000)
-                time.sleep(0)
-            print('through', file=sys.stdout if {number} == 2 else sys.stderr, flush=True)
-            assert not outputs.flush()
-            os._exit(0)
-        """)], **streams)  # type: ignore[call-overload]
-    os.close(write)
-    other = process.stderr if number == 1 else process.stdout
-    assert other is not None and other.readline() == b'through\n'
-    assert process.wait(timeout=60) == 0
-    other.close()
-    os.close(read)
+#: writes to both outputs, which nobody reads until it has said on another descriptor that it could
+BOTH = """
+import os, sys
+from drive_can_bridge.clock import SteadyClock
+from drive_can_bridge.process.standard_outputs import StandardOutputs
+with StandardOutputs(SteadyClock()):
+    for number in range(1000):
+        os.write(1 + number % 2, b'%-99d\\n' % number)
+    os.write(int(sys.argv[1]), b'through')
+    sys.stdin.read()
+"""
 
 
-def test_lines_of_both_keep_their_order_where_they_go_the_same_way() -> None:
-    done = run("""
-        with StandardOutputs():
-            for number in range(1000):
-                os.write(1 + number % 2, b'%d\\n' % number)
-        """, stderr=subprocess.STDOUT)
-    assert done.stdout == b''.join(b'%d\n' % number for number in range(1000))
+@pytest.mark.real
+def test_lines_of_both_keep_nobody_waiting_and_their_order_where_they_go_the_same_way() -> None:
+    told, tell = os.pipe()
+    with subprocess.Popen([sys.executable, '-c', BOTH, str(tell)], stdin=subprocess.PIPE,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          pass_fds=[tell]) as process:
+        os.close(tell)
+        assert os.read(told, 7) == b'through'
+        out, _ = process.communicate()
+    os.close(told)
+    assert [int(line) for line in out.splitlines()] == list(range(1000))
 
 
 CLOSED = """
@@ -192,10 +188,9 @@ assert os.open(os.devnull, os.O_RDONLY) > 2
 """
 
 
-@pytest.mark.parametrize('closed', ['<&-', '>&-', '2>&-', '<&- >&- 2>&-'])
-def test_streams_that_somebody_closed_go_to_nobody(closed: str) -> None:
-    done = subprocess.run(['sh', '-c', f'exec "$@" {closed}', 'sh', sys.executable, '-c', CLOSED],
-                          timeout=60, capture_output=True, check=False)
-    assert done.returncode == 0
-    assert done.stdout == (b'' if ' >' in f' {closed}' else b'output\n')
-    assert done.stderr == (b'' if '2>' in closed else b'error\n')
+@pytest.mark.usefixtures('programs')
+def test_streams_that_somebody_closed_go_to_nobody() -> None:
+    """Each at once; what a bridge does then: system/test_system_stuck_output.py."""
+    done = subprocess.run(['sh', '-c', 'exec "$@" <&- >&-', 'sh', sys.executable, '-c', CLOSED],
+                          capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b'', b'error\n')

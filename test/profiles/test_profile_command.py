@@ -252,6 +252,7 @@ def in_terminal(*arguments: str, **environment: str) -> str:
     return shown.decode()
 
 
+@pytest.mark.usefixtures('programs')
 def test_fits_a_terminal_and_obeys_no_color() -> None:
     shown = in_terminal('profile', 'list')
     assert '\x1b[1m' in shown
@@ -262,6 +263,7 @@ def test_fits_a_terminal_and_obeys_no_color() -> None:
     assert 'tesys_t_ltmr' in plain
 
 
+@pytest.mark.usefixtures('programs')
 def test_what_goes_to_a_pipe_is_neither_cut_nor_wrapped() -> None:
     shown = subprocess.run(
         [sys.executable, '-m', 'drive_can_bridge.cli.main', 'profile', 'show', 'tesys_t_ltmr'],
@@ -296,6 +298,7 @@ def test_nothing_upsets_a_terminal(tmp_path: Path, capsys: pytest.CaptureFixture
     assert '\x1b' not in out
 
 
+@pytest.mark.usefixtures('programs')
 @pytest.mark.parametrize('name', ['/dev/zero', 'pipe', 'large.csv'])
 def test_what_has_no_end_is_not_read(name: str, tmp_path: Path) -> None:
     file = tmp_path / name
@@ -309,7 +312,7 @@ def test_what_has_no_end_is_not_read(name: str, tmp_path: Path) -> None:
     limit = 1 << 30     # of memory
     done = subprocess.run(
         [sys.executable, '-m', 'drive_can_bridge.cli.main', 'profile', 'import', str(file)],
-        capture_output=True, text=True, timeout=60.0, check=False,
+        capture_output=True, text=True, check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
     assert (done.returncode, done.stdout, done.stderr) == (
         1, '', f'drive_can profile: {file}: {reason}\n')

@@ -163,6 +163,7 @@ def test_a_drive_that_is_not_online_is_a_failure(
         'lift: stopped']
 
 
+@pytest.mark.usefixtures('bench')
 def test_no_bridge_at_all(run: Run) -> None:
     code, lines, errors = run('stop', '--namespace', 'nobody')
     assert (code, len(lines), errors) == (1, 1, '')

@@ -1,18 +1,19 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The log's own thread: nobody waits for it, and nothing is left out in silence."""
 
+import itertools
 from pathlib import Path
 import tempfile
 import threading
-import time
 from typing import Any
 
-from clocks import REAL
+from clocks import HandClock, REAL
 import pytest
 from rclpy.logging import get_logging_directory
 from waiting import wait_for
+from world import World
 
-from drive_can_bridge.ros import log as log_module
+from drive_can_bridge.process.standard_outputs import PATIENCE
 from drive_can_bridge.ros.log import LINES_MAX, Log
 
 
@@ -31,6 +32,7 @@ class Logger:
         return write
 
 
+@pytest.mark.usefixtures('threads')
 def test_lines_in_order_and_printable() -> None:
     logger = Logger()
     log = Log(logger, REAL)
@@ -45,6 +47,7 @@ def test_lines_in_order_and_printable() -> None:
     assert logger.lines[-1] == ('error', 'too late')
 
 
+@pytest.mark.usefixtures('threads')
 def test_nobody_waits_for_a_logger_that_does_not_come_back() -> None:
     logger = Logger()
     logger.open.clear()
@@ -62,13 +65,13 @@ def test_nobody_waits_for_a_logger_that_does_not_come_back() -> None:
     log.close()
 
 
-def test_the_last_words_are_written_however_long_that_takes() -> None:
+def test_the_last_words_are_written_however_long_that_takes(bench: World) -> None:
     class SlowLogger(Logger):
         def __getattr__(self, level: str) -> Any:
-            time.sleep(0.05)
+            bench.clock.live(0.9 * PATIENCE)
             return super().__getattr__(level)
     logger = SlowLogger()
-    log = Log(logger, REAL)
+    log = Log(logger, bench.clock)
     for number in range(20):
         log.info(str(number))
     log.fatal('why it ends')
@@ -76,20 +79,22 @@ def test_the_last_words_are_written_however_long_that_takes() -> None:
     assert logger.lines[-1] == ('fatal', 'why it ends')
 
 
+@pytest.mark.usefixtures('threads')
 def test_the_end_does_not_wait_for_ever() -> None:
     logger = Logger()
     logger.open.clear()
-    log = Log(logger, REAL)
+    looks = itertools.count()
+    log = Log(logger, HandClock(lambda: 0.1 * PATIENCE * next(looks)))
     for number in range(LINES_MAX + 2):
         log.info(str(number))
     log.close()
+    assert not logger.lines
     logger.open.set()
 
 
-def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_module, 'SUM_UP', 0.05)
+def test_its_thread_sums_up_what_repeats_by_itself(bench: World) -> None:
     logger = Logger()
-    log = Log(logger, REAL)
+    log = Log(logger, bench.clock)
     for _ in range(500):
         log.speaker('lift').warning('fault')
         log.speaker('lift').info('fault gone')
@@ -100,6 +105,7 @@ def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPat
     assert logger.lines[-1][1].startswith('lift: fault gone (')
 
 
+@pytest.mark.usefixtures('threads')
 def test_the_end_writes_what_is_held_behind_what_waits() -> None:
     logger = Logger()
     log = Log(logger, REAL)

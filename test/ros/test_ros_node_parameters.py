@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The parameters of the bridge's own node."""
 
+import hashlib
 from pathlib import Path
-import subprocess
 
 from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client, wait_until
@@ -52,9 +52,9 @@ def test_the_digest_of_the_profile(bridge: StartBridge, client: Client, tmp_path
     bridge(parameters(conveyor=CONVEYOR, lift={**LIFT, 'profile': str(profile), 'cyclic_request': [
         'speed_setpoint'], 'cyclic_response': ['actual_speed']}))
     names = ['drives.conveyor.profile_sha256', 'drives.lift.profile_sha256']
-    command = ['sha256sum', str(profiles_directory() / 'datamodel_example.yaml'), str(profile)]
-    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert client.get(BRIDGE, *names) == [line.split()[0] for line in listed.splitlines()]
+    assert client.get(BRIDGE, *names) == [
+        hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in (profiles_directory() / 'datamodel_example.yaml', profile)]
     [(done, reason)] = client.set(BRIDGE, drives__conveyor__profile_sha256='0')
     assert not done and 'read-only' in reason
 

@@ -2,8 +2,7 @@
 """
 What the executable says about what it cannot work with, and its exit code.
 
-Its ``main`` runs in this process; the executable itself is started by
-``system/test_system_configuration.py``.
+Its ``main`` runs in this process; every problem of a file: ``system/test_system_commands.py``.
 """
 
 from collections.abc import Callable
@@ -29,7 +28,8 @@ Run = Callable[..., tuple[int, list[str]]]
 
 
 @pytest.fixture(name='run')
-def _run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def _run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+         threads: None) -> Run:
     # a bridge asks for a higher priority, which is none of this process's business
     monkeypatch.setattr(os, 'setpriority', lambda *_: None)
     monkeypatch.setattr(sys, 'setswitchinterval', lambda _: None)
@@ -135,8 +135,8 @@ def test_no_file_at_all(run: Run) -> None:
 @pytest.mark.parametrize('content', [
     '/**/drive_can_bridge:\n  ros__parameters:\n    buses: {main: {channel: [1, a]}}\n',
     '/**/drive_can_bridge:\n  ros__parameters:\n    buses: &bus {}\n    drives: *bus\n',
-    None,
-], ids=['mixed list', 'alias', 'no file'])
+    'no yaml: [', None,
+], ids=['mixed list', 'alias', 'no yaml', 'no file'])
 def test_what_rcl_refuses(run: Run, tmp_path: Path, content: str | None) -> None:
     file = tmp_path / 'refused.yaml'
     if content is not None:

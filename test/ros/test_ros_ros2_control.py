@@ -363,5 +363,20 @@ def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:
         message = manager.hardware.latest
         assert not len(message.position)
         assert not takes_positions(message), 'so transforms come from joint_state_broadcaster'
+
+        # without power at speed: neutral until commanded neutral, whatever the controller goes on
+        one.played['right_wheel'].fault('power_cut=4')
+        wait_until(lambda: math.isnan(manager.hardware.latest.velocity[1]), what='NaN')
+        assert state['right_wheel_joint', 'velocity'] == pytest.approx(3.0, abs=0.1), 'for ever'
+        one.online('right_wheel')
+        with one.record() as recorder:
+            assert client.call('/right_wheel/enable', SetBool, SetBool.Request(data=True)).success
+            wait_until(lambda: len([words for words in recorder.cycles(2) if words[0]]) > 50)
+            assert {words[1] for words in recorder.cycles(2)} == {0}
+            assert {words[1] for words in recorder.cycles(1)} == {3820}     # 0.1 rpm of the motor
+            command['right_wheel_joint', 'velocity'] = 0.0
+            wait_until(lambda: one.node.drives['right_wheel'].session.setpoints.items[0].armed)
+            command['right_wheel_joint', 'velocity'] = 3.0
+            wait_until(lambda: recorder.words(2)[1] == -5730)
     finally:
         manager.close()

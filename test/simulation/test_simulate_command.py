@@ -146,18 +146,6 @@ def test_standard_input(start: Any) -> None:
     assert len(command.errors) == 1
 
 
-@pytest.mark.real
-def test_without_standard_input(start: Any) -> None:
-    command = start('--interface', 'virtual', '--channel', 'z', stdin=None,
-                    preexec_fn=lambda: os.close(0))
-    command.line('drive lift')
-    assert command.lines[:2] == ['bus main: virtual z', 'bus second: virtual z']
-    with pytest.raises(subprocess.TimeoutExpired):
-        command.process.wait(0.3)
-    assert command.end() == 0
-    assert command.errors == []
-
-
 def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str) -> tuple[
         int, list[str]]:
     """Run the command in this process; return its exit code, and what it complains of."""
@@ -170,6 +158,7 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
     return code, capsys.readouterr().err.splitlines()
 
 
+@pytest.mark.usefixtures('threads')
 @pytest.mark.parametrize(('arguments', 'status', 'message'), [
     (('--pty', '--interface', 'virtual'), 2, 'exclude each other'),
     (('--fault', 'conveyor'), 2, 'write DRIVE:FAULT'),
@@ -250,9 +239,11 @@ class TestASerialPort:
 
     @pytest.mark.real
     def test_of_the_simulation_is_its_own(self, start: Any, port: str, file: str) -> None:
+        """Without standard input, too."""
         # the other bus is elsewhere: two on one port end the simulation, and with it the lock
-        command = start('--params-file', file)
+        command = start('--params-file', file, stdin=None, preexec_fn=lambda: os.close(0))
         command.line('drive lift')
+        assert command.lines[0] == f'bus main: slcan {port}'
         with pytest.raises(InUse, match=rf'{command.process.pid} \(drive_can simulate\)'):
             Ownership([(BusConfiguration('main', 'slcan', port), ())], 'x', END_FIRST)
         assert command.end() == 0

@@ -7,7 +7,6 @@ from dataclasses import replace
 import os
 from typing import Any
 
-import can
 from clocks import REAL
 from jumping import JumpingClock
 import pytest
@@ -252,20 +251,6 @@ def test_any_profile_is_plain_memory_at_least(protocol: str) -> None:
     assert made.registers.refusal({'red': 1}) is Refusal.READ_ONLY
     made.fault('restart=0', 1.0)
     assert made.value('blue') == -3
-
-
-@pytest.mark.real
-def test_virtual_bus() -> None:
-    channel = 'test_simulation'
-    with Simulation(bridge(channel=channel), REAL) as simulation, can.Bus(
-            interface='virtual', channel=channel, ignore_config=True) as bus:
-        bus.send(can.Message(arbitration_id=POLL.identifier, data=POLL.data))
-        message = bus.recv(10.0)
-        assert message is not None
-        assert Frame(message.arbitration_id, bytes(message.data), True) == ANSWER
-        simulation.drives['conveyor'].fault('off')
-        bus.send(can.Message(arbitration_id=POLL.identifier, data=POLL.data))
-        assert bus.recv(0.1) is None
 
 
 class TestConsole:

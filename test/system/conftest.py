@@ -1,20 +1,28 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The executables as a user drives them: in processes of their own, which meet over ROS and a bus.
+The executables as a user drives them, which meet over ROS and a bus.
+
+With the mark ``real``: in processes of their own. Without: on the bench (``on_bench.py``), where
+no time passes but what the story takes.
 
 Whatever a test started is ended after it, its outputs are shown when it fails, and a traceback in
 any of them is a failure in itself.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import itertools
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
-from processes import Client, Processes
+from processes import Client, ClientProcess, Processes
 import pytest
+from slcan_peer import Answers, Peer
 from waiting import DEADLINE
+from world import World, world
+
+if TYPE_CHECKING:
+    from on_bench import BenchPeer, BenchProcesses
 
 _COUNTER = itertools.count(1)
 _PROCESSES = pytest.StashKey[Processes]()
@@ -38,9 +46,26 @@ def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[None]:
     return report
 
 
+@pytest.fixture(name='world')
+def _world(request: pytest.FixtureRequest) -> Iterator[World | None]:
+    """Return the bench; None: the story is real."""
+    if request.node.get_closest_marker('real') is not None:
+        yield None
+        return
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as made:
+        yield made
+
+
 @pytest.fixture
-def processes(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Processes]:
+def processes(request: pytest.FixtureRequest, tmp_path: Path, world: World | None,
+              ) -> 'Iterator[Processes | BenchProcesses]':
     """Start processes; none of them outlives the test."""
+    if world is not None:
+        from on_bench import BenchProcesses
+        bench = BenchProcesses(tmp_path, world)
+        yield bench
+        bench.end()
+        return
     started = Processes(tmp_path)
     request.node.stash[_PROCESSES] = started
     yield started
@@ -55,15 +80,42 @@ def namespace() -> str:
 
 
 @pytest.fixture(scope='session')
-def _client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    client = Client(tmp_path_factory.mktemp('client'))
+def _client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ClientProcess]:
+    client = ClientProcess(tmp_path_factory.mktemp('client'))
     yield client
     client.process.kill()
 
 
 @pytest.fixture
-def client(_client: Client, processes: Processes) -> Iterator[Client]:
-    """Return the ROS client, a process that lives as long as the test run."""
-    processes.guests.append(_client.process)
-    yield _client
-    _client.ask('forget')
+def client(request: pytest.FixtureRequest, processes: 'Processes | BenchProcesses',
+           world: World | None) -> Iterator[Client]:
+    """Return the ROS client; of real stories a process that lives as long as the test run."""
+    if world is not None:
+        from on_bench import BenchClient
+        bench = BenchClient(world)
+        yield bench
+        bench.close()
+        return
+    shared: ClientProcess = request.getfixturevalue('_client')
+    assert isinstance(processes, Processes)
+    processes.guests.append(shared.process)
+    yield shared
+    shared.ask('forget')
+
+
+@pytest.fixture
+def connect(world: World | None, tmp_path: Path) -> Iterator[Callable[[Answers], Any]]:
+    """Return what puts a drive in literal text on the bus."""
+    started: 'list[Peer | BenchPeer]' = []
+
+    def begin(answers: Answers) -> 'Peer | BenchPeer':
+        link = tmp_path / 'links' / 'main'
+        if world is None:
+            started.append(Peer(link, answers))
+        else:
+            from on_bench import BenchPeer
+            started.append(BenchPeer(world, link, answers))
+        return started[-1]
+    yield begin
+    for peer in started:
+        peer.close()

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A client without manners: everything at once, nonsense, and as fast as it can.
+A client without manners: everything at once, and as fast as it can.
 
 ``flood_client.py ACTION ARGUMENTS``; it says ``ready`` when it begins, and prints one JSON object
 at its end. Started by the tests in this directory.
@@ -8,19 +8,15 @@ at its end. Started by the tests in this directory.
 ========================= =====================================================================
 calls DRIVE COUNT         so many calls of GetParameters in flight at the same time
 commands TOPIC SECONDS    publishes as fast as it can, about 10,000 times a second; ends with 25.0
-numbers TOPIC STATUS      publishes what is no setpoint: not finite, absurd
 parameters DRIVE SECONDS  writes and reads parameters, each call as soon as the last is answered
-requests DRIVE            parameter requests that make no sense
 ========================= =====================================================================
 """
 
 import json
-import math
 import sys
 import time
 
 from acquaintance import acquaint
-from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 import rclpy
@@ -29,10 +25,6 @@ from std_msgs.msg import Float64
 
 #: s after which an answer will not come any more
 PATIENCE = 600.0
-#: no double, or none that any drive could want
-ABSURD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3000.1, -1e9, 2.0 ** 63)
-#: a value like any other: it rounds to 0
-TINY = 5e-324
 
 
 def until(node, condition, patience=PATIENCE):
@@ -97,59 +89,6 @@ def commands(node, topic, seconds):
     return {'published': count}
 
 
-def numbers(node, topic, status):
-    """Publish each until it is counted: a bridge that stands still for a moment loses some."""
-    refused = [0]
-
-    def look(message):
-        for entry in message.status:
-            if entry.name == status:
-                refused[0] = int(next(
-                    pair.value for pair in entry.values if pair.key == 'commands_refused'))
-    node.create_subscription(DiagnosticArray, '/diagnostics', look, QoSProfile(depth=50))
-    publisher = publisher_of(node, topic)
-    publisher.publish(Float64(data=TINY))
-    repeated = 0
-    for value in ABSURD:
-        before = refused[0]
-        publisher.publish(Float64(data=value))
-        while not until(node, lambda before=before: refused[0] > before, 5.0):
-            repeated += 1
-            publisher.publish(Float64(data=value))
-    return {'refused': len(ABSURD), 'repeated': repeated}
-
-
-def requests(node, drive):
-    get = service(node, GetParameters, f'{drive}/get_parameters')
-    write = service(node, SetParameters, f'{drive}/set_parameters')
-    print('ready', flush=True)
-    names = ['', ' ', '.', 'p', 'p-1', 'p1.', 'p99999999999999999999', 'x.', 'xffffff.ffffff',
-             'p65535', 'ramp_time\n', 'Ramp_Time', '\u00fc' * 100, 'a' * 100_000, '%s%n',
-             '../../etc/passwd']
-    futures = [get.call_async(GetParameters.Request(names=names)),
-               get.call_async(GetParameters.Request(names=['nothing'] * 20_000)),
-               get.call_async(GetParameters.Request(names=[]))]
-    values = [ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
-              for value in (*ABSURD, TINY)]
-    values += [ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
-               for value in (-2 ** 63, 2 ** 63 - 1)]
-    values += [ParameterValue(), ParameterValue(type=200),
-               ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='x' * 100_000),
-               ParameterValue(type=ParameterType.PARAMETER_BYTE_ARRAY,
-                              byte_array_value=[b'\x01'] * 1000)]
-    futures += [write.call_async(SetParameters.Request(
-        parameters=[Parameter(name='ramp_time', value=value)])) for value in values]
-    until(node, lambda: all(future.done() for future in futures))
-    answers = [future.result() for future in futures if future.done()]
-    results = [answer.results[0] for answer in answers[3:]]
-    return {'answered': len(answers), 'asked': len(futures),
-            'lengths': [len(answer.values) for answer in answers[:3]],
-            'set': sum(value.type != ParameterType.PARAMETER_NOT_SET
-                       for answer in answers[:3] for value in answer.values),
-            'successful': sum(result.successful for result in results),
-            'unexplained': sum(not result.reason for result in results)}
-
-
 def parameters(node, drive, seconds):
     get = service(node, GetParameters, f'{drive}/get_parameters')
     write = service(node, SetParameters, f'{drive}/set_parameters')
@@ -180,8 +119,7 @@ def parameters(node, drive, seconds):
     return {'rounds': rounds, 'failed': failed, 'wrong': wrong}
 
 
-ACTIONS = {'calls': calls, 'commands': commands, 'numbers': numbers, 'parameters': parameters,
-           'requests': requests}
+ACTIONS = {'calls': calls, 'commands': commands, 'parameters': parameters}
 
 
 def main():

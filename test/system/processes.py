@@ -43,7 +43,78 @@ def environment() -> dict[str, str]:
             'PYTHONFAULTHANDLER': '1', 'LC_ALL': 'C.UTF-8', 'COLUMNS': '99'}
 
 
-class Process:
+class Told:
+    """
+    What somebody says on standard output and standard error, line by line.
+
+    :ivar name: who.
+    """
+
+    name: str
+
+    @property
+    def running(self) -> bool:
+        raise NotImplementedError
+
+    @property
+    def lines(self) -> list[str]:
+        """Whole lines of standard output so far."""
+        raise NotImplementedError
+
+    @property
+    def errors(self) -> list[str]:
+        """Whole lines of standard error so far."""
+        raise NotImplementedError
+
+    def line(self, pattern: str, *, errors: bool = False, since: int = 0,
+             timeout: float = DEADLINE) -> str:
+        """Wait for a line that contains the pattern, from line number ``since`` on."""
+        expression = re.compile(pattern)
+        looked = since
+
+        def find() -> str | None:
+            nonlocal looked
+            ended = not self.running  # first: what it wrote last is there then
+            lines = self.errors if errors else self.lines
+            for line in lines[looked:]:
+                if expression.search(line):
+                    return line
+            looked = max(looked, len(lines))
+            if ended:
+                raise AssertionError(f'{self.name} ended without a line {pattern!r}')
+            return None
+        return str(wait_for(find, f'a line {pattern!r} of {self.name}', timeout))
+
+    def error(self, pattern: str, *, since: int = 0, timeout: float = DEADLINE) -> str:
+        """Wait for a line of standard error."""
+        return self.line(pattern, errors=True, since=since, timeout=timeout)
+
+    def losses(self, pattern: str = 'offline') -> list[str]:
+        """Return what a bridge says of lost drives."""
+        return [line for line in self.errors if re.search(pattern, line)]
+
+
+class Witness:
+    """What simulated drives have seen on the bus."""
+
+    def frames(self, pattern: str = '', since: int = 0) -> list[str]:
+        """Return the logged frames, as ``003FFFF0#000003E800000000 R``; R: from the bridge."""
+        raise NotImplementedError
+
+    @staticmethod
+    def matches(pattern: str, frame: str) -> bool:
+        """Tell whether a frame has such a place."""
+        return re.search(pattern, frame) is not None
+
+    def frame(self, pattern: str, since: int = 0, count: int = 1) -> list[str]:
+        """Wait for ``count`` frames that match."""
+        def find() -> list[str] | None:
+            found = self.frames(pattern, since)
+            return found if len(found) >= count else None
+        return list(wait_for(find, f'{count} frames {pattern!r}'))
+
+
+class Process(Told):
     """
     A process with its standard output and standard error in files.
 
@@ -80,34 +151,6 @@ class Process:
         """Whole lines of standard error so far."""
         return self._err.read()
 
-    def line(self, pattern: str, *, errors: bool = False, since: int = 0,
-             timeout: float = DEADLINE) -> str:
-        """Wait for a line that contains the pattern, from line number ``since`` on."""
-        expression = re.compile(pattern)
-        looked = since
-
-        def find() -> str | None:
-            nonlocal looked
-            ended = not self.running  # first: what it wrote last is in the file then
-            lines = self.errors if errors else self.lines
-            for line in lines[looked:]:
-                if expression.search(line):
-                    return line
-            looked = max(looked, len(lines))
-            if ended:
-                raise AssertionError(f'{self.name} ended ({self.process.returncode}) without a '
-                                     f'line {pattern!r}')
-            return None
-        return str(wait_for(find, f'a line {pattern!r} of {self.name}', timeout))
-
-    def error(self, pattern: str, *, since: int = 0, timeout: float = DEADLINE) -> str:
-        """Wait for a line of standard error."""
-        return self.line(pattern, errors=True, since=since, timeout=timeout)
-
-    def losses(self, pattern: str = 'offline') -> list[str]:
-        """Return what a bridge says of lost drives."""
-        return [line for line in self.errors if re.search(pattern, line)]
-
     def write(self, text: str) -> None:
         """Write a line to standard input."""
         assert self.process.stdin is not None
@@ -117,6 +160,14 @@ class Process:
     def send(self, number: int) -> None:
         """Send a signal."""
         self.process.send_signal(number)
+
+    def suspend(self) -> None:
+        """Have it stand still; it does when this returns."""
+        self.send(signal.SIGSTOP)
+        tasks = Path(f'/proc/{self.pid}/task')
+        wait_for(lambda: all(
+            (task / 'stat').read_text().rpartition(')')[2].split()[0] == 'T'
+            for task in tasks.iterdir()), f'{self.name} to stand still')
 
     def wait(self, timeout: float = DEADLINE) -> int:
         """Wait for the end; return the exit code."""
@@ -216,7 +267,7 @@ class Processes:
                                   key=lambda process: isinstance(process, Simulator)))
 
 
-class Simulator(Process):
+class Simulator(Process, Witness):
     """``drive_can simulate --log-frames``: also a witness of what was on the bus."""
 
     links: Path
@@ -242,40 +293,13 @@ class Simulator(Process):
         self._looked = len(lines)
         return [frame for frame in self._frames[since:] if expression.search(frame)]
 
-    def frame(self, pattern: str, since: int = 0, count: int = 1) -> list[str]:
-        """Wait for ``count`` frames that match."""
-        found: list[str] = []
-        looked = since
-
-        def find() -> bool:
-            nonlocal looked
-            assert self.running, f'{self.name} has ended'
-            found.extend(self.frames(pattern, looked))
-            looked = max(looked, len(self._frames))
-            return len(found) >= count
-        wait_for(find, f'{count} frames {pattern!r}')
-        return found
-
 
 class Client:
-    """The client script ``ros_client.py``: ROS as other processes see it."""
-
-    def __init__(self, directory: Path) -> None:
-        self.process = Process([sys.executable, str(Path(__file__).with_name('ros_client.py'))],
-                               directory, 'client')
-        self._answers = 0
+    """ROS as others see it."""
 
     def ask(self, action: str, timeout: float = DEADLINE, **arguments: Any) -> Any:
         """Let the client do something; return its answer."""
-        self.process.write(json.dumps({'action': action, 'timeout': timeout, **arguments}))
-        self._answers += 1
-        wanted = self._answers
-        wait_for(lambda: len(self.process.lines) >= wanted or not self.process.running,
-                 f'the client to {action} {arguments}', timeout + DEADLINE)
-        answer = json.loads(self.process.lines[wanted - 1])
-        if 'failure' in answer:
-            raise AssertionError(f'{action} {arguments}: {answer["failure"]}')
-        return answer['result']
+        raise NotImplementedError
 
     def publish(self, topic: str, value: float, *, rate: float = 50.0) -> None:
         """Publish a value again and again, until told something else."""
@@ -330,6 +354,27 @@ class Client:
         """
         facts: dict[str, str] = self.ask('diagnostics', name=name, conditions=conditions)
         return facts
+
+
+class ClientProcess(Client):
+    """The client script ``ros_client.py``."""
+
+    def __init__(self, directory: Path) -> None:
+        self.process = Process([sys.executable, str(Path(__file__).with_name('ros_client.py'))],
+                               directory, 'client')
+        self._answers = 0
+
+    def ask(self, action: str, timeout: float = DEADLINE, **arguments: Any) -> Any:
+        """Let the client do something; return its answer."""
+        self.process.write(json.dumps({'action': action, 'timeout': timeout, **arguments}))
+        self._answers += 1
+        wanted = self._answers
+        wait_for(lambda: len(self.process.lines) >= wanted or not self.process.running,
+                 f'the client to {action} {arguments}', timeout + DEADLINE)
+        answer = json.loads(self.process.lines[wanted - 1])
+        if 'failure' in answer:
+            raise AssertionError(f'{action} {arguments}: {answer["failure"]}')
+        return answer['result']
 
 
 class _Lines:

@@ -13,7 +13,6 @@ import queue
 import re
 import sys
 import threading
-import time
 
 from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
@@ -25,8 +24,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
 from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock
 
 TYPES = {'Float64': Float64, 'Int64': Int64}
+
 
 class Failed(Exception):
     """What was asked for did not happen."""
@@ -38,7 +39,7 @@ class Client:
     def __init__(self, node):
         self.node = node
         # one that stays: what rclpy.spin_once does costs a tenth of a core
-        self.executor = SingleThreadedExecutor()
+        self.executor = SingleThreadedExecutor(context=node.context)
         self.executor.add_node(node)
         self.publishers = {}
         self.received = {}
@@ -53,9 +54,9 @@ class Client:
         self.executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition, timeout, what):
-        deadline = time.monotonic() + timeout
+        deadline = clock().now() + timeout
         while not condition():
-            if time.monotonic() > deadline:
+            if clock().now() > deadline:
                 raise Failed(f'waited {timeout:g} s for {what}')
             self.spin(0.02)
 
@@ -120,8 +121,8 @@ class Client:
         self.until(lambda: True in messages, timeout, f'{topic} True, however short')
 
     def rest(self, seconds, timeout):
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
+        deadline = clock().now() + seconds
+        while clock().now() < deadline:
             self.spin(0.02)
 
     def diagnostics(self, name, conditions, timeout):
@@ -157,12 +158,12 @@ class Client:
         service = self.services[name]
         self.until(service.service_is_ready, timeout, f'the service {name}')
         # before each call: the bridge may be another process than last time
-        deadline = time.monotonic() + timeout
+        deadline = clock().now() + timeout
 
         def wait(condition, seconds):
-            end = time.monotonic() + seconds
-            while not condition() and time.monotonic() < end:
-                if time.monotonic() > deadline:
+            end = clock().now() + seconds
+            while not condition() and clock().now() < end:
+                if clock().now() > deadline:
                     raise Failed(f'waited {timeout:g} s for any answer of the node of {name}')
                 self.spin(0.02)
             return condition()

@@ -23,6 +23,18 @@ ZEROS = '0' * 16
 NEUTRAL_WORDS = '000003E8' + '0' * 8
 
 
+#: line, or its first 10 or 5 characters -> lines
+Answers = dict[str, str | Callable[[str], list[str]]]
+
+
+def answer_to(answers: Answers, text: str) -> list[str]:
+    """Return the lines that answer one."""
+    answer = next((answers[key] for key in (text, text[:10], text[:5]) if key in answers), [])
+    if callable(answer):
+        return answer(text)
+    return [answer] if isinstance(answer, str) else answer
+
+
 class Line(NamedTuple):
     """
     A line from the bridge, without its end.
@@ -45,15 +57,14 @@ class Peer:
         the line.
     """
 
-    def __init__(self, link: Path,
-                 answers: dict[str, str | Callable[[str], list[str]]] | None = None) -> None:
+    def __init__(self, link: Path, answers: Answers) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         link.parent.mkdir(parents=True, exist_ok=True)
         link.symlink_to(os.ttyname(self._slave))
         self.link = link
-        self.answers = answers or {}
+        self.answers = answers
         self.received: list[Line] = []
         self.lock = threading.Lock()
         self._rest = b''
@@ -134,12 +145,8 @@ class Peer:
                 self._answer(text)
 
     def _answer(self, text: str) -> None:
-        answer = next((self.answers[key] for key in (text, text[:10], text[:5])
-                       if key in self.answers), None)
-        if callable(answer):
-            for line in answer(text):
-                self.send(line.encode('latin-1') + b'\r')
-        elif answer is not None:
-            self.send(answer.encode('latin-1') + b'\r')
-        elif text[:1] not in 'tT':
-            self.send(b'\r')
+        lines = answer_to(self.answers, text)
+        if not lines and text[:1] not in 'tT':
+            lines = ['']
+        for line in lines:
+            self.send(line.encode('latin-1') + b'\r')

@@ -192,6 +192,7 @@ class Soak:
             assert min(self.files[-WARM:]) <= max(self.files[:WARM]) + 2, self.files
 
 
+@pytest.mark.real
 @pytest.mark.timeout(SECONDS * SLOWNESS + 900.0)
 def test_soak(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     print(f'DRIVE_CAN_SOAK_SECONDS={SECONDS:g} DRIVE_CAN_TEST_SEED={SEED}')

@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """CANnord: inverters that share a broadcast, and one in literal text that tells a fault."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from parameter_files import bridge_file
 from processes import Client, Processes
 import pytest
-from slcan_peer import Peer
+from slcan_peer import Answers, Peer
 
 PROFILE = """
 protocols: [cannord]
@@ -39,10 +39,8 @@ def inverters(directory: Path, *drives: dict[str, Any]) -> Path:
 
 
 @pytest.fixture
-def peer(tmp_path: Path) -> Iterator[Peer]:
-    started = Peer(tmp_path / 'links' / 'main')
-    yield started
-    started.close()
+def peer(connect: Callable[[Answers], Peer]) -> Peer:
+    return connect({})
 
 
 def enable(client: Client, drive: str) -> None:

@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A simulated LTMR, the bridge and a ROS node in three processes; and the bytes between them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from parameter_files import bridge_file
 from processes import Client, Process, Processes, Simulator
-from slcan_peer import Peer
+from slcan_peer import Answers, Peer
 from waiting import wait_for
 
 PUMP: dict[str, Any] = {
@@ -114,15 +115,13 @@ class Controller:
         self.function, self.operational = '00', False
         self.words.update(C701='4100', C002='0000')
 
-    def connect(self, link: Path) -> Peer:
-        """Stand behind an adapter."""
-        return Peer(link, dict.fromkeys(['t00020105', 't5058'], self))
 
 
 def witnessed(processes: Processes, client: Client, namespace: str, directory: Path,
-              controller: Controller, **options: Any) -> tuple[Peer, Process, str]:
+              connect: Callable[[Answers], Peer], controller: Controller, **options: Any,
+              ) -> tuple[Peer, Process, str]:
     """Start a bridge that talks to the literal controller."""
-    peer = controller.connect(directory / 'links' / 'main')
+    peer = connect(dict.fromkeys(['t00020105', 't5058'], controller))
     file = bridge_file(directory, drives={'pump': {**WITNESS, **options}},
                        bus={'bitrate': 250_000})
     bridge = processes.bridge(file, namespace)
@@ -132,48 +131,43 @@ def witnessed(processes: Processes, client: Client, namespace: str, directory: P
 
 
 def test_bytes_of_the_manual(processes: Processes, client: Client, namespace: str,
-                             tmp_path: Path) -> None:
+                             tmp_path: Path, connect: Callable[[Answers], Peer]) -> None:
     controller = Controller()
-    peer, bridge, drive = witnessed(processes, client, namespace, tmp_path, controller)
-    try:
-        client.value(f'{drive}/system_status_1', 0x41, 0x41, kind='Int64')
-        for head in READ_455:
-            peer.wait_for(head)
-        frames = [line for line in peer.lines if line[:1] in ('t', 'T')]
-        assert frames[0] == 't00020105'
-        # whatever the first function byte is, the next request has another
-        functions = [line[11:13] for line in frames if line.startswith('t505')]
-        assert all(one != other for one, other in zip(functions, functions[1:]))
-        wait_for(lambda: {line for line in peer.lines if line.startswith('t5058C701')} == {
-            f'{head}00000000' for head in READ_455}, 'reads of 455 with both toggles')
+    peer, bridge, drive = witnessed(processes, client, namespace, tmp_path, connect, controller)
+    client.value(f'{drive}/system_status_1', 0x41, 0x41, kind='Int64')
+    for head in READ_455:
+        peer.wait_for(head)
+    frames = [line for line in peer.lines if line[:1] in ('t', 'T')]
+    assert frames[0] == 't00020105'
+    # whatever the first function byte is, the next request has another
+    functions = [line[11:13] for line in frames if line.startswith('t505')]
+    assert all(one != other for one, other in zip(functions, functions[1:]))
+    wait_for(lambda: {line for line in peer.lines if line.startswith('t5058C701')} == {
+        f'{head}00000000' for head in READ_455}, 'reads of 455 with both toggles')
 
-        assert client.get(drive, 'flc1_ratio') == [33.0]
-        assert client.set(drive, flc1_ratio=50.0) == [(True, '')]
-        assert controller.words['8C02'] == '3200'
-        assert client.get(drive, 'p9999') == [None]
-        assert '06020000h' in bridge.error('pump: read p9999 ')
-        assert client.control(f'{drive}/enable', True)[0]
-        assert controller.words['C002'] == '0100'
+    assert client.get(drive, 'flc1_ratio') == [33.0]
+    assert client.set(drive, flc1_ratio=50.0) == [(True, '')]
+    assert controller.words['8C02'] == '3200'
+    assert client.get(drive, 'p9999') == [None]
+    assert '06020000h' in bridge.error('pump: read p9999 ')
+    assert client.control(f'{drive}/enable', True)[0]
+    assert controller.words['C002'] == '0100'
 
-        # a write whose answer is lost has been executed: it is reported, and never repeated
-        sent = len(peer.lines)
-        controller.acknowledges = False
-        (success, reason), = client.set(drive, flc1_ratio=60.0)
-        controller.acknowledges = True
-        assert not success
-        assert reason.startswith('no answer')
-        assert len([line for line in peer.lines[sent:] if line.startswith('t50588C0200')
-                    and line[12] == 'A']) == 1
-        assert client.get(drive, 'flc1_ratio') == [60.0]
-        assert bridge.end() == 0
-        # the last word to the controller is to stop
-        assert controller.words['C002'] == '0000'
-        known = ('t00020105', 't50588C0200', 't5058C00200', 't5058000000')
-        frames = [line for line in peer.lines if line[:1] in ('t', 'T')]
-        # beside these only reads of one or two registers: the round, 9999, who it is
-        assert {(line[:5], line[11:]) for line in frames if not line.startswith(known)} <= {
-            ('t5058', f'{function}00000000') for function in ('25', 'A5', '26', 'A6')}
-    finally:
-        peer.close()
-
-
+    # a write whose answer is lost has been executed: it is reported, and never repeated
+    sent = len(peer.lines)
+    controller.acknowledges = False
+    (success, reason), = client.set(drive, flc1_ratio=60.0)
+    controller.acknowledges = True
+    assert not success
+    assert reason.startswith('no answer')
+    assert len([line for line in peer.lines[sent:] if line.startswith('t50588C0200')
+                and line[12] == 'A']) == 1
+    assert client.get(drive, 'flc1_ratio') == [60.0]
+    assert bridge.end() == 0
+    # the last word to the controller is to stop
+    assert controller.words['C002'] == '0000'
+    known = ('t00020105', 't50588C0200', 't5058C00200', 't5058000000')
+    frames = [line for line in peer.lines if line[:1] in ('t', 'T')]
+    # beside these only reads of one or two registers: the round, 9999, who it is
+    assert {(line[:5], line[11:]) for line in frames if not line.startswith(known)} <= {
+        ('t5058', f'{function}00000000') for function in ('25', 'A5', '26', 'A6')}

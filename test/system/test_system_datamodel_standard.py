@@ -69,6 +69,7 @@ def _start(processes: Processes, client: Client, namespace: str, tmp_path: Path)
     return lambda **options: Bench(processes, client, namespace, tmp_path, **options)
 
 
+@pytest.mark.real
 @pytest.mark.alone
 def test_both_hold_their_periods(start: type[Bench]) -> None:
     """While other processes read and write parameters of both drives without pause."""

@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Drives that answer late, twice, in pieces, in the wrong order, or against each other."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from parameter_files import bridge_file, CONVEYOR, NEIGHBOUR
 from processes import Client, Processes
 import pytest
 from repeating import again_and_again
-from slcan_peer import Peer, ZEROS
+from slcan_peer import Answers, Peer, ZEROS
 from test_system_reconnection import rearm_and_move, start_moving, status_of
 from waiting import SLOWNESS, wait_for
 
@@ -20,10 +20,8 @@ PERIOD = 0.1 * SLOWNESS
 
 
 @pytest.fixture
-def peer(tmp_path: Path) -> Iterator[Peer]:
-    started = Peer(tmp_path / 'links' / 'main', {CYCLIC_REQUEST: ANSWER})
-    yield started
-    started.close()
+def peer(connect: Callable[[Answers], Peer]) -> Peer:
+    return connect({CYCLIC_REQUEST: ANSWER})
 
 
 def peer_file(directory: Path) -> Path:

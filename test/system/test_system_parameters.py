@@ -12,6 +12,7 @@ from processes import Client, Process, Processes
 import pytest
 from waiting import wait_for
 
+from drive_can_bridge.cli.main import main as drive_can
 from drive_can_bridge.transport.places import DeviceLock
 
 #: nothing here may depend on how busy the machine is
@@ -44,6 +45,7 @@ def documents(process: Process, code: int = 0) -> list[dict[str, Any]]:
     return [json.loads(line) for line in ended(process, code)]
 
 
+@pytest.mark.real
 def test_both_ways_show_the_same(processes: Processes, client: Client, namespace: str,
                                  tmp_path: Path) -> None:
     file = bridge_file(tmp_path, drives=ALL)
@@ -85,6 +87,7 @@ def test_both_ways_show_the_same(processes: Processes, client: Client, namespace
     assert bridge.end() == 0
 
 
+@pytest.mark.real
 def test_a_second_bridge_names_the_first_and_a_killed_one_leaves_no_lock(
         processes: Processes, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
@@ -108,6 +111,7 @@ def test_a_second_bridge_names_the_first_and_a_killed_one_leaves_no_lock(
     assert third.end() == 0
 
 
+@pytest.mark.real
 def test_where_only_the_device_is_shared_nothing_is_written_to_it(
         processes: Processes, namespace: str, tmp_path: Path) -> None:
     """As with two containers: the locks of the host do not meet."""
@@ -131,22 +135,19 @@ def test_where_only_the_device_is_shared_nothing_is_written_to_it(
     assert bridge.end() == 0
 
 
-@pytest.mark.parametrize('way', ['directly', 'through a bridge'])
+@pytest.mark.real
 def test_ctrl_c_waits_for_the_write_under_way(processes: Processes, client: Client,
-                                              namespace: str, tmp_path: Path, way: str) -> None:
+                                              namespace: str, tmp_path: Path) -> None:
     slow = {**CONVEYOR, 'parameter_timeout': 2.0}
     file = bridge_file(tmp_path, drives={'conveyor': slow})
     simulator = processes.simulator(file)
-    options = ['--params-file', str(file)]
-    if way != 'directly':
-        processes.bridge(file, namespace)
-        client.online(f'/{namespace}/conveyor')
-        options = ['--namespace', namespace]
+    processes.bridge(file, namespace)
+    client.online(f'/{namespace}/conveyor')
     before = len(simulator.frames())
     simulator.write('conveyor late=0.5')
     simulator.line('fault late')
     write = processes.drive_can('write', 'conveyor', 'ramp_time=7', 'maximum_speed=1000',
-                                *options)
+                                '--namespace', namespace)
     # the write frame itself: read, then written, then read back half a second later
     simulator.frame('#02BC', since=before)
     write.send(signal.SIGINT)
@@ -157,6 +158,7 @@ def test_ctrl_c_waits_for_the_write_under_way(processes: Processes, client: Clie
     assert not simulator.frames('#2710', since=before)
 
 
+@pytest.mark.real
 def test_watching_ends_with_ctrl_c(processes: Processes, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
     processes.simulator(file)
@@ -170,33 +172,23 @@ def test_watching_ends_with_ctrl_c(processes: Processes, tmp_path: Path) -> None
     assert watch.errors == []
 
 
-def test_a_read_is_interrupted(processes: Processes, tmp_path: Path) -> None:
-    file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    simulator.write('conveyor silent')
-    simulator.line('fault silent')
-    read = processes.drive_can('read', '--params-file', str(file))
-    simulator.frame('R$')
-    read.send(signal.SIGINT)
-    assert read.wait() in (1, 130)     # 1: it had just given up
-    assert len(read.errors) <= 1
 
-
-def test_an_imported_table_is_read_from_drives_made_of_it(processes: Processes, tmp_path: Path,
-                                                          ) -> None:
+def test_an_imported_table_is_read_from_drives_made_of_it(
+        processes: Processes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / 'table.csv'
     rows = [f'{number};Wert {number};{"s" if number % 2 else "rpm"};0,1;rw'
             for number in range(300, 420)]
     table.write_text('\n'.join(['Nr;Bezeichnung;Einheit;Skalierung;Zugriff', *rows, '']),
                      encoding='latin-1')
     profile = tmp_path / 'imported.yaml'
-    made = processes.drive_can('profile', 'import', str(table), '-o', str(profile))
-    assert made.wait() == 0, made.dump()
+    assert drive_can(['profile', 'import', str(table), '-o', str(profile)]) == 0
     file = bridge_file(tmp_path, drives={'conveyor': {
         **CONVEYOR, 'profile': str(profile), 'cyclic_request': [],
         'cyclic_response': ['wert_300']}})
     processes.simulator(file)
-    found = documents(processes.drive_can('read', '--json', '--params-file', str(file)))
+    capsys.readouterr()
+    assert drive_can(['read', '--json', '--params-file', str(file)]) == 0
+    found = list(map(json.loads, capsys.readouterr().out.splitlines()))
     assert [each['number'] for each in found] == list(range(300, 420))
     assert {each['unit'] for each in found} == {'s', 'rpm'}
     assert all(isinstance(each['raw'], int) for each in found)

@@ -13,7 +13,7 @@ from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
 import pytest
 from test_system_reconnection import rearm_and_move, start_moving
-from waiting import wait_for, wait_for_end
+from waiting import clock, pause, wait_for, wait_for_end
 
 DEACTIVATE = 4
 
@@ -52,6 +52,7 @@ def has_open(process: Process, path: str) -> bool:
     return False
 
 
+@pytest.mark.real
 def test_signal_while_configuring(processes: Processes, namespace: str, tmp_path: Path,
                                   terminal: str) -> None:
     # an adapter that takes its time: configure waits three seconds for the first attempt
@@ -71,20 +72,24 @@ def test_signal_while_deactivating(processes: Processes, client: Client, namespa
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
-    timer = threading.Timer(delay, bridge.send, [signal.SIGTERM])
-    timer.start()
+    def send() -> None:
+        pause(delay)
+        bridge.send(signal.SIGTERM)
+    thread = clock().worker(send, 'the signal')
+    thread.start()
     try:
         client.ask('transition', node=f'/{namespace}/drive_can_bridge', number=DEACTIVATE,
                    timeout=5.0)
     except AssertionError:
         pass  # it has gone before it could answer
-    timer.join()
+    thread.join()
     assert bridge.wait() == 0
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
                  ['003FFFF0#000003E800000000 R'] * 3)
     assert not [line for line in bridge.errors if '[ERROR]' in line]
 
 
+@pytest.mark.real
 def test_out_of_file_descriptors(processes: Processes, client: Client, namespace: str,
                                  tmp_path: Path) -> None:
     file = bridge_file(tmp_path)

@@ -6,6 +6,7 @@ import re
 
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes, Simulator
+import pytest
 from waiting import SLOWNESS
 
 CYCLIC = '^003FFFF0#'
@@ -58,6 +59,7 @@ def rearm_and_move(client: Client, drive: str, bridge: Process, simulator: Simul
     assert simulator.frames(MOVING, since)
 
 
+@pytest.mark.real
 def test_simulator_is_killed_and_restarted(processes: Processes, client: Client, namespace: str,
                                            tmp_path: Path) -> None:
     file = bridge_file(tmp_path)

@@ -204,6 +204,7 @@ def goes_on(arm: Arm, name: str, since: float) -> None:
                                                                       abs=0.02)
 
 
+@pytest.mark.real
 def test_trip_on_the_way(arm: Arm) -> None:
     begun = arm.under_way()
     since = arm.last_time()
@@ -222,62 +223,3 @@ def test_trip_on_the_way(arm: Arm) -> None:
     arm.call('elbow', 'reset_fault')
     goes_on(arm, 'elbow', since)
     assert arm.bridge.end() == 0
-
-
-def test_power_cut_on_the_way(arm: Arm) -> None:
-    begun = arm.under_way()
-    since = arm.last_time()
-    arm.simulator.write('wrist power_cut=3')
-    arm.client.online(f'/{arm.namespace}/wrist', False)
-    wait_for(lambda: arm.ask('result') == 'path', 'the controller to abort')
-    arm.client.online(f'/{arm.namespace}/wrist')
-    answers = [frame for frame in arm.frames('wrist', since) if frame.answer]
-    stopped, back = max(zip(answers, answers[1:]), key=lambda two: two[1].time - two[0].time)
-    assert behind('wrist', begun, stopped) < BEHIND_MAX
-    waiting = [frame for frame in arm.frames('wrist', back.time) if not frame.answer]
-    assert {frame.words[0] for frame in waiting} <= {DISABLE}
-    assert not arm.ask('look')['thrown']
-    goes_on(arm, 'wrist', back.time)
-    assert arm.bridge.end() == 0
-
-
-def test_power_cut_at_speed(processes: Processes, client: Client, namespace: str,
-                            tmp_path: Path) -> None:
-    """The wheel stays neutral until it is commanded neutral, whatever the controller goes on."""
-    wheels = {'left_wheel': 1, 'right_wheel': 2}
-    base = Robot('base', wheels, processes, client, namespace, tmp_path)
-    for name in wheels:
-        base.call(name, 'enable', True)
-    speeds = {'left_wheel_joint': 2.0, 'right_wheel_joint': 3.0}
-    standing = dict.fromkeys(speeds, 0.0)
-    wanted = {'left_wheel': 3820, 'right_wheel': -5730}     # 0.1 rpm of the motor
-
-    def drive() -> None:
-        base.ask('command', values=standing, kind='velocity')
-        since = base.last_time()
-        for name in wheels:
-            client.diagnostics(f'{namespace}/drive_can_bridge: drive {name}', state='^online$')
-        base.ask('command', values=speeds, kind='velocity')
-        for name, speed in wanted.items():
-            base.wait_frames(name, lambda frame, speed=speed: frame.answer and abs(  # type: ignore
-                frame.words[1] - speed) < 10, since)
-    drive()
-    wait_for(lambda: base.ask('look')['states']['right_wheel_joint/velocity'] == pytest.approx(
-        3.0, abs=0.1), 'the controllers to hear of the speed')
-    base.simulator.write('right_wheel power_cut=4')
-    client.online(f'/{namespace}/right_wheel', False)
-    wait_for(lambda: base.ask('look')['velocity'][1] is None, 'NaN')
-    look = base.ask('look')
-    assert look['names'] == list(speeds)
-    assert look['states']['right_wheel_joint/velocity'] == pytest.approx(3.0, abs=0.1), 'for ever'
-    client.online(f'/{namespace}/right_wheel')
-    since = base.last_time()
-    base.call('right_wheel', 'enable', True)
-    running = base.wait_frames('right_wheel', lambda frame: not frame.answer
-                               and frame.words[0] == ENABLE, since, count=50)
-    assert {frame.words[1] for frame in running} == {0}
-    assert {frame.words[1] for frame in base.frames('left_wheel', since)
-            if not frame.answer} == {wanted['left_wheel']}
-    drive()
-    assert not base.ask('look')['thrown']
-    assert base.bridge.end() == 0

@@ -1,11 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """SIGINT, SIGTERM, SIGHUP, SIGSTOP and SIGKILL of the bridge, whatever it is doing."""
 
-from collections.abc import Iterator
-import os
 from pathlib import Path
 import signal
-import tty
 
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes
@@ -13,9 +10,8 @@ import pytest
 from test_system_datamodel_standard import SHORT
 from test_system_reconnection import NEUTRAL, rearm_and_move, start_moving
 from waiting import wait_for, wait_for_end
+from world import World
 
-BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM],
-                               ids=['SIGINT', 'SIGTERM'])
 
 
 def looks_after_signals(process: Process) -> bool:
@@ -25,18 +21,16 @@ def looks_after_signals(process: Process) -> bool:
     return bool(int(caught.split()[1], 16) & 1 << signal.SIGTERM - 1)
 
 
-@pytest.mark.parametrize(('number', 'code'), [
-    (signal.SIGINT, 0), (signal.SIGTERM, 0), (signal.SIGHUP, 0), (signal.SIGQUIT, 131)],
-    ids=['SIGINT', 'SIGTERM', 'SIGHUP', 'SIGQUIT'])
+@pytest.mark.real
 def test_while_active(processes: Processes, client: Client, namespace: str, tmp_path: Path,
-                      number: int, code: int) -> None:
+                      ) -> None:
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
     bridge.send(signal.SIGTSTP)     # Ctrl-Z would leave it running
     bridge.error('drive_can_bridge: Ctrl-Z refused: ')
-    assert bridge.end(number) == code
+    assert bridge.end(signal.SIGTERM) == 0
     # nobody tells the drive that a bridge has gone: three neutral frames have to
     wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'),
                  ['003FFFF0#000003E800000000 R'] * 3)
@@ -51,43 +45,56 @@ def test_while_active(processes: Processes, client: Client, namespace: str, tmp_
     assert not [line for line in bridge.errors if '[ERROR]' in line]
 
 
-@BOTH
-def test_drive_that_falls_silent_together_with_the_end(
-        processes: Processes, client: Client, namespace: str, tmp_path: Path, number: int) -> None:
+@pytest.mark.parametrize(('numbers', 'code'), [
+    ([signal.SIGINT], 0), ([signal.SIGHUP], 0), ([signal.SIGQUIT], 131),
+    ([signal.SIGINT, signal.SIGTERM], 0)], ids=['SIGINT', 'SIGHUP', 'SIGQUIT', 'one breath'])
+def test_whichever_it_is_what_moves_is_stopped(processes: Processes, client: Client,
+                                               namespace: str, tmp_path: Path,
+                                               numbers: list[int], code: int) -> None:
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
-    simulator.send(signal.SIGSTOP)
-    try:
-        assert bridge.end(number) == 0
-    finally:
-        simulator.send(signal.SIGCONT)
+    for number in numbers:
+        bridge.send(number)
+    assert bridge.wait() == code
+    assert simulator.frames('^003FFFF0.* R$')[-4:] == [
+        '003FFFF0#05DC03E800000000 R', *['003FFFF0#000003E800000000 R'] * 3]
+    bridge.error('conveyor: stopped')
+
+
+def test_drive_that_falls_silent_together_with_the_end(
+        processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
+    file = bridge_file(tmp_path)
+    simulator = processes.simulator(file)
+    bridge = processes.bridge(file, namespace)
+    start_moving(client, f'/{namespace}/conveyor')
+    simulator.write('conveyor silent')
+    assert bridge.end() == 0
     bridge.error('conveyor: told to stop, but it does not answer: it may still be running')
     assert not [line for line in bridge.errors if line.endswith('conveyor: stopped')]
 
 
-@BOTH
 def test_while_the_bus_is_absent(processes: Processes, namespace: str, tmp_path: Path,
-                                 number: int) -> None:
+                                 world: World) -> None:
+    world.wires.of('/dev/no_such_adapter').lose('slcan /dev/no_such_adapter: is not there')
     bridge = processes.bridge(bridge_file(tmp_path, channel='/dev/no_such_adapter'), namespace)
     bridge.error('active: 1 drive on 1 bus')
     bridge.error('bus main: ')      # it has been tried by now
-    assert bridge.end(number) == 0
+    assert bridge.end() == 0
     text, = [line for line in bridge.errors if 'bus main' in line]
     assert '/dev/no_such_adapter' in text
     assert 'tried again every 0.2 s' in text
 
 
-@BOTH
 def test_while_unconfigured(processes: Processes, client: Client, namespace: str, tmp_path: Path,
-                            number: int) -> None:
+                            ) -> None:
     bridge = processes.bridge(bridge_file(tmp_path, autostart=False), namespace)
     node = f'/{namespace}/drive_can_bridge'
     assert client.ask('transition', node=node, number=3) is False  # activate: not possible
     bridge.error('transition number 3 is not possible in state unconfigured '
                  r'\(possible are configure, shutdown\)')
-    assert bridge.end(number) == 0
+    assert bridge.end() == 0
     assert len([line for line in bridge.errors if 'ransition' in line]) == 1    # rcl's own, too
     assert not [line for line in bridge.errors if 'bus main' in line]
 
@@ -107,9 +114,9 @@ def test_while_inactive(processes: Processes, client: Client, namespace: str,
     assert simulator.frames() == []
 
 
+@pytest.mark.real
 @pytest.mark.parametrize(('number', 'library'), [
-    (signal.SIGINT, ''), (signal.SIGTERM, ''), (signal.SIGINT, '_rclpy_pybind11'),
-    (signal.SIGTERM, 'librmw_fastrtps_cpp'), (signal.SIGINT, 'lifecycle_msgs')])
+    (signal.SIGINT, ''), (signal.SIGTERM, 'librmw_fastrtps_cpp')])
 def test_during_start_up(processes: Processes, namespace: str, tmp_path: Path, number: int,
                          library: str) -> None:
     # some moments of the start-up, told by what has been loaded by then
@@ -127,44 +134,8 @@ def test_during_start_up(processes: Processes, namespace: str, tmp_path: Path, n
     assert not [line for line in bridge.errors if 'bus main' not in line and 'active' not in line]
 
 
-@pytest.fixture
-def terminal() -> Iterator[str]:
-    """Return a pseudo-terminal."""
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    yield os.ttyname(slave)
-    os.close(master)
-    os.close(slave)
 
-
-def test_second_signal_ends_at_once(processes: Processes, client: Client, namespace: str,
-                                    tmp_path: Path, terminal: str) -> None:
-    bridge = processes.bridge(
-        bridge_file(tmp_path, channel=terminal, bus={'sleep_after_open': 600.0}), namespace)
-    # its reader hangs in an open that never ends; the node is there all the same
-    bridge.error('active: 1 drive on 1 bus')
-    facts = client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
-    assert facts['level'] == '2'
-    bridge.send(signal.SIGINT)
-    client.ask('rest', seconds=0.1)     # in the same breath they are one signal
-    bridge.send(signal.SIGTERM)
-    assert bridge.wait() == 128 + signal.SIGTERM
-
-
-def test_two_signals_while_active(processes: Processes, client: Client, namespace: str,
-                                  tmp_path: Path) -> None:
-    file = bridge_file(tmp_path)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    start_moving(client, f'/{namespace}/conveyor')
-    bridge.send(signal.SIGINT)
-    bridge.send(signal.SIGTERM)
-    # one stop, unless this process has to wait for a processor between the two
-    assert bridge.wait() in (0, 128 + signal.SIGINT, 128 + signal.SIGTERM)
-    # whoever stops a whole group of processes sends two at once: the drive is told all the same
-    wait_for_end(lambda: simulator.frames('^003FFFF0.* R$'), ['003FFFF0#000003E800000000 R'])
-
-
+@pytest.mark.real
 def test_drives_that_a_second_signal_leaves_unstopped_are_named(
         processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     """It has to be told by writes that nobody confirms, which takes longer than the grace."""
@@ -172,7 +143,7 @@ def test_drives_that_a_second_signal_leaves_unstopped_are_named(
     simulator = processes.simulator(file)
     bridge = processes.bridge(file, namespace)
     start_moving(client, f'/{namespace}/conveyor')
-    simulator.send(signal.SIGSTOP)
+    simulator.suspend()
     try:
         bridge.send(signal.SIGINT)
         client.ask('rest', seconds=0.1)     # twice in the same breath is one signal
@@ -184,6 +155,7 @@ def test_drives_that_a_second_signal_leaves_unstopped_are_named(
                  'it may still be running')
 
 
+@pytest.mark.real
 def test_process_that_stood_still(processes: Processes, client: Client, namespace: str,
                                   tmp_path: Path) -> None:
     # a command would still be fresh: only the lost time may stop it
@@ -192,7 +164,7 @@ def test_process_that_stood_still(processes: Processes, client: Client, namespac
     bridge = processes.bridge(file, namespace)
     drive = f'/{namespace}/conveyor'
     start_moving(client, drive)
-    bridge.send(signal.SIGSTOP)
+    bridge.suspend()
     client.ask('rest', seconds=0.3)     # what was on its way when it stopped arrives
     simulator.write('list')
     simulator.line('^conveyor: ')
@@ -212,6 +184,7 @@ def test_process_that_stood_still(processes: Processes, client: Client, namespac
     assert bridge.end() == 0
 
 
+@pytest.mark.real
 def test_what_was_sent_while_it_stood_still_is_thrown_away(
         processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     # neither a command time-out nor a lost second: only the age of the commands tells
@@ -220,7 +193,7 @@ def test_what_was_sent_while_it_stood_still_is_thrown_away(
     bridge = processes.bridge(file, namespace)
     topic = f'/{namespace}/conveyor/command/speed_setpoint'
     start_moving(client, f'/{namespace}/conveyor')
-    bridge.send(signal.SIGSTOP)
+    bridge.suspend()
     client.publish(topic, 200.0, rate=100.0)
     client.ask('rest', seconds=0.1)
     client.silence(topic)       # whoever said 200 has changed his mind long before it goes on
@@ -239,6 +212,7 @@ def test_what_was_sent_while_it_stood_still_is_thrown_away(
     assert bridge.end() == 0
 
 
+@pytest.mark.real
 def test_killed(processes: Processes, client: Client, namespace: str, tmp_path: Path) -> None:
     file = bridge_file(tmp_path)
     simulator = processes.simulator(file)

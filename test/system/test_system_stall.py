@@ -1,13 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """An adapter that stops taking data: told, waited for, and nothing stale reaches the drive."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
 import pytest
-from slcan_peer import NEUTRAL_WORDS, Peer, ZEROS
+from slcan_peer import Answers, NEUTRAL_WORDS, Peer, ZEROS
 from waiting import wait_for_end
 
 CYCLIC_REQUEST = 'T003FFFF08'
@@ -15,13 +15,13 @@ MISSED_LIMIT = 40
 #: what a terminal holds ready for its reader; nobody can take that back
 READY = 4096
 
+pytestmark = pytest.mark.real
+
 
 @pytest.fixture
-def peer(tmp_path: Path) -> Iterator[Peer]:
-    started = Peer(tmp_path / 'links' / 'main', {
+def peer(connect: Callable[[Answers], Peer]) -> Peer:
+    return connect({
         CYCLIC_REQUEST: f'T103FFFF08{ZEROS}', f'T002001E18{ZEROS}': f'T102001E180064{ZEROS[4:]}'})
-    yield started
-    started.close()
 
 
 def test_adapter_that_takes_nothing(processes: Processes, client: Client, namespace: str,
@@ -77,18 +77,6 @@ def test_adapter_that_takes_nothing(processes: Processes, client: Client, namesp
     assert bridge.end() == 0
     wait_for_end(lambda: [line for line in peer.lines if line.startswith('T')],
                  [CYCLIC_REQUEST + NEUTRAL_WORDS] * 3)
-
-
-def test_stop_while_the_adapter_takes_nothing(processes: Processes, client: Client,
-                                              namespace: str, tmp_path: Path, peer: Peer) -> None:
-    file = bridge_file(tmp_path, bus={'bitrate': 1_000_000, 'reconnect_period': 0.01}, drives={
-        'conveyor': {**CONVEYOR, 'mapping': 'assume', 'period': 0.005,
-                     'missed_limit': MISSED_LIMIT}})
-    bridge = processes.bridge(file, namespace)
-    client.online(f'/{namespace}/conveyor')
-    peer.stop_reading()
-    bridge.error('the adapter takes no more data')
-    assert bridge.end() == 0
 
 
 def test_stop_of_a_drive_that_moves_while_the_adapter_takes_nothing(

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from builders import parameter
-from clocks import REAL
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard
 import pytest
+from world import World
 
 from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.cli.probe import AnotherMaster, Asker
@@ -548,11 +548,10 @@ def file_with(tmp_path: Path, name: str, options: str) -> Path:
     return path
 
 
-@pytest.mark.real
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(bench: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = file_with(tmp_path, 'file.yaml', '')
     other = file_with(tmp_path, 'other.yaml', ', value_order: low_first, index_byte: high')
-    with Simulation(configuration_from_file(other), REAL) as simulation:
+    with Simulation(configuration_from_file(other), bench.clock) as simulation:
         assert drive_can('probe', '--params-file', file, 'conv*') == 0
         out, err = capsys.readouterr()
         assert out.splitlines()[0].split() == ['drive', 'key', 'found', 'in', 'the', 'file',
@@ -586,6 +585,7 @@ def test_which_drive(words: list[str], told: str, tmp_path: Path,
     assert 'which drive? There are: ' in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures('bench')
 @pytest.mark.parametrize(('answer', 'code', 'told'), [
     ('n\n', 2, 'Ask all the same? [y/N] drive_can probe: nothing was sent\n'), ('', 2, 'sent'),
     ('y\n', 1, 'Ask all the same? [y/N] ')])

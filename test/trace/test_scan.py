@@ -7,10 +7,10 @@ import json
 from pathlib import Path
 from random import Random
 
-from clocks import REAL
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
 import pytest
 from test_trace_agrees import running
+from world import World
 
 from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.cli.scan import LOAD_MAX, Survey, write_parameter_file
@@ -360,15 +360,14 @@ def drive_can(*arguments: object) -> int:
     return front_end.main([str(argument) for argument in arguments])
 
 
-@pytest.mark.real
-def test_simulated_drives_are_found_and_written(tmp_path: Path,
+def test_simulated_drives_are_found_and_written(bench: World, tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'found.yaml'
     played = configuration_from_file(config_file('all_families.yaml'))
     drives = [(drive.protocol, drive.station) for drive in played.drives.values()
               if drive.protocol in SAFE]
     assert len(drives) == len(SAFE)
-    with Simulation(played, REAL):
+    with Simulation(played, bench.clock):
         assert drive_can('scan', '--interface', 'virtual', '--channel', 'all_families',
                          '--bitrate', 500_000, '--listen', 0.3, '-o', output) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -380,13 +379,13 @@ def test_simulated_drives_are_found_and_written(tmp_path: Path,
     capsys.readouterr()
 
     # a bridge runs with it
-    with running(found, REAL) as bus:
+    with running(found, bench.clock) as bus:
         for name in found.drives:
             bus.wait_exchanges(name, 3)
 
 
-@pytest.mark.real
-def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+def test_what_is_there_is_asked_for(bench: World, tmp_path: Path,
+                                    capsys: pytest.CaptureFixture[str],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     output, beside = tmp_path / 'found.yaml', tmp_path / 'found_drive_std_7.yaml'
     (tmp_path / 'found_drive_of_mine.yaml').write_text('mine')
@@ -394,7 +393,7 @@ def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixtur
                  500_000, '--listen', 0.1, '-o', output)
     monkeypatch.setattr('sys.stdin', open('/dev/null'))
     frames: list[Frame] = []
-    with Simulation(configuration_from_file(config_file('all_families.yaml')), REAL,
+    with Simulation(configuration_from_file(config_file('all_families.yaml')), bench.clock,
                     show_frame=lambda bus, frame, sent: sent or frames.append(frame)):
         for existing in (output, beside):
             existing.write_text('by hand')
@@ -410,6 +409,7 @@ def test_what_is_there_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert frames
 
 
+@pytest.mark.usefixtures('bench')
 def test_nothing_found_nothing_written(tmp_path: Path,
                                        capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'found.yaml'
@@ -446,12 +446,11 @@ def test_what_is_written_is_valid_whatever_the_maps(
     assert [remark.split(' cannot')[0] for remark in remarks] == [f'# {text}' for text in unfit]
 
 
-@pytest.mark.real
 def test_beside_a_bridge_all_drives_are_found_by_listening(
-        capsys: pytest.CaptureFixture[str]) -> None:
+        bench: World, capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('all_families.yaml'))
     assert {drive.protocol for drive in played.drives.values()} == set(FAMILIES)
-    with running(played, REAL) as bus:
+    with running(played, bench.clock) as bus:
         for name in bus.sessions:
             bus.wait_exchanges(name, 3)
         foreign = [drive.violations for drive in bus.simulation.drives.values()]
@@ -469,15 +468,14 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
     assert '500000 bit/s, ' in err and 'nothing was asked: --passive' in err
 
 
-@pytest.mark.real
 def test_what_was_not_asked_is_named_with_the_next_command(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        bench: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     played = configuration_from_file(config_file('example.yaml'))
     bus, = played.buses.values()
     played = replace(played, buses={bus.name: replace(bus, interface='virtual',
                                                       channel='scan_next')})
     again = 'drive_can scan --interface virtual --channel scan_next --bitrate 500000'
-    with Simulation(played, REAL):
+    with Simulation(played, bench.clock):
         assert drive_can(*again.split()[1:], '--listen', 0.1) == 0
         err = capsys.readouterr().err.splitlines()
         left = ', '.join(name for name in FAMILIES if name not in SAFE)
@@ -491,6 +489,7 @@ def test_what_was_not_asked_is_named_with_the_next_command(
         assert capsys.readouterr().err.splitlines()[-1] == f'next: drive_can validate {output}'
 
 
+@pytest.mark.usefixtures('bench')
 def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ('scan', '--interface', 'virtual', '--channel', 'scan_named', '--listen', 0.1,
@@ -504,11 +503,10 @@ def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
     assert 'no drive found' in capsys.readouterr().out
 
 
-@pytest.mark.real
 def test_named_families_are_not_asked_where_there_is_a_canopen_node(
-        capsys: pytest.CaptureFixture[str]) -> None:
+        bench: World, capsys: pytest.CaptureFixture[str]) -> None:
     frames: list[Frame] = []
-    with Simulation(configuration_from_file(config_file('all_families.yaml')), REAL,
+    with Simulation(configuration_from_file(config_file('all_families.yaml')), bench.clock,
                     show_frame=lambda bus, frame, sent: frames.append(frame)):
         drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
                   500_000, '--listen', 0.3, '--protocols', 'cannord,datamodel_standard', '--yes')

@@ -111,6 +111,7 @@ TRACE = [
 ]
 
 
+@pytest.mark.usefixtures('threads')
 @pytest.mark.parametrize('suffix', WRITABLE)
 def test_every_format_keeps_the_frames(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f'trace{suffix}'
@@ -216,16 +217,18 @@ except OSError as error:
 """
 
 
+@pytest.mark.usefixtures('programs')
 @pytest.mark.parametrize('way', ['looking', 'closing'])
 def test_a_database_that_cannot_be_written(way: str, tmp_path: Path) -> None:
     path = tmp_path / 'trace.db'
     told = subprocess.run([sys.executable, '-c', FULL, path, way], capture_output=True, text=True,
-                          check=True, timeout=60)
+                          check=True)
     assert told.stdout in (f'{path} {reason}\n' for reason in (
         'disk I/O error', 'database or disk is full'))
     assert told.stderr == ''
 
 
+@pytest.mark.usefixtures('threads')
 def test_a_database_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / 'trace.db'
     path.write_text('of yesterday')

@@ -78,6 +78,7 @@ def bus(path: str, interface: str = 'slcan') -> BusConfiguration:
     return BusConfiguration('main', interface, path, 125_000)
 
 
+@pytest.mark.usefixtures('programs')
 @pytest.mark.parametrize('interface', ['slcan', 'robotell', 'seeedstudio', 'serial'])
 def test_the_device_of_another_process_is_not_written_to(device: Device, interface: str) -> None:
     process = subprocess.Popen([sys.executable, '-c', HOLDER, interface, device.path],
@@ -107,9 +108,10 @@ def test_whoever_closes_it_lets_others_have_it(device: Device) -> None:
 
 def stranger(path: str) -> str:
     return subprocess.run([sys.executable, '-c', STRANGER, path], capture_output=True, text=True,
-                          check=True, timeout=60).stdout.strip()
+                          check=True).stdout.strip()
 
 
+@pytest.mark.usefixtures('programs')
 def test_two_nodes_of_one_device_meet_by_what_the_device_itself_says(device: Device) -> None:
     """They do not under flock, and root opens what is exclusive."""
     lock = DeviceLock(device.path, exclusive=True)
@@ -123,6 +125,7 @@ def test_two_nodes_of_one_device_meet_by_what_the_device_itself_says(device: Dev
     assert stranger(device.path) == 'free'
 
 
+@pytest.mark.usefixtures('programs')
 def test_on_a_pseudo_terminal_nothing_outlives_the_process(device: Device) -> None:
     lock = DeviceLock(device.path)
     lock.keep_out()
