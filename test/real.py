@@ -65,8 +65,6 @@ TOLD = {
         'locks between processes',
     'test/simulation/test_simulated_slcan.py::test_client_in_another_process':
         'python-can in another process at a pseudo-terminal',
-    'test/security/test_security_command.py::test_it_fits_what_a_bridge_has':
-        'the policy of drive_can security',
 }
 
 

@@ -3,14 +3,12 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from panel_builders import Run, Site
 import pytest
 from running import Running
 
-sys.path.append(str(Path(__file__).parents[1] / 'ros'))    # bridges on the bench
 if TYPE_CHECKING:
     from panel_bench import House
 

@@ -2,6 +2,7 @@
 """``drive_can panel`` as a command: what it prints, how it ends, what it says when it cannot."""
 
 from collections.abc import Callable
+import errno
 from importlib import import_module
 import os
 import signal
@@ -91,9 +92,9 @@ def test_a_port_that_is_taken() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(DriveCanError) as said:
             serve('--port', str(port))
-    assert str(said.value).startswith(
-        f'drive_can panel: 127.0.0.1, port {port}: {os.strerror(98)}')
-    assert '--port' in str(said.value)
+    for word in ('drive_can panel: ', '127.0.0.1', str(port), os.strerror(errno.EADDRINUSE),
+                 '--port'):
+        assert word in str(said.value)
 
 
 @NEEDS_PANEL
@@ -101,8 +102,9 @@ def test_a_port_that_is_taken() -> None:
 def test_an_address_of_another_machine(host: str) -> None:
     with pytest.raises(DriveCanError) as said:
         serve('--host', host)
-    assert str(said.value).startswith(f'drive_can panel: {host}, port 8080: ')
-    assert '--host' in str(said.value)
+    for word in ('drive_can panel: ', host, '8080', '--host'):
+        assert word in str(said.value)
+    assert '--port' not in str(said.value)
 
 
 @NEEDS_PANEL
