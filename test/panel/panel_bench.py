@@ -42,7 +42,7 @@ TICK = 1e-6
 Result = TypeVar('Result')
 
 
-class _Selector(selectors.SelectSelector):
+class _Selector(selectors.DefaultSelector):
     """Waits by the clock of the bench for what never comes: there are no sockets."""
 
     def __init__(self, clock: JumpingClock, alarm: JumpingAlarm) -> None:
