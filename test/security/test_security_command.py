@@ -20,7 +20,7 @@ from world import world
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.source import Stop
+from drive_can_bridge.monitor.snapshot import Stop
 from drive_can_bridge.resources import config_file
 
 FILE = """
