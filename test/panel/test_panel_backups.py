@@ -11,12 +11,12 @@ from panel_builders import NEEDS_PANEL, Site, Visitors
 import pytest
 from waiting import wait_for
 
+if TYPE_CHECKING:
+    from panel_bench import House
+
 pytest.importorskip('rclpy')
 
 pytestmark = NEEDS_PANEL
-
-if TYPE_CHECKING:
-    from panel_bench import House
 
 
 def test_a_backup_goes_there_and_back_in_processes(site: Site) -> None:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from panel_builders import Answer
 import pytest
 
-pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
-
 if TYPE_CHECKING:
     from panel_bench import House
+
+pytest.importorskip('rclpy')
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
 CHANNEL = '/_nicegui_ws/socket.io/?EIO=4&transport=polling'
 #: values that no element of a page sends, each as its arguments

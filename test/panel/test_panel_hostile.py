@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from panel_builders import SCRIPT
 import pytest
 
-pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
-
 if TYPE_CHECKING:
     from panel_bench import House
+
+pytest.importorskip('rclpy')
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
 STOP = {'drive': '/lift'}
 PARAMETERS = 'mode', 'address', 'other_setpoint', 'ramp_time'
@@ -133,7 +133,8 @@ def test_a_script_in_a_description_stays_text(house: 'House') -> None:
 @pytest.mark.parametrize('fields', [
     {}, {'drive': 7}, {'drive': '/nobody'}, {'drive': '/lift/../conveyor'}, {'drive': None},
     {'drive': ['/lift']}, {'drive': '/lift\x1b[2J'}])
-def test_there_are_only_the_drives_that_there_are(house: 'House', fields: dict[str, object]) -> None:
+def test_there_are_only_the_drives_that_there_are(
+        house: 'House', fields: dict[str, object]) -> None:
     answer = house.do('quick_stop', 'operator', fields)
     assert answer.status == 404
     assert answer.said['success'] is False

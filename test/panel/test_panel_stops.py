@@ -17,14 +17,13 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot
-from drive_can_bridge.monitor.snapshot import Outcome, Stop
-
-pytest.importorskip('rclpy')
-pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Outcome, Snapshot, Stop
 
 if TYPE_CHECKING:
     from panel_bench import House
+
+pytest.importorskip('rclpy')
+pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
 
 @pytest.fixture
