@@ -2,7 +2,8 @@
 """
 What all tests share: where they run, how long they look, and which of them run beside each other.
 
-Puts this directory and ``clocked/`` on the path: every test may import ``builders``.
+Puts this directory, ``clocked/`` and ``ros/`` on the path: every test may import ``builders``, and
+``bridges`` on the bench.
 
 *Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
 domains of its own, before anything of ROS is imported. The tests of ``ros/`` have another one than
@@ -53,6 +54,7 @@ import real
 from told_again import ToldAgain
 
 sys.path.insert(0, str(Path(__file__).with_name('clocked')))
+sys.path.append(str(Path(__file__).with_name('ros')))
 from guard import Guard  # noqa: I100, I202
 import world
 

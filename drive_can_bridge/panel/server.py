@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.panel.access import ENTER
@@ -38,6 +39,10 @@ _LOOK_PERIOD = 0.1
 #: lines on standard error in so many s
 _LINES_MAX, _WHILE = 10, 60.0
 _GRACE = 1
+#: who logs in a server, and from which level on it is said
+LOGGERS = {'uvicorn': logging.CRITICAL, 'nicegui': logging.ERROR,
+           'drive_can_panel': logging.ERROR, 'asyncio': logging.ERROR,
+           'engineio.server': logging.CRITICAL, 'socketio.server': logging.CRITICAL}
 
 
 _SHOWN_OUT_WORDS = 'too many connections are open already: try again in a while\n'
@@ -143,15 +148,17 @@ class _OneLine(logging.Formatter):
 class _NotMany(logging.Filter):
     """Nobody fills standard error: so many lines in a while, and how many there were besides."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
         super().__init__()
+        self._clock = clock
         self._since, self._told, self._kept_back = -math.inf, 0, 0
 
     def filter(self, record: logging.LogRecord) -> bool:
-        if record.created - self._since > _WHILE:
+        now = self._clock.now()
+        if now - self._since > _WHILE:
             if self._kept_back:
                 record.msg = f'({self._kept_back} lines left out) {record.msg}'
-            self._since, self._told, self._kept_back = record.created, 0, 0
+            self._since, self._told, self._kept_back = now, 0, 0
         if self._told == _LINES_MAX:
             self._kept_back += 1
             return False
@@ -181,7 +188,18 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
+def log_to_standard_error(clock: Clock) -> None:
+    """Have what goes wrong in a server said there: in a line each, and not in many."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(_OneLine())
+    handler.addFilter(_NotMany(clock))
+    for name, level in LOGGERS.items():
+        logger = logging.getLogger(name)
+        logger.handlers, logger.propagate = [handler], False
+        logger.setLevel(level)
+
+
+def serve(app: ASGIApp, listener: socket.socket, clock: Clock, *, ended: Callable[[], bool],
           ready: Callable[[], None]) -> None:
     """
     Serve until the end; then the port is closed, however far this had come.
@@ -190,16 +208,7 @@ def serve(app: ASGIApp, listener: socket.socket, *, ended: Callable[[], bool],
     :param ready: is told when the first request can come, unless it is to end by then.
     """
     _make_room()
-    handler = logging.StreamHandler()
-    handler.setFormatter(_OneLine())
-    handler.addFilter(_NotMany())
-    for name, level in (('uvicorn', logging.CRITICAL), ('nicegui', logging.ERROR),
-                        ('drive_can_panel', logging.ERROR), ('asyncio', logging.ERROR),
-                        ('engineio.server', logging.CRITICAL),
-                        ('socketio.server', logging.CRITICAL)):
-        logger = logging.getLogger(name)
-        logger.handlers, logger.propagate = [handler], False
-        logger.setLevel(level)
+    log_to_standard_error(clock)
     config = uvicorn.Config(
         app, http=partial(Connection, {}),     # type: ignore[arg-type]
         ws='auto', loop='asyncio', lifespan='on', log_config=None,

@@ -79,8 +79,11 @@ class Task:
 
     def rest(self) -> None:
         """Wait for its turn."""
-        if not self._turn.acquire(timeout=HANG):
-            raise Stuck(f'{self._clock.current.name} has not waited for {HANG:g} s')
+        before = self._clock.handed_over
+        while not self._turn.acquire(timeout=HANG):
+            if self._clock.handed_over == before:
+                raise Stuck(f'{self._clock.current.name} has not waited for {HANG:g} s')
+            before = self._clock.handed_over
         if self._clock.over and self._run is not None:
             raise _Over
 
@@ -169,6 +172,7 @@ class JumpingClock:
 
     :param seed: says who goes first where several may.
     :ivar failures: what ended threads.
+    :ivar handed_over: how often the turn has changed.
     """
 
     def __init__(self, seed: int = 0) -> None:
@@ -177,6 +181,7 @@ class JumpingClock:
         self.tasks: list[Task] = []
         self.failures: list[BaseException] = []
         self.over = False
+        self.handed_over = 0
         self._main = self.current = Task(self, None, 'the story')
         self._time = BEGIN
         self._coming: list[tuple[float, int, Task, int]] = []
@@ -274,6 +279,7 @@ class JumpingClock:
     def hand_over(self) -> None:
         """Let the next one go on."""
         self._turns += 1
+        self.handed_over += 1
         if self._turns > TURNS_MAX:
             self._fail(f'{self.current.name} and others go round in circles')
         while not self._ready:

@@ -1,13 +1,25 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can monitor`` and bridges that somebody else started, each a process of its own."""
+"""``drive_can monitor`` and bridges that somebody else started: as processes, and on the bench."""
 
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+import os
 from pathlib import Path
+import re
 import signal
+import sys
+from types import ModuleType
 
+from clocks import REAL
 import pytest
 from running import Running, Terminal
 from waiting import wait_for
+from world import World, world
+
+from drive_can_bridge.cli import monitor as command
+from drive_can_bridge.cli.main import main, understood
+from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.monitor.model import Model
 
 pytest.importorskip('rclpy')
 
@@ -92,19 +104,6 @@ def test_it_attaches_to_whatever_comes_and_says_what_went(run: Run, tmp_path: Pa
         assert 'Traceback' not in each.errors
 
 
-def test_the_bridge_does_not_notice(run: Run, tmp_path: Path) -> None:
-    watched = bridge(run, tmp_path)
-    monitor = run('drive_can', 'monitor')
-    monitor.line('^conveyor online actual_speed=')
-    assert monitor.end(signal.SIGKILL) == -signal.SIGKILL
-    again = run('drive_can', 'monitor')
-    again.line('^conveyor online actual_speed=')
-    assert again.end(signal.SIGINT) == 0
-    assert 'offline' not in watched.errors
-    assert watched.errors.count(': online') == 2
-    assert watched.end(signal.SIGINT) == 0
-
-
 def test_keys_show_a_drive(run: Run, tmp_path: Path) -> None:
     pytest.importorskip('rich')
     terminal = Terminal(100, 29)
@@ -145,19 +144,66 @@ def stopped(process: Running) -> bool:
     return status.rpartition(')')[2].split()[0] == 'T'
 
 
+class Watcher:
+    """
+    Signals, on the bench.
+
+    :param seconds: until there is one.
+    """
+
+    def __init__(self, bench: World, seconds: float) -> None:
+        self._clock = bench.clock
+        self._end = bench.clock.now() + seconds
+
+    def wait(self, timeout: float) -> str | None:
+        self._clock.live(timeout)
+        return '' if self._clock.now() >= self._end else None
+
+
+def test_the_bridge_does_not_notice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from bridges import Bridge, LIFT, parameters
+    from drive_can_bridge.ros.monitor.client import MonitorClient
+
+    def watch(seconds: float) -> list[str]:
+        capsys.readouterr()
+        model = Model()
+        source = MonitorClient(model)
+        command._print_lines(source, model, Watcher(bench, seconds),   # type: ignore[arg-type]
+                             bench.clock, as_json=False)
+        source.close()
+        return capsys.readouterr().out.splitlines()
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as bench:
+        watched = Bridge(tmp_path, parameters(lift=LIFT))
+        watched.begin()
+        watched.online()
+        statistics = watched.node.drives['lift'].session.statistics
+        for _ in range(2):      # the first one ends, the other comes
+            *_, line = watch(5.0)
+            assert re.match(r'lift \S.* actual_speed=', line)
+            assert ' offline' not in line
+        bench.clock.live(5.0)
+        assert watched.node.drives['lift'].session.online
+        assert statistics.missed == 0
+        watched.close()
+
+
 @pytest.mark.parametrize('arguments', [['--namespace', 'no-name'], ['something'], ['--speed']])
-def test_wrong_usage(run: Run, arguments: list[str]) -> None:
-    monitor = run('drive_can', 'monitor', *arguments)
-    assert monitor.process.wait(60.0) == 2
-    assert monitor.errors.startswith('drive_can monitor: ')
-    assert len(monitor.errors.splitlines()) == 1
+def test_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ending:
+        main(['monitor', *arguments])
+    assert ending.value.code == 2
+    line, = capsys.readouterr().err.splitlines()
+    assert line.startswith('drive_can monitor: ')
 
 
-def test_without_ros_it_says_what_to_install(run: Run, tmp_path: Path) -> None:
-    (tmp_path / 'rclpy.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n",
-                                       encoding='utf-8')
-    monitor = run('drive_can', 'monitor', environment={
-        'PYTHONPATH': f'{tmp_path}:{Path(__file__).parents[2]}'})
-    assert monitor.process.wait(60.0) == 1
-    [line] = monitor.errors.splitlines()
-    assert 'drive_can monitor: needs ROS 2' in line
+def test_without_ros_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Incomplete(ModuleType):
+        def __getattr__(self, name: str) -> object:
+            raise ModuleNotFoundError('no', name='rclpy')
+    monkeypatch.setitem(sys.modules, 'drive_can_bridge.ros.monitor.client', Incomplete('client'))
+    monkeypatch.setattr(command, 'SignalWatcher', lambda **_: nullcontext())
+    _, args = understood(['monitor'])
+    args.clock = REAL
+    with pytest.raises(DriveCanError) as said:
+        command.run(args)
+    assert 'drive_can monitor: needs ROS 2' in str(said.value)

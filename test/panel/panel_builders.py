@@ -104,7 +104,59 @@ class Answer:
         return json.loads(self.body)
 
 
-class Site:
+def write_profiles(directory: Path, *changes: tuple[str, str]) -> None:
+    """Write the profiles of drives, that of the conveyor with changes."""
+    text = PROFILE.format(script=SCRIPT)
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    (directory / 'hostile.yaml').write_text(text, encoding='utf-8')
+    (directory / 'without_quick_stop.yaml').write_text(WITHOUT_QUICK_STOP, encoding='utf-8')
+
+
+class Visitors:
+    """
+    What people and programs ask of a panel.
+
+    :ivar tokens: by role.
+    """
+
+    host: str
+    port: int
+    tokens: dict[str, str]
+
+    def ask(self, method: str, path: str, role: str | None = None,
+            headers: Mapping[str, str] | None = None, body: bytes | None = None) -> Answer:
+        """Send a request; headers may take the place of the usual ones."""
+        raise NotImplementedError
+
+    def cookie(self, role: str | None) -> dict[str, str]:
+        """Return the header that tells a role."""
+        return {} if role is None else {
+            'Cookie': f'drive_can_panel_{self.port}={self.tokens[role]}'}
+
+    def get(self, path: str, role: str | None = None, **headers: str) -> Answer:
+        """Get a page."""
+        return self.ask('GET', path, role, {name.replace('_', '-'): value
+                                            for name, value in headers.items()})
+
+    def do(self, action: str, role: str | None, fields: Mapping[str, object],
+           **headers: str) -> Answer:
+        """Ask for something, as the page does."""
+        return self.ask('POST', f'/do/{action}', role, {
+            'Content-Type': 'application/json', 'Origin': f'http://{self.host}',
+            **{name.replace('_', '-'): value for name, value in headers.items()}},
+            json.dumps(fields).encode())
+
+    def websocket(self, role: str | None, **headers: str) -> Answer:
+        """Begin a WebSocket; 101: it was let in."""
+        return self.ask('GET', '/_nicegui_ws/socket.io/?EIO=4&transport=websocket', role, {
+            'Connection': 'Upgrade', 'Upgrade': 'websocket', 'Sec-WebSocket-Version': '13',
+            'Sec-WebSocket-Key': 'dGhlIHNhbXBsZSBub25jZQ==', 'Origin': f'http://{self.host}',
+            **{name.replace('_', '-'): value for name, value in headers.items()}})
+
+
+class Site(Visitors):
     """
     A bridge with its drives, and a panel for them.
 
@@ -117,7 +169,6 @@ class Site:
         self._file = directory / 'drives.yaml'
         self._file.write_text(FILE.format(directory=directory), encoding='utf-8')
         self.write_profile()
-        (directory / 'without_quick_stop.yaml').write_text(WITHOUT_QUICK_STOP, encoding='utf-8')
         self._links = directory / 'links'
         #: as candump writes it
         self.frame_log = directory / 'frames.log'
@@ -140,21 +191,12 @@ class Site:
 
     def write_profile(self, *changes: tuple[str, str]) -> None:
         """Write the profile of a drive, with changes."""
-        text = PROFILE.format(script=SCRIPT)
-        for before, after in changes:
-            assert before in text
-            text = text.replace(before, after)
-        (self._directory / 'hostile.yaml').write_text(text, encoding='utf-8')
+        write_profiles(self._directory, *changes)
 
     def start_bridge(self) -> Running:
         """Start the bridge, once more after it has ended."""
         return self._run('drive_can_bridge', '--ros-args', '--params-file', str(self._file), '-p',
                          f'buses.main.channel:={self._links / "main"}')
-
-    def cookie(self, role: str | None) -> dict[str, str]:
-        """Return the header that tells a role."""
-        return {} if role is None else {
-            'Cookie': f'drive_can_panel_{self.port}={self.tokens[role]}'}
 
     def ask(self, method: str, path: str, role: str | None = None,
             headers: Mapping[str, str] | None = None, body: bytes | None = None) -> Answer:
@@ -168,26 +210,6 @@ class Site:
                           response.read())
         finally:
             connection.close()
-
-    def get(self, path: str, role: str | None = None, **headers: str) -> Answer:
-        """Get a page."""
-        return self.ask('GET', path, role, {name.replace('_', '-'): value
-                                            for name, value in headers.items()})
-
-    def do(self, action: str, role: str | None, fields: Mapping[str, object],
-           **headers: str) -> Answer:
-        """Ask for something, as the page does."""
-        return self.ask('POST', f'/do/{action}', role, {
-            'Content-Type': 'application/json', 'Origin': f'http://{self.host}',
-            **{name.replace('_', '-'): value for name, value in headers.items()}},
-            json.dumps(fields).encode())
-
-    def websocket(self, role: str | None, **headers: str) -> Answer:
-        """Begin a WebSocket; 101: it was let in."""
-        return self.ask('GET', '/_nicegui_ws/socket.io/?EIO=4&transport=websocket', role, {
-            'Connection': 'Upgrade', 'Upgrade': 'websocket', 'Sec-WebSocket-Version': '13',
-            'Sec-WebSocket-Key': 'dGhlIHNhbXBsZSBub25jZQ==', 'Origin': f'http://{self.host}',
-            **{name.replace('_', '-'): value for name, value in headers.items()}})
 
     def check_alive(self) -> None:
         """Panel and bridge go on, and nobody was shown a traceback."""

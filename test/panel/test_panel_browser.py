@@ -92,7 +92,7 @@ def test_an_edit_reaches_the_drive_and_its_refusal_is_shown(site: Site, browser:
     browser.write('ramp_time', '4711')
     # word for word what the bridge answers to anybody
     browser.shows(r'4711(\.0)? is out of range')
-    assert 'out of range' in answer.said['text']
+    assert answer.said['success'] is False
     wait_for(lambda: browser.field('ramp_time') == '4711', 'what was typed, to be corrected')
     browser.refresh()
     browser.click('.q-tab', 'Parameters')
@@ -142,7 +142,6 @@ def test_a_viewer_sees_no_buttons_and_no_fields(site: Site, browser: Browser) ->
         return fetch('/do/quick_stop', {method: 'POST', body: '{"drive": "/lift"}',
             headers: {'Content-Type': 'application/json'}}).then((answer) => answer.json())""")
     assert said['success'] is False
-    assert "needs the operator's token" in said['text']
 
 
 def test_without_token_a_page_says_what_to_do(site: Site, browser: Browser) -> None:

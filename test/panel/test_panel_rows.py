@@ -52,9 +52,11 @@ def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: ob
     # somebody types; somebody else writes
     row._field.value = '1'
     row.show(drive('4.00'))
-    assert (row._field.value, row._now.text) == ('1', 'now 4.00 s')
+    assert row._field.value == '1'
+    assert '4.00' in row._now.text
     row.show(drive('5.00'))
-    assert (row._field.value, row._now.text) == ('1', 'now 5.00 s')
+    assert row._field.value == '1'
+    assert '5.00' in row._now.text
     # what was typed has been written, and is read as the drive has it
     row._field.value = '1.5'
     row.show(drive('1.50'))

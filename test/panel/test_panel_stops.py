@@ -3,10 +3,12 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 import html
 import json
-from typing import Any
+import signal
+from typing import Any, TYPE_CHECKING
 
 from clocks import REAL
 from panel_builders import Site
@@ -17,8 +19,12 @@ from waiting import wait_for
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Outcome, Snapshot, Stop
 
+if TYPE_CHECKING:
+    from panel_bench import House
+
 pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
+
 
 @pytest.fixture
 def somebody(site: Site) -> Iterator[Somebody]:
@@ -28,19 +34,19 @@ def somebody(site: Site) -> Iterator[Somebody]:
     other.close()
 
 
-def offered(site: Site, page: str, drive: str) -> set[str]:
+def offered(house: 'House', page: str, drive: str) -> set[str]:
     """Return the stops that a page of an operator has a button for."""
-    text = html.unescape(site.get(page, 'operator').text).replace('\\"', '"')
+    text = html.unescape(house.get(page, 'operator').text).replace('\\"', '"')
     return {stop.value for stop in Stop if f'panel.stop("{stop.value}", "{drive}"' in text}
 
 
 @pytest.mark.parametrize(('drive', 'stops'), [
     ('/lift', {'quick_stop', 'disable'}), ('/press', {'quick_stop', 'disable'}),
     ('/conveyor', {'quick_stop'})])
-def test_a_quick_stop_is_offered_of_every_drive(site: Site, drive: str, stops: set[str]) -> None:
-    wait_for(lambda: len(offered(site, '/', '/lift')) == 2, 'what the bridge says of its drives')
+def test_a_quick_stop_is_offered_of_every_drive(
+        house: 'House', drive: str, stops: set[str]) -> None:
     for page in ('/', f'/drive{drive}'):
-        assert offered(site, page, drive) == stops
+        assert offered(house, page, drive) == stops
 
 
 def test_nothing_with_control_runs_on_when_all_are_stopped(
@@ -51,9 +57,25 @@ def test_nothing_with_control_runs_on_when_all_are_stopped(
     enabled = '0001'
     assert control_word(site, '005FFFF0') == control_word(site, '007FFFF0') == enabled
     said = site.do('quick_stop', 'operator', {'drive': '*'}).said
-    assert said == {'success': True, 'failed': [], 'text': '3 of 3 drives stopped'}
+    assert (said['success'], said['failed']) == (True, [])
     for identifier in ('005FFFF0', '007FFFF0'):
         wait_for(partial(disabled, site, identifier), 'that it is disabled')
+
+
+def test_what_reaches_nobody_is_said(site: Site) -> None:
+    assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
+    # of one drive and of all; each takes its time-out, so at once
+    with ThreadPoolExecutor() as pool:
+        for said in pool.map(lambda wanted: site.do(wanted[0], 'operator', {
+                'drive': wanted[1]}).said, (('disable', '/lift'), ('quick_stop', '*'))):
+            assert said['success'] is False
+            assert 'nobody' in said['text']
+    site.bridge = site.start_bridge()
+    # what is sent before is not heard, and waited for in vain
+    wait_for(lambda: 'active: 3 drives' in site.bridge.errors, 'the bridge')
+    wait_for(lambda: site.do('disable', 'operator', {'drive': '/lift'}).said['success'],
+             'the bridge that is back')
+    site.check_alive()
 
 
 class Asked:

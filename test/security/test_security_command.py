@@ -2,20 +2,25 @@
 """``drive_can security``: what it writes, and that a running bridge has what the policy names."""
 
 from collections.abc import Callable, Iterator
+import os
 from pathlib import Path
 import resource
 import shutil
-import signal
 import socket
 import subprocess
 import time
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from running import Running
+import waiting
 from waiting import wait_for
+from world import world
 
 from drive_can_bridge.cli.main import main
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.snapshot import Stop
 from drive_can_bridge.resources import config_file
 
 FILE = """
@@ -130,99 +135,111 @@ def test_a_namespace(tmp_path: Path) -> None:
     assert '/diagnostics' in allowed(policy, '/bridge', 'topics', 'publish')
 
 
-@pytest.mark.real
-def test_it_fits_what_a_bridge_has(run: Run, tmp_path: Path) -> None:
+@pytest.fixture
+def graph(tmp_path: Path) -> Iterator[Any]:
+    """Put a bridge with two drives on the bench; return a node that looks."""
     rclpy = pytest.importorskip('rclpy')
+    from bridges import Bridge
     from rclpy.context import Context
-    policy = written(tmp_path)
-    run('drive_can_bridge', '--ros-args', '--params-file', str(tmp_path / 'drives.yaml'))
-    context = Context()
-    rclpy.init(context=context)
-    node = rclpy.create_node('looks', context=context)
-    names = ('drive_can_bridge', 'conveyor', 'lift')
-    try:
-        def offered() -> bool:
-            return '/lift/set_parameters' in {
-                name for name, _ in node.get_service_names_and_types()}
-        wait_for(offered, 'the bridge')
-        wait_for(lambda: node.count_publishers('/diagnostics'), 'its diagnostics')
-        wait_for(lambda: {*names} <= {name for name, _ in node.get_node_names_and_namespaces()},
-                 'all nodes')
-        for kind, verb, look in (
-                ('topics', 'publish', node.get_publisher_names_and_types_by_node),
-                ('topics', 'subscribe', node.get_subscriber_names_and_types_by_node),
-                ('services', 'reply', node.get_service_names_and_types_by_node)):
-            there = {name for each in names for name, _ in look(each, '/')}
-            assert there - allowed(policy, '/bridge', kind, verb) == set()
-    finally:
+    from rclpy.signals import SignalHandlerOptions
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True):
+        bridge = Bridge(tmp_path, FILE)
+        context = Context()
+        rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+        node = rclpy.create_node('looks', context=context)
+        bridge.begin()
+        bridge.online()
+        yield node
         node.destroy_node()
         context.try_shutdown()
+        bridge.close()
+        assert bridge.errors == []
 
 
-def test_it_fits_what_clients_do(run: Run, tmp_path: Path) -> None:
-    rclpy = pytest.importorskip('rclpy')
-    pytest.importorskip('nicegui', reason="needs the extra 'panel'")
-    from rclpy.context import Context
+def test_it_fits_what_a_bridge_has(graph: Any, tmp_path: Path) -> None:
     policy = written(tmp_path)
-    links, file = tmp_path / 'links', str(tmp_path / 'drives.yaml')
-    run('drive_can', 'simulate', '--params-file', file, '--pty-link', str(links))
-    wait_for((links / 'main').is_symlink, 'the drives')
-    run('drive_can_bridge', '--ros-args', '--params-file', file, '-p',
-        f'buses.main.channel:={links / "main"}')
-    context = Context()
-    rclpy.init(context=context)
-    node = rclpy.create_node('looks', context=context)
-    # which enclave each may run in, and what its nodes have done in turn
-    done: dict[str, dict[tuple[str, str], set[str]]] = {}
-    looks = {('topics', 'publish'): node.get_publisher_names_and_types_by_node,
-             ('topics', 'subscribe'): node.get_subscriber_names_and_types_by_node,
-             ('services', 'reply'): node.get_service_names_and_types_by_node,
-             ('services', 'request'): node.get_client_names_and_types_by_node}
+    for kind, verb, look in (
+            ('topics', 'publish', graph.get_publisher_names_and_types_by_node),
+            ('topics', 'subscribe', graph.get_subscriber_names_and_types_by_node),
+            ('services', 'reply', graph.get_service_names_and_types_by_node)):
+        there = {name for each in ('drive_can_bridge', 'conveyor', 'lift')
+                 for name, _ in look(each, '/')}
+        assert there - allowed(policy, '/bridge', kind, verb) == set()
+        assert len(there) > 3
 
-    def note(enclave: str) -> set[str]:
-        """Look what the clients that are there have; return what they have had so far."""
-        found = done.setdefault(enclave, {way: set() for way in looks})
-        for name, place in node.get_node_names_and_namespaces():
-            if name.startswith('_drive_can_'):
-                for way, look in looks.items():
-                    try:
+
+class Notes:
+    """
+    What clients of ours have had in the graph, by way.
+
+    :param node: that looks.
+    """
+
+    def __init__(self, node: Any) -> None:
+        self._node = node
+        self._looks = {('topics', 'publish'): node.get_publisher_names_and_types_by_node,
+                       ('topics', 'subscribe'): node.get_subscriber_names_and_types_by_node,
+                       ('services', 'reply'): node.get_service_names_and_types_by_node,
+                       ('services', 'request'): node.get_client_names_and_types_by_node}
+        self.found: dict[tuple[str, str], set[str]] = {way: set() for way in self._looks}
+        self._over = False
+        waiting.clock().worker(self._run, 'notes').start()
+
+    def end(self) -> dict[tuple[str, str], set[str]]:
+        """Look no more."""
+        self._over = True
+        return self.found
+
+    def _run(self) -> None:
+        while not self._over:
+            for name, place in self._node.get_node_names_and_namespaces():
+                if name.startswith('_drive_can_'):
+                    for way, look in self._looks.items():
                         # of its own services each node may have some, by a pattern
-                        found[way] |= {each.replace(f'/{name}/', '/_drive_can_*/')
-                                       for each, _ in look(name, place)}
-                    except rclpy.node.NodeNameNonExistentError:  # it has just ended
-                        pass
-        return set().union(*found.values())
+                        self.found[way] |= {each.replace(f'/{name}/', '/_drive_can_*/')
+                                            for each, _ in look(name, place)}
+            waiting.pause(0.0005)
 
-    def gone() -> bool:
-        return not any(name.startswith('_drive_can_') for name in node.get_node_names())
-    try:
-        monitor = run('drive_can', 'monitor')
-        monitor.line('^conveyor online')
-        wait_for(lambda: {'/conveyor/response', '/lift/online', '/rosout'} <= note('/viewer'),
-                 'what the monitor subscribes to')
-        assert monitor.end(signal.SIGINT) == 0
-        wait_for(gone, 'the end of the monitor')
-        for enclave, words in (('/viewer', ('read', 'conveyor')),
-                               ('/operator', ('write', 'conveyor', 'ramp_time=2'))):
-            service = f'/conveyor/{"set" if words[0] == "write" else "get"}_parameters'
-            # it may come and go without being noticed
-            while service not in note(enclave):
-                command = run('drive_can', *words)
-                wait_for(lambda: (note(enclave), command.process.poll())[1] is not None,  # noqa: B023
-                         'the end of the command')
-                assert command.process.returncode == 0, command.errors
-                wait_for(gone, 'the end of its node')
-        panel = run('drive_can', 'panel', '--port', '0')
-        panel.line('^viewer: ')
-        wait_for(lambda: {'/lift/enable', '/lift/quick_stop', '/diagnostics'} <= note('/operator'),
-                 'what the panel asks')
-        assert panel.end(signal.SIGINT) == 0
-    finally:
-        node.destroy_node()
-        context.try_shutdown()
-    for enclave, found in done.items():
-        for (kind, verb), names in found.items():
-            assert names - allowed(policy, enclave, kind, verb) == set(), (enclave, kind, verb)
+
+def monitor() -> None:
+    """Look for a while, as ``drive_can monitor`` does."""
+    from drive_can_bridge.ros.monitor.client import MonitorClient
+    source = MonitorClient(Model())
+    for _ in range(50):
+        source.poll(waiting.clock().now())
+        waiting.pause(0.1)
+    source.close()
+
+
+def panel() -> None:
+    """Do the same, and keep what stops drives at hand, as ``drive_can panel`` does."""
+    from drive_can_bridge.ros.monitor.client import MonitorClient
+    from drive_can_bridge.ros.monitor.operations import Operations
+    source = MonitorClient(Model())
+    operations = Operations(source.node)
+    for _ in range(50):
+        source.poll(waiting.clock().now())
+        operations.poll({'/lift': Stop, '/conveyor': [Stop.QUICK_STOP]}, waiting.clock().now())
+        waiting.pause(0.1)
+    source.close()
+
+
+@pytest.mark.parametrize(('enclave', 'client', 'has'), [
+    ('/viewer', monitor, {'/conveyor/response', '/lift/online', '/rosout', '/diagnostics'}),
+    ('/viewer', lambda: main(['read', 'conveyor']), {'/conveyor/get_parameters'}),
+    ('/operator', lambda: main(['write', 'conveyor', 'ramp_time=2']),
+     {'/conveyor/set_parameters'}),
+    ('/operator', panel, {'/lift/enable', '/lift/quick_stop', '/conveyor/quick_stop'}),
+], ids=['monitor', 'read', 'write', 'panel'])
+def test_it_fits_what_clients_do(graph: Any, tmp_path: Path, enclave: str,
+                                 client: Callable[[], object], has: set[str]) -> None:
+    policy = written(tmp_path)
+    notes = Notes(graph)
+    assert not client()
+    found = notes.end()
+    assert has <= set().union(*found.values())
+    for (kind, verb), names in found.items():
+        assert names - allowed(policy, enclave, kind, verb) == set(), (kind, verb)
 
 
 def test_a_policy_of_before_outlives_a_full_disk(
