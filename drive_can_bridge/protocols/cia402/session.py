@@ -2,15 +2,10 @@
 """
 The conversation with one drive of CiA 402.
 
-.. code-block:: text
-
-    IDLE ──activate, bus up──► SETTING UP ──ready──► CYCLIC ──missed_limit──► LEAVING
-      ▲                         ▲  │ ▲                 │ boot-up, heartbeat      │
-      │                         │  └─┼──differs──► DIFFERS (looks again in 1 s)  │
-      └──deactivate / bus down──┘    └────────3 neutral cycles, then silence─────┘
-
 Before the first PDO a drive is set up by SDO (:mod:`.bring_up`), and so it is after every loss:
 a node that has started anew has forgotten what was written. That it has power is not needed.
+That, again and again until it is ready to be cycled, is its life (:meth:`Cia402Session._life`).
+A drive that is lost while it is online gets three neutral cycles more before it begins anew.
 
 Whatever was told to run is told to stop: by cycles while PDOs flow, otherwise by SDO, which no
 mapping can misroute. At the end, stop cycles go on until the drive says that it is disabled, or
@@ -18,7 +13,6 @@ for ``control_timeout``; then it watches the bridge no more.
 """
 
 from collections.abc import Callable, Generator, Sequence
-from enum import Enum
 from functools import partial
 import math
 
@@ -59,6 +53,7 @@ from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
 
@@ -70,16 +65,6 @@ EVENT_PERIODS = 1.5
 HEARTBEAT_ERROR = 0x8130
 _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.MODE, subindex=0)
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
-
-
-class Phase(Enum):
-    """How far the session has come with its drive."""
-
-    IDLE = 'idle'
-    SETTING_UP = 'setting up'
-    DIFFERS = 'differs'
-    CYCLIC = 'cycling'
-    LEAVING = 'last neutral cycles'
 
 
 class Watch:
@@ -170,10 +155,10 @@ class Cia402Session(Session):
             ) if options.mode == 'pp' else None
         self._homing = Homing(self, control, self._rules, self._channel,
                               MODES[options.mode].number)
-        self.look_after(Looks(self._next_look, self._look), self._watch, self._homing,
-                        self.exchange, channel=self._channel)
-        self._phase = Phase.IDLE
-        self._look_at = math.inf        # when the set-up begins again
+        self._course = Life(self._channel)
+        self.look_after(self._course, Looks(self._next_look, self._look), self._watch,
+                        self._homing, self.exchange, channel=self._channel)
+        self._differs = False           # what the last set-up has found
         self._cycling_since = -math.inf
         self._stop_until = -math.inf
         self._differing = ''            # as it was told
@@ -190,33 +175,30 @@ class Cia402Session(Session):
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    @property
-    def _cycling(self) -> bool:
-        return self._phase in (Phase.CYCLIC, Phase.LEAVING)
-
     def begin(self, now: float) -> None:
         self.exchange.stop()
         self._channel.cancel(Lane.OWN)
+        self._course.stop()
         self._forget_state()
         self._watch.in_use = True
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
-        self._set_up_soon(START_SPACING, now)
+        self._course.start(self._life(now, START_SPACING), now)
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
         self._looking = False
         self._homing.stop()
         self._stop.forget()
-        self._look_at = math.inf
+        self._course.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self._cycling or owes or self._bring_up.watch is not None)
+            self.exchange.cycling or owes or self._bring_up.watch is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
-        if self._cycling:
+        if self.exchange.cycling:
             self.exchange.stop_soon(now)
         elif self.owed:
             self._stop_by_sdo(now)
@@ -234,7 +216,7 @@ class Cia402Session(Session):
     def fall_silent(self) -> None:
         super().fall_silent()
         self._stop.forget()
-        self._phase, self._look_at = Phase.IDLE, math.inf
+        self._differs = False
         self._set.clear()
 
     def bus_down(self, now: float, reason: str) -> None:
@@ -243,70 +225,66 @@ class Cia402Session(Session):
 
     # -- setting up -------------------------------------------------------------------------------
 
-    def _next_look(self) -> float:
-        """Return when the set-up begins again, or something is overdue of the node."""
-        node = self._node.next_timer() if self.stage is Stage.RUNNING else math.inf
-        return min(self._look_at, node)
-
-    def _look(self, now: float) -> None:
-        if now >= self._look_at:
-            self._set_up(now)
-        if self.stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
-            if self._cycling:
-                self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
-
-    def _set_up_soon(self, spacing: float, now: float) -> None:
+    def _life(self, now: float, spacing: float) -> Script:
         """
-        Set the drive up, not too often: each time it is sent NMT.
+        Set the drive up until it can be cycled, not too often: each time it is sent NMT.
 
         :param spacing: s since the last NMT at least.
         """
-        self._phase = Phase.SETTING_UP
-        self._look_at = max(now, self._bring_up.nmt_at + spacing)
-        if self._look_at <= now:
-            self._set_up(now)
+        bring_up = self._bring_up
+        again = bring_up.nmt_at + spacing
+        if again > now:
+            now = yield again
+        while True:
+            self._differs = False
+            self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
+            outcome: Outcome = yield bring_up.run(lambda: self._channel.now)
+            now = self._channel.now
+            if outcome.found is Found.READY:
+                self._start_cycling(now)
+                return
+            again = now + LOOK_AGAIN
+            if outcome.found is Found.DIFFERS:
+                self._differs = True
+                self.report.advice = sentences.mapping_differs(outcome.text)
+                if outcome.text != self._differing:
+                    self._differing = outcome.text
+                    self.report.note(MappingDiffered(outcome.text))
+            elif outcome.found is Found.RUNS:
+                self.report.advice = outcome.text
+                if not self._runs_told:
+                    self._runs_told = True
+                    self.report.warn(outcome.text, may_run=True)
+            else:
+                self.report.advice = sentences.set_up_unanswered()
+                again = now
+                if bring_up.heard:
+                    again = max(now, bring_up.nmt_at + START_PERIOD)
+                elif now >= bring_up.nmt_at + START_PERIOD:
+                    bring_up.wake(now)      # a node that was stopped answers nothing
+            now = yield again
 
-    def _set_up(self, now: float) -> None:
-        """Set the drive up, from the beginning."""
-        self._phase, self._look_at = Phase.SETTING_UP, math.inf
-        self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
-        self._channel.run(self._bring_up.run(lambda: self._channel.now), self._set_up_ended, now)
+    def _start_cycling(self, now: float) -> None:
+        exchange = self.exchange
+        self._differing, self._runs_told, self._cycling_since = '', False, now
+        self._machine.status_received(self._bring_up.status, now)
+        exchange.book.forget_asked()
+        exchange.book.stale = self._beat.running    # it answers to the SYNC of others
+        exchange.start(now)
+        self.report.advice = sentences.cycles_unanswered()
 
-    def _set_up_ended(self, outcome: Outcome) -> None:
-        now = self._channel.now
-        if self.stage is not Stage.RUNNING:
-            return
-        if outcome.found is Found.READY:
-            self._differing, self._runs_told = '', False
-            self._phase, self._cycling_since = Phase.CYCLIC, now
-            self._machine.status_received(self._bring_up.status, now)
-            self.exchange.book.forget_asked()
-            self.exchange.book.stale = self._beat.running   # it answers to the SYNC of others
-            self.exchange.start(now)
-            self.report.advice = sentences.cycles_unanswered()
-        elif outcome.found is Found.DIFFERS:
-            self._phase, self._look_at = Phase.DIFFERS, now + LOOK_AGAIN
-            self.report.advice = sentences.mapping_differs(outcome.text)
-            if outcome.text != self._differing:
-                self._differing = outcome.text
-                self.report.note(MappingDiffered(outcome.text))
-        elif outcome.found is Found.RUNS:
-            self._look_at = now + LOOK_AGAIN
-            self.report.advice = outcome.text
-            if not self._runs_told:
-                self._runs_told = True
-                self.report.warn(outcome.text, may_run=True)
-        else:
-            self.report.advice = sentences.set_up_unanswered()
-            if not self._bring_up.heard and now >= self._bring_up.nmt_at + START_PERIOD:
-                self._bring_up.wake(now)    # a node that was stopped answers nothing
-            self._look_at = now if not self._bring_up.heard else max(
-                now, self._bring_up.nmt_at + START_PERIOD)
+    def _next_look(self) -> float:
+        """Return when something is overdue of the node."""
+        return self._node.next_timer() if self.stage is Stage.RUNNING else math.inf
+
+    def _look(self, now: float) -> None:
+        if self._node.handle_timer(now) is Change.HEARTBEAT_LOST and self.exchange.cycling:
+            self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
     # -- online and offline -----------------------------------------------------------------------
 
     def _missed(self, reason: Sentence, now: float) -> None:
-        if self._phase is Phase.LEAVING:
+        if self.exchange.leaving:
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
                 self.start_over(now)
@@ -320,10 +298,9 @@ class Cia402Session(Session):
         self.exchange.forget()
         if not self.online:
             self.exchange.stop()
-            self._set_up_soon(START_PERIOD, now)
+            self._course.start(self._life(now, START_PERIOD), now)
             return
         self.lose(reason, now)
-        self._phase = Phase.LEAVING
         self.exchange.run_out(self.exchange.timer.due)
 
     def lost(self, now: float, *, was_online: bool) -> None:
@@ -393,7 +370,7 @@ class Cia402Session(Session):
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
         exchange, count = self.exchange, len(self._responses)
-        if not self._cycling:
+        if not self.exchange.cycling:
             exchange.book.take_stale()
             return
         if self._synchronous and not exchange.wanted:
@@ -417,7 +394,7 @@ class Cia402Session(Session):
         if not self._synchronous and self.exchange.timer.due < math.inf:
             self._expect_set(now)
         if not self.online and self.stage is Stage.RUNNING:
-            if self._phase is Phase.LEAVING:    # it is back
+            if exchange.leaving:    # it is back
                 self.start_over(now)
                 return
             self.be_online()
@@ -443,8 +420,8 @@ class Cia402Session(Session):
             self._channel.clear()
             self._stop.forget()
             self._close(reason, now)
-        elif state is not NmtState.OPERATIONAL and self._phase is Phase.CYCLIC and (
-                now > self._cycling_since + START_SPACING):
+        elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
+                not self.exchange.leaving and now > self._cycling_since + START_SPACING):
             self._close(sentences.node_state(state.text), now)
         else:
             self._again.heard(now, hurry=True)
@@ -564,7 +541,7 @@ class Cia402Session(Session):
         return None if reply.data is None else int.from_bytes(reply.data, 'little')
 
     def _stop_by_sdo_ended(self) -> None:
-        if self.stage is Stage.STOPPING and not self._cycling:
+        if self.stage is Stage.STOPPING and not self.exchange.cycling:
             self._release(self._channel.now)
 
     def _last_cycle_left(self, now: float) -> None:
@@ -601,7 +578,7 @@ class Cia402Session(Session):
 
     @property
     def state(self) -> DriveState:
-        if self._phase is Phase.DIFFERS and not self.defect:
+        if self._differs and not self.defect:
             return DriveState.MAPPING_DIFFERS
         return super().state
 
