@@ -36,16 +36,18 @@ from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
+from drive_can_bridge.protocols.canopen.node import (
+    Change, Node, START_PAUSE, START_PERIOD, START_SPACING,
+)
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERIOD, Outcome
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoCourier
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
-from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
     cells, MAP, SdoAccess, write_until_answered,
 )
@@ -67,35 +69,38 @@ _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.M
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 
 
-class Watch:
-    """The part of a session that sends the heartbeat of the bridge, while it is in use."""
+class Heartbeats:
+    """
+    The part of a session that sends the heartbeat of the bridge, and waits for that of the node.
 
-    def __init__(self, session: Session, beat: BridgeHeartbeat | None) -> None:
-        self._session, self._beat = session, beat
-        self.in_use = False
+    :param lost: (now): called when that is overdue.
+    """
 
-    def handle_timer(self, now: float) -> None:
-        """Send a heartbeat, if one is due."""
-        if self.in_use and self._beat is not None:
+    def __init__(self, session: Session, node: Node, beat: BridgeHeartbeat | None,
+                 lost: Callable[[float], None]) -> None:
+        self._session, self._node, self._beat, self._lost = session, node, beat, lost
+
+    def send(self, now: float) -> None:
+        """Send one, if it is due."""
+        if self._beat is not None:
             self._beat.beat(self._session.outbox, now)
 
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        stage = self._session.stage
+        if stage is not Stage.IDLE:
+            self.send(now)
+        if stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+            self._lost(now)
+
     def next_timer(self) -> float:
-        """Return when one is due."""
-        return self._beat.next_timer() if self.in_use and self._beat is not None else math.inf
+        """Return when one is due, or overdue."""
+        stage = self._session.stage
+        own = math.inf if self._beat is None or stage is Stage.IDLE else self._beat.next_timer()
+        return min(own, self._node.next_timer()) if stage is Stage.RUNNING else own
 
     def stop(self) -> None:
-        """Send none any more."""
-        self.in_use = False
-
-
-class Looks:
-    """The part of a session that is two of its methods."""
-
-    def __init__(self, due: Callable[[], float], act: Callable[[float], None]) -> None:
-        self.next_timer, self.handle_timer = due, act
-
-    def stop(self) -> None:
-        """Leave it to the session."""
+        """Nothing to be done: the stage says it."""
 
 
 class Cia402Session(Session):
@@ -115,7 +120,7 @@ class Cia402Session(Session):
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
-        self._machine = control
+        self._machine, self._mode = control, MODES[options.mode].number
         super().__init__(
             drive, control, image=ProcessImage.of(
                 drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
@@ -146,31 +151,26 @@ class Cia402Session(Session):
             in_turn=not self._synchronous, timer=self._turn)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
-        self._watch = Watch(self, heartbeat)
-        self._bring_up = BringUp(self, self._node, self._rules)
+        self._heartbeats = Heartbeats(self, self._node, heartbeat, self._heartbeat_lost)
+        self._bring_up = BringUp(self, self._node, self._rules, self._channel)
         self.homes = options.homing
         self._handover = Handover(
             self.setpoints, self._rules, drive.control_timeout,
             lambda text: self.report.note(Noted(text, warning=True)),
             ) if options.mode == 'pp' else None
-        self._homing = Homing(self, control, self._rules, self._channel,
-                              MODES[options.mode].number)
+        self._homing = Homing(self, control, self._rules, self._channel, self._mode)
         self._course = Life(self._channel)
-        self.look_after(self._course, Looks(self._next_look, self._look), self._watch,
-                        self._homing, self.exchange, channel=self._channel)
+        self.look_after(self._course, self._heartbeats, self._homing, self.exchange,
+                        channel=self._channel)
         self._differs = False           # what the last set-up has found
-        self._cycling_since = -math.inf
         self._stop_until = -math.inf
-        self._differing = ''            # as it was told
-        self._runs_told = False
         self._forget_state()
 
     def _forget_state(self) -> None:
         """Know nothing of what the drive shows while it is enabled."""
         self._mode_shown: int | None = None
-        self._mode_seen = self._looking = False
+        self._looking = False
         self._tells_velocity = True
-        self._pending_since = math.inf
         self._error_code: int | None = None
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -180,7 +180,6 @@ class Cia402Session(Session):
         self._channel.cancel(Lane.OWN)
         self._course.stop()
         self._forget_state()
-        self._watch.in_use = True
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
@@ -231,55 +230,44 @@ class Cia402Session(Session):
 
         :param spacing: s since the last NMT at least.
         """
-        bring_up = self._bring_up
+        bring_up, told = self._bring_up, NOTHING
+        self._differs = False
         again = bring_up.nmt_at + spacing
         if again > now:
             now = yield again
         while True:
-            self._differs = False
-            self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
-            outcome: Outcome = yield bring_up.run(lambda: self._channel.now)
-            now = self._channel.now
-            if outcome.found is Found.READY:
-                self._start_cycling(now)
+            self._heartbeats.send(now)      # to be heard before the drive is to watch it
+            outcome: Outcome = yield bring_up.run()
+            now, found, text = self._channel.now, outcome.found, outcome.text
+            if found is Found.READY:
+                self._start_cycling(outcome.status, now)
                 return
+            self._differs = found is Found.DIFFERS
+            self.report.advice = text or sentences.set_up_unanswered()
             again = now + LOOK_AGAIN
-            if outcome.found is Found.DIFFERS:
-                self._differs = True
-                self.report.advice = sentences.mapping_differs(outcome.text)
-                if outcome.text != self._differing:
-                    self._differing = outcome.text
-                    self.report.note(MappingDiffered(outcome.text))
-            elif outcome.found is Found.RUNS:
-                self.report.advice = outcome.text
-                if not self._runs_told:
-                    self._runs_told = True
-                    self.report.warn(outcome.text, may_run=True)
-            else:
-                self.report.advice = sentences.set_up_unanswered()
+            if found is Found.DIFFERS:
+                self.report.advice = sentences.mapping_differs(text)
+                if text != told:
+                    self.report.note(MappingDiffered(text))
+            elif found is Found.RUNS and text != told:
+                self.report.warn(text, may_run=True)
+            elif found is Found.SILENT:
+                again = max(now, bring_up.nmt_at + START_PERIOD)
+            elif found is Found.ABSENT:
                 again = now
-                if bring_up.heard:
-                    again = max(now, bring_up.nmt_at + START_PERIOD)
-                elif now >= bring_up.nmt_at + START_PERIOD:
+                if now >= bring_up.nmt_at + START_PERIOD:
                     bring_up.wake(now)      # a node that was stopped answers nothing
+            told = text or told
             now = yield again
+            self._differs = False
 
-    def _start_cycling(self, now: float) -> None:
+    def _start_cycling(self, status: int, now: float) -> None:
         exchange = self.exchange
-        self._differing, self._runs_told, self._cycling_since = '', False, now
-        self._machine.status_received(self._bring_up.status, now)
+        self._machine.status_received(status, now)
         exchange.book.forget_asked()
         exchange.book.stale = self._beat.running    # it answers to the SYNC of others
         exchange.start(now)
         self.report.advice = sentences.cycles_unanswered()
-
-    def _next_look(self) -> float:
-        """Return when something is overdue of the node."""
-        return self._node.next_timer() if self.stage is Stage.RUNNING else math.inf
-
-    def _look(self, now: float) -> None:
-        if self._node.handle_timer(now) is Change.HEARTBEAT_LOST and self.exchange.cycling:
-            self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
     # -- online and offline -----------------------------------------------------------------------
 
@@ -292,6 +280,10 @@ class Cia402Session(Session):
             self._silent(reason, now)
         elif not self._synchronous:
             self._expect_set(now)
+
+    def _heartbeat_lost(self, now: float) -> None:
+        if self.exchange.cycling:
+            self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
     def _silent(self, reason: Sentence, now: float) -> None:
         """Have a drive that is lost stand still: it may be listening."""
@@ -421,7 +413,8 @@ class Cia402Session(Session):
             self._stop.forget()
             self._close(reason, now)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
-                not self.exchange.leaving and now > self._cycling_since + START_SPACING):
+                not self.exchange.leaving and 
+                now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
             self._close(sentences.node_state(state.text), now)
         else:
             self._again.heard(now, hurry=True)
@@ -432,9 +425,9 @@ class Cia402Session(Session):
         """Ask for what the status word does not say, where something depends on it."""
         state, control = self._rules.state, self._machine
         if state is not State.OPERATION_ENABLED:
-            self._mode_seen = False
+            self._mode_shown = None
         if not control.pending:
-            self._pending_since, self._error_code = now, None
+            self._error_code = None
         if self._looking:
             return
         if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
@@ -443,12 +436,12 @@ class Cia402Session(Session):
             self._channel.run(self._look_at_velocity(), self._looked, now)
         elif self.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
-        elif state is State.OPERATION_ENABLED and not self._mode_seen and (
+        elif state is State.OPERATION_ENABLED and self._mode_shown != self._mode and (
                 not control.stopping and not self._homing.under_way):
             self._looking = True
             self._channel.run(self._look_at_mode(), self._looked, now)
         elif control.pending and self._error_code is None and (
-                now > self._pending_since + 0.5 * self.configuration.control_timeout):
+                now > control.next_timer() - 0.5 * self.configuration.control_timeout):
             self._looking = True
             self._channel.run(self._look_at_error(), self._looked, now)
 
@@ -457,16 +450,14 @@ class Cia402Session(Session):
 
     def _look_at_mode(self) -> Generator[Ask, Reply, None]:
         """Read 6061h until it shows the mode."""
-        wanted = MODES[self.configuration.options.mode].number
         while self._rules.state is State.OPERATION_ENABLED:
             reply = yield Ask(states.MODE_SHOWN)
             if reply.abort is not None:
                 self._bring_up.tell(sentences.mode_not_shown())
-                self._mode_seen = True
+                self._mode_shown = self._mode       # nothing says otherwise
             elif reply.data:
                 self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
-                self._mode_seen = self._mode_shown == wanted
-            if self._mode_seen:
+            if self._mode_shown == self._mode:
                 self._machine.status_received(self._rules.status, self._channel.now)
                 self.control_changed(self._channel.now)
                 return
@@ -488,10 +479,10 @@ class Cia402Session(Session):
         self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
 
     def _mode_lacking(self) -> Sentence:
-        if self._mode_seen or self._rules.state is not State.OPERATION_ENABLED:
+        if self._mode_shown == self._mode or self._rules.state is not State.OPERATION_ENABLED:
             return NOTHING
-        name = self.configuration.options.mode
-        return sentences.mode_differs(name, MODES[name].number, self._mode_shown)
+        return sentences.mode_differs(
+            self.configuration.options.mode, self._mode, self._mode_shown)
 
     def _why(self) -> Sentence:
         """Say what else the drive says of why it is not enabled."""
