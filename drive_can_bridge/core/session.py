@@ -336,6 +336,18 @@ class Session(ABC):
         for part in self._parts:
             part.stop()
 
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        """
+        Handle an exchange that was not answered, unless the drive is being stopped.
+
+        :param reason: why the drive counts as lost; '' if it does not yet.
+        """
+        if reason:
+            self.lose(reason, now)
+
+    def exchange_ended(self) -> None:  # noqa: B027  optional
+        """Forget what belongs to an exchange that has ended, answered or not."""
+
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
         """Record that the drive is lost."""
 

@@ -32,10 +32,11 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
-from drive_can_bridge.protocols.cannord.group import Group
+from drive_can_bridge.protocols.cannord.group import Group, Member
 from drive_can_bridge.protocols.cannord.identifiers import (
     broadcasts, identifier, MessageObject,
 )
@@ -46,6 +47,10 @@ from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
 )
+
+
+_SILENCE = 'no answer to process data'
+_ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'
 
 
 def make_group(drives: Sequence[DriveConfiguration]) -> list['CannordSession']:
@@ -105,14 +110,15 @@ class CannordSession(Session):
             self, access, control_refusal=self._control_refusal,
             answered=self._timeout.request_answered,
             control=partial(group.stop_for, self) if self._led else None)
-        self._answers = group.join(
-            self, request_identifier, self._expect, self._samples.settle if group.extra else None)
-        self.look_after(self._answers, channel=self._channel)
+        self._answers = Answers(self, silence=_SILENCE, advice=_ADVICE, in_turn=not group.alone)
+        group.join(Member(self, request_identifier, self._answers, self._samples))
+        self._cycles = self._answers if self._led else group.exchange
+        self.look_after(self._cycles, channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def begin(self, now: float) -> None:
-        self._answers.stop()
+        self._cycles.stop()
         self._forget_samples()
         self._group.forget(self)
         owed = self.duty.happened(Happened.STARTED) is Do.STOP
@@ -152,14 +158,12 @@ class CannordSession(Session):
         if not self._led:
             self._group.exchange.hurry(now, setpoints=self.owed)
 
-    def _expect(self, now: float, until: float) -> None:
-        """Expect an answer: the inverter was sent its process frames."""
-        self._answers.expect(now, until, runs=self._group.exchange.runs)
-        if self.stage is Stage.IDLE:
-            self._answers.book.expect_nothing()
-            self._answers.book.stale = self._group.extra
-            return
-        self._samples.awaiting = self._group.extra
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        self._answers.lose(reason, now)
+
+    def exchange_ended(self) -> None:
+        if self._group.extra:
+            self._samples.settle()
 
     # -- process data, receiving ------------------------------------------------------------------
 

@@ -34,6 +34,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
@@ -145,10 +146,9 @@ class Cia402Session(Session):
         self._synchronous: bool = options.transmission == 'sync'
         self._beat = beat or Beat()
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
-        self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(
-            self, self._encode, self._send_cycle, slot=0, silence='no complete set of PDOs',
-            missed=self._missed, ended=self._last_cycle_left, settled=self._set.clear,
-            in_turn=not self._synchronous, timer=self._turn)
+        self._answers = Answers(self, silence='no complete set of PDOs',
+                               in_turn=not self._synchronous, timer=self._turn)
+        self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
         self._heartbeats = Heartbeats(self, self._node, heartbeat, self._heartbeat_lost)
@@ -264,14 +264,14 @@ class Cia402Session(Session):
     def _start_cycling(self, status: int, now: float) -> None:
         exchange = self.exchange
         self._machine.status_received(status, now)
-        exchange.book.forget_asked()
-        exchange.book.stale = self._beat.running    # it answers to the SYNC of others
+        self._answers.book.forget_asked()
+        self._answers.book.stale = self._beat.running    # it answers to the SYNC of others
         exchange.start(now)
         self.report.advice = sentences.cycles_unanswered()
 
     # -- online and offline -----------------------------------------------------------------------
 
-    def _missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if self.exchange.leaving:
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
@@ -287,7 +287,7 @@ class Cia402Session(Session):
 
     def _silent(self, reason: Sentence, now: float) -> None:
         """Have a drive that is lost stand still: it may be listening."""
-        self.exchange.forget()
+        self._answers.forget()
         if not self.online:
             self.exchange.stop()
             self._course.start(self._life(now, START_PERIOD), now)
@@ -308,7 +308,10 @@ class Cia402Session(Session):
 
     # -- PDOs, sending ----------------------------------------------------------------------------
 
-    def _encode(self, raws: list[int]) -> list[bytes]:
+    def exchange_ended(self) -> None:
+        self._set.clear()
+
+    def encode_cycle(self, raws: list[int]) -> list[bytes]:
         if self._handover is not None:
             self._handover.carried(raws[0], raws[1:])
         payloads, at = [], 0
@@ -318,14 +321,14 @@ class Cia402Session(Session):
             at += count
         return payloads
 
-    def _send_cycle(self, payloads: list[bytes], now: float) -> None:
+    def send_cycle(self, payloads: list[bytes], now: float) -> None:
         exchange = self.exchange
         for each, payload in zip(self._requests, payloads):
             exchange.put(Frame(each.identifier, payload, False))
         if self._turn is not None:
             exchange.expect_answer(now)
             self._beat.begun(self._turn, now, exchange.await_frame())
-        elif not exchange.book.awaiting:
+        elif not self._answers.book.awaiting:
             self._expect_set(now)
 
     def _expect_set(self, now: float) -> None:
@@ -361,12 +364,12 @@ class Cia402Session(Session):
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
-        exchange, count = self.exchange, len(self._responses)
+        exchange, answers, count = self.exchange, self._answers, len(self._responses)
         if not self.exchange.cycling:
-            exchange.book.take_stale()
+            answers.book.take_stale()
             return
-        if self._synchronous and not exchange.wanted:
-            if place == count - 1 and not exchange.expects('transmit PDO', now, received_at):
+        if self._synchronous and not answers.wanted:
+            if place == count - 1 and not answers.expects('transmit PDO', now, received_at):
                 exchange.wait_out(now)
             return
         try:
@@ -382,8 +385,8 @@ class Cia402Session(Session):
                 return
             raws = tuple(raw for each in range(count) for raw in self._set[each])
             self._set.clear()
-        exchange.answered(received_at)
-        if not self._synchronous and self.exchange.timer.due < math.inf:
+        answers.answered(received_at)
+        if not self._synchronous and exchange.timer.due < math.inf:
             self._expect_set(now)
         if not self.online and self.stage is Stage.RUNNING:
             if exchange.leaving:    # it is back
@@ -535,10 +538,10 @@ class Cia402Session(Session):
         if self.stage is Stage.STOPPING and not self.exchange.cycling:
             self._release(self._channel.now)
 
-    def _last_cycle_left(self, now: float) -> None:
+    def last_cycle_left(self, now: float) -> None:
         if self.stage is not Stage.STOPPING:
             return
-        book = self.exchange.book
+        book = self._answers.book
         # one that has answered its stop may miss some: it is lost by as many as ever
         listens = not book.missed_in_row or (
             book.stop_shown and book.missed_in_row < self.configuration.missed_limit)
@@ -565,7 +568,7 @@ class Cia402Session(Session):
 
     @property
     def unshown(self) -> bool:
-        return super().unshown and not self.exchange.book.stop_shown
+        return super().unshown and not self._answers.book.stop_shown
 
     @property
     def state(self) -> DriveState:
