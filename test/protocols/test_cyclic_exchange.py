@@ -11,10 +11,9 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.request_desk import RequestServer
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.users import Users
+from drive_can_bridge.core.users import RequestServer, Users
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 

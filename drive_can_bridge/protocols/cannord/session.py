@@ -22,11 +22,12 @@ from functools import partial
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
@@ -87,29 +88,24 @@ class CannordSession(Session):
             leader=group.control)
         self.enabled_by = group.leads
         self._extended: bool = options.extended_identifiers
-        request_identifier, self._response_identifier, self._task_identifier, \
+        request_identifier, self._response_identifier, task_identifier, \
             self._task_response_identifier = (
                 identifier(kind, drive.station, extended=self._extended)
                 for kind in MessageObject)
         self._swap: bool = options.swap_setpoints_2_3
         self._samples = Samples(self)
         self._courier = TaskCourier(
-            ParameterLayout(options.value_order, options.index_byte),
-            lambda payload, left: self.outbox.put(
-                Frame(self._task_identifier, payload, self._extended), left), self.retry)
+            ParameterLayout(options.value_order, options.index_byte), self.outbox,
+            task_identifier, extended=self._extended, retry=self.retry)
         self._channel = TaskChannel(self._courier)
         access = procedures.TaskAccess(
-            self._channel, self.retry, last_value=self._samples.last,
-            persist=options.persist_writes,
+            self._channel, self.retry, samples=self._samples, persist=options.persist_writes,
             signed=procedures.signed_cells(drive.profile.parameters.values()))
         # what only a master sends
-        self._masters = request_identifier, self._task_identifier
+        self._masters = request_identifier, task_identifier
         self._broadcasts = broadcasts(drive.station, extended=self._extended)
-        self._timeout = TimeoutWatch(drive, access, self.report.note)
-        self.users = Users(
-            self, access, control_refusal=self._control_refusal,
-            answered=self._timeout.request_answered,
-            control=partial(group.stop_for, self) if self._led else None)
+        self._timeout = TimeoutWatch(drive, access, self.report)
+        self.users = Users(self, access)
         self._answers = Answers(self, silence=_SILENCE, advice=_ADVICE, in_turn=not group.alone)
         group.join(Member(self, request_identifier, self._answers, self._samples))
         self._cycles = self._answers if self._led else group.exchange
@@ -238,7 +234,16 @@ class CannordSession(Session):
 
     # -- as one of those that are told the same ---------------------------------------------------
 
-    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def request_control(self, request: ControlRequest, now: float) -> None:
+        if self._led:
+            self._group.stop_for(self, request, now)
+        else:
+            super().request_control(request, now)
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        self._timeout.request_answered(request, outcomes)
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         return self._group.control_refusal(self, action, refusal)
 
     def take_events(self) -> list[Event]:

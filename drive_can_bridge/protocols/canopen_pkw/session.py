@@ -25,6 +25,7 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen
@@ -73,8 +74,7 @@ class PkwSession(Session):
             answered=self._rounds.ended, missed=self._missed,
             present=lambda: not self._node.heartbeat_lost)
         self.users = Users(
-            self, procedures.RegisterAccess(self._channel, self.retry, placement),
-            blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
+            self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self.look_after(channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -242,6 +242,12 @@ class PkwSession(Session):
         soonest = min(soonest, self._round_due, self._supervision.next_timer(),
                       self.setpoints.expires_at, self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
+
+    def request_refusal(self, now: float) -> Sentence:
+        return self._supervision.refusal(now)
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        return self._writers.control_refusal(action, refusal)
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ mapping can misroute. At the end, stop cycles go on until the drive says that it
 for ``control_timeout``; then it watches the bridge no more.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
 import math
 
@@ -71,15 +71,11 @@ _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTIO
 
 
 class Heartbeats:
-    """
-    The part of a session that sends the heartbeat of the bridge, and waits for that of the node.
+    """The part of a session that sends the bridge's heartbeat, and waits for that of the node."""
 
-    :param lost: (now): called when that is overdue.
-    """
-
-    def __init__(self, session: Session, node: Node, beat: BridgeHeartbeat | None,
-                 lost: Callable[[float], None]) -> None:
-        self._session, self._node, self._beat, self._lost = session, node, beat, lost
+    def __init__(self, session: 'Cia402Session', node: Node, beat: BridgeHeartbeat | None,
+                 ) -> None:
+        self._session, self._node, self._beat = session, node, beat
 
     def send(self, now: float) -> None:
         """Send one, if it is due."""
@@ -92,7 +88,7 @@ class Heartbeats:
         if stage is not Stage.IDLE:
             self.send(now)
         if stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
-            self._lost(now)
+            self._session.heartbeat_lost(now)
 
     def next_timer(self) -> float:
         """Return when one is due, or overdue."""
@@ -117,7 +113,7 @@ class Cia402Session(Session):
                  heartbeat: BridgeHeartbeat | None = None) -> None:
         options = drive.options
         table = control_table(options)
-        self._rules = DriveRules(table, options, lacks=self._mode_lacking, why=self._why)
+        self._rules = DriveRules(table, options, self)
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
@@ -129,10 +125,9 @@ class Cia402Session(Session):
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
         self._node = Node(drive.station, nmt_start=False,
                           heartbeat_timeout=options.heartbeat_timeout)
-        self._courier = SdoCourier(drive.station, self.outbox.put, self.retry)
+        self._courier = SdoCourier(drive.station, self.outbox, self.retry)
         self._channel: SdoChannel = Channel(self._courier)
-        self.users = Users(self, SdoAccess(self._channel, self.retry),
-                           control_refusal=self._control_refusal)
+        self.users = Users(self, SdoAccess(self._channel, self.retry))
         self._stop: SafeStop[Ask, Reply] = SafeStop(
             self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
             word=CONTROL_PARAMETER)
@@ -151,12 +146,11 @@ class Cia402Session(Session):
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
-        self._heartbeats = Heartbeats(self, self._node, heartbeat, self._heartbeat_lost)
+        self._heartbeats = Heartbeats(self, self._node, heartbeat)
         self._bring_up = BringUp(self, self._node, self._rules, self._channel)
         self.homes = options.homing
         self._handover = Handover(
-            self.setpoints, self._rules, drive.control_timeout,
-            lambda text: self.report.note(Noted(text, warning=True)),
+            self.setpoints, self._rules, drive.control_timeout, self.report,
             ) if options.mode == 'pp' else None
         self._homing = Homing(self, control, self._rules, self._channel, self._mode)
         self._course = Life(self._channel)
@@ -281,7 +275,8 @@ class Cia402Session(Session):
         elif not self._synchronous:
             self._expect_set(now)
 
-    def _heartbeat_lost(self, now: float) -> None:
+    def heartbeat_lost(self, now: float) -> None:
+        """Handle a node whose heartbeats have ceased."""
         if self.exchange.cycling:
             self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
@@ -416,8 +411,8 @@ class Cia402Session(Session):
             self._stop.forget()
             self._close(reason, now)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
-                not self.exchange.leaving and 
-                now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
+                not self.exchange.leaving
+                and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
             self._close(sentences.node_state(state.text), now)
         else:
             self._again.heard(now, hurry=True)
@@ -481,14 +476,17 @@ class Cia402Session(Session):
         reply = yield Ask(states.ERROR_CODE)
         self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
 
-    def _mode_lacking(self) -> Sentence:
+    @property
+    def mode_lacking(self) -> Sentence:
+        """What the drive lacks to be driven although it reports enabled; '' if nothing."""
         if self._mode_shown == self._mode or self._rules.state is not State.OPERATION_ENABLED:
             return NOTHING
         return sentences.mode_differs(
             self.configuration.options.mode, self._mode, self._mode_shown)
 
-    def _why(self) -> Sentence:
-        """Say what else the drive says of why it is not enabled."""
+    @property
+    def why(self) -> Sentence:
+        """What else the drive says of why it is not enabled; '' if nothing."""
         code, emergency = self._error_code, self._node.emergency
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
@@ -512,7 +510,7 @@ class Cia402Session(Session):
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
 
-    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         emergency = self._node.emergency
         if refusal or action is not ControlAction.ENABLE or not self._machine.fault:
             return refusal
