@@ -311,7 +311,7 @@ class World:
         self.number = count()
         self.looked_at = -math.inf
         self.enabling = False   # a call that nobody has answered yet
-        self.commanded_at = -math.inf
+        self.commanded_at = self.zero_at = -math.inf
         self.publish_at = math.inf
         for session in self.sessions:
             session.bus_up(self.now)
@@ -391,6 +391,8 @@ class World:
 
     def command(self, value: float) -> None:
         self.commanded_at = self.now
+        if not value:
+            self.zero_at = self.now
         self.leader.users.command(0, value, self.now)
 
     # -- the judge --------------------------------------------------------------------------------
@@ -563,8 +565,9 @@ class World:
 
         A control word by number is not misrouted, and what is still told to run is said to.
         """
-        told_to_run = self.now - self.commanded_at <= COMMAND_TIMEOUT and any(
-            partner.armed for partner in self.partners)
+        told_to_run = (
+            self.now - self.commanded_at <= COMMAND_TIMEOUT and self.now - self.zero_at > SLACK
+            and any(partner.armed for partner in self.partners))
         return self.lenient and not self.control and self.now < self.looked_at and not told_to_run
 
     def _bus_up(self) -> None:

@@ -18,7 +18,7 @@ from drive_can_bridge.core.errors import BusUnavailable, DriveCanError, Transpor
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.prober import Finding, Prober, Question
+from drive_can_bridge.protocols.scanner import Finding, Prober, Question
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
 

@@ -8,27 +8,95 @@ of each request to the caller. What it makes of a request stands in :mod:`.contr
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 import math
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.control_operation import Answers, Operation
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_rules import TableRules
-from drive_can_bridge.core.control_steps import (
-    Meeting, MEETINGS, Seen, STEPS, Then,
-)
-from drive_can_bridge.core.control_texts import (
-    disregard_text, state_text, stuck_text, success_text,
-)
-from drive_can_bridge.core.disregard import Disregard
+from drive_can_bridge.core.control_steps import Meeting, MEETINGS, Seen, STEPS, Then
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.status_reports import StatusReports, Wording
+from drive_can_bridge.core.status_reports import (
+    disregard_text, state_text, StatusReports, stuck_text, success_text, Wording,
+)
 
+
+#: s that a drive may go on running under ``disable`` at least until that is told
+RUNNING_ON_MAX = 1.0
 #: how often the reset word leaves where nobody acknowledges it
 RESET_CYCLES = 3
-
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
+
+
+class Disregard:
+    """
+    Notice that something lasts.
+
+    :param timeout: s that a caller of a stop waits, ramps included: it may last so long.
+    :ivar text: what people were told of it; '': nothing.
+    """
+
+    def __init__(self, timeout: float) -> None:
+        self.text = NOTHING
+        self._longest = max(RUNNING_ON_MAX, timeout)
+        self._since = math.inf
+
+    def lasts(self, now: float, *, so: bool) -> bool:
+        """Record whether it is so now; tell whether it is to be told."""
+        if not so:
+            self.forget()
+            return False
+        self._since = min(self._since, now)
+        return not self.text and now - self._since > self._longest
+
+    def forget(self) -> None:
+        """Record that it is over."""
+        self._since, self.text = math.inf, NOTHING
+
+
+@dataclass(slots=True)
+class Operation:
+    """
+    What is under way.
+
+    :ivar requests: those that wait for it; a quick stop for which there is no word waits for
+        ``disable``.
+    :ivar pulsed: the reset word has left as often as it has to.
+    :ivar held: it is answered, and only keeps its word: whatever else is wanted may end it.
+    """
+
+    action: ControlAction
+    deadline: float
+    requests: list[ControlRequest] = field(default_factory=list)
+    pulsed: bool = False
+    held: bool = False
+
+
+class Answers:
+    """The outcomes of requests until somebody takes them."""
+
+    def __init__(self) -> None:
+        self._completed: list[ControlCompleted] = []
+
+    def complete(self, request: ControlRequest, success: bool, message: Sentence) -> None:
+        """Answer one request."""
+        self._completed.append(ControlCompleted(request, success, message))
+
+    def answer(self, operation: Operation, success: bool, message: Sentence) -> None:
+        """Answer all that wait for an operation."""
+        for request in operation.requests:
+            instead = request.action is not operation.action
+            self.complete(
+                request, success, sentences.disabled_instead(message) if instead else message)
+        operation.requests.clear()
+
+    def take(self) -> list[ControlCompleted]:
+        """Return the outcomes since the last call."""
+        completed = self._completed
+        if completed:
+            self._completed = []
+        return completed
 
 
 class ControlMachine:

@@ -29,7 +29,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from enum import Enum
 import math
-from typing import Any
+from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_gate import CommandGate
@@ -43,7 +43,6 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
-from drive_can_bridge.core.parts import AcyclicPart, Part
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Outcomes, Request
@@ -55,6 +54,34 @@ from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty
 from drive_can_bridge.core.users import Users
 
+
+class Part(Protocol):
+    """What goes on in a conversation beside other things."""
+
+    def next_timer(self) -> float:
+        """Return when ``handle_timer`` has something to do; infinity: not planned."""
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due, which may be nothing."""
+
+    def stop(self) -> None:
+        """Plan nothing any more. The channel was cleared."""
+
+
+class AcyclicPart(Protocol):
+    """The acyclic channel."""
+
+    def next_timer(self) -> float:
+        """Return when ``advance`` wants to be called."""
+
+    def advance(self, now: float) -> None:
+        """Do all that is possible now."""
+
+    def time_lost(self, now: float) -> None:
+        """Record that nobody listened until now."""
+
+    def clear(self) -> None:
+        """Forget everything under way."""
 
 
 class Stage(Enum):

@@ -17,7 +17,7 @@ their end, users get one step in between and whatever time is left.
 *Repetitions.* A step that nobody answered is done again as often as its courier says. Between its
 attempts others may have their turn.
 
-*Quarantine* (:mod:`.quarantine`). After a step that nobody answered, nothing is asked that the
+*Quarantine* (:class:`Quarantine`). After a step that nobody answered, nothing is asked that the
 late answer could be mistaken for, for as long as such an answer may come. The attempts at one step
 do not wait for each other where answers say what they answer: the late one is as good. Where they
 do not, nothing at all is asked, and whatever arrives meanwhile begins the silence
@@ -31,16 +31,72 @@ import math
 from typing import Any, Generic
 
 from drive_can_bridge.protocols.courier import ANYTHING, Courier, ReplyT, StepT
-from drive_can_bridge.protocols.quarantine import Quarantine
 
+
+#: s by which the read after a quarantine may be late, and it still was listened to
+PUNCTUAL = 0.0005
+#: s for the reader to fetch what a process that stood still finds in its buffers
+CATCHING_UP = 0.01
+#: quarantines that are remembered before those that are long over are forgotten
+REMEMBERED = 32
 #: s that a stop waits for the answer under way, where a device has one request at a time
 STOP_PATIENCE = 0.05
 #: s, beyond those that a courier expects it, after which an answer counts as nobody's
 LATE_MAX = 0.5
 #: so many questions that were given up are remembered
 LATE_COUNT = 16
-
 Done = Callable[[Any], None]
+
+
+class Quarantine:
+    """
+    What must not be asked for yet.
+
+    Questions that a late answer cannot be mistaken for have keys of their own.
+    """
+
+    __slots__ = ('_until',)
+
+    def __init__(self) -> None:
+        # until when; and whether somebody has yet to listen at its end
+        self._until: dict[Hashable, tuple[float, bool]] = {}
+
+    def begin(self, key: Hashable, until: float) -> None:
+        """Do not ask before ``until``, or later where that was said before."""
+        if len(self._until) >= REMEMBERED:
+            self._forget(until)
+        self._until[key] = max(self.ready_at(key), until), True
+
+    def ready_at(self, key: Hashable) -> float:
+        """Return when the question may be asked."""
+        return self._until[key][0] if key in self._until else -math.inf
+
+    def holds(self, key: Hashable, now: float, late: float) -> bool:
+        """
+        Say whether to listen on although it is time to ask.
+
+        :param late: s since it was time to ask.
+        """
+        until, unheard = self._until.get(key, (-math.inf, False))
+        if not unheard:
+            return False
+        if late <= PUNCTUAL:
+            self._until[key] = until, False
+            return False
+        self._until[key] = now + CATCHING_UP, False
+        return True
+
+    def time_lost(self, now: float) -> None:
+        """Listen on where nobody did at the end of a quarantine."""
+        for key, (until, unheard) in self._until.items():
+            if unheard:
+                self._until[key] = max(until, now + CATCHING_UP), unheard
+
+    def _forget(self, now: float) -> None:
+        """Forget quarantines that have ended long ago, or else the oldest."""
+        over = [key for key, (until, _) in self._until.items() if until < now - 1.0]
+        for key in over or [min(self._until, key=self.ready_at)]:
+            del self._until[key]
 
 
 class Lane(Enum):

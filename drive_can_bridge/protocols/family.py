@@ -18,8 +18,8 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
-from drive_can_bridge.protocols.prober import Prober
-from drive_can_bridge.protocols.scout import Scout
+from drive_can_bridge.protocols.scanner import Prober
+from drive_can_bridge.protocols.scanner import Scout
 
 
 class Complaint(NamedTuple):

@@ -22,11 +22,10 @@ from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.prober import Finding
+from drive_can_bridge.protocols.scanner import Finding
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.drive import SimulatedDrive
-from drive_can_bridge.simulation.drives import SIMULATED_DRIVES
-from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES, Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
 Device = Callable[[Frame], list[Frame]]

@@ -20,7 +20,7 @@ from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scout import Certainty, Scout
+from drive_can_bridge.protocols.scanner import Certainty, Scout
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint

@@ -2,6 +2,8 @@
 """The row of the family table for drives of CiA 402."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
@@ -9,15 +11,18 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
-    node_claims, object_of_name, reserved_claims, station_complaints,
+    node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints,
 )
+from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.options import Cia402Options
+from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, STATUS_NAME, STATUS_PARAMETER, STATUS_WORD,
 )
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
+from drive_can_bridge.protocols.options import IntegerList, option
+
 
 #: s: longest period in which a drive that interpolates gets its setpoints
 INTERPOLATION_MAX = 0.02
@@ -26,6 +31,51 @@ TIMER_MAX = 65.535
 _SETPOINTS = {(mode.index, mode.subindex) for mode in MODES.values()}
 _LISTS = (('request_pdos', 'cyclic_request', CONTROL_PARAMETER),
           ('response_pdos', 'cyclic_response', STATUS_PARAMETER))
+_HEARTBEAT = worst_bits(1, extended=False)
+_SYNC = worst_bits(0, extended=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Cia402Options(NodeOptions):
+    """What the drive does, how its PDOs travel, and who watches whom."""
+
+    mode: Literal['csp', 'csv', 'cst', 'pp', 'pv', 'tq', 'vl', 'ip'] = option(
+        None, 'Mode of operation, written to 6060h; its setpoint has to be in cyclic_request.')
+    mapping: Literal['configure', 'verify', 'assume'] = option(
+        'configure', 'What becomes of the PDOs: configure (written, each read back), verify '
+        '(read; not cycled where they differ), assume (not looked at).')
+    request_pdos: IntegerList = option(
+        (1,), 'Numbers of the receive PDOs to be filled, in order: control word, then '
+        'cyclic_request.', minimum=1, maximum=PDO_MAX)
+    response_pdos: IntegerList = option(
+        (1,), 'Numbers of the transmit PDOs to be filled, in order: status word, then '
+        'cyclic_response.', minimum=1, maximum=PDO_MAX)
+    transmission: Literal['sync', 'event'] = option(
+        'sync', 'sync: one SYNC a period and bus; event: the drive sends by its event timer.')
+    heartbeat_producer: float = option(
+        0.1, 's between heartbeats of the drive, written to 1017h; 0: left alone.', minimum=0,
+        maximum=65.535)
+    heartbeat_timeout: float = option(
+        0.35, 's without heartbeat until the drive counts as offline; 0: not watched.', minimum=0,
+        maximum=3600)
+    ramp_bits: bool = option(
+        True, 'Mode vl: enabled by 007Fh (ramp generator enabled, unlocked, its input taken); '
+        'false: by 000Fh.')
+    bridge_heartbeat: float = option(
+        0.2, 's between heartbeats of the bridge, which the drive watches (1016h) for three times '
+        'as long; 0: off.', minimum=0, maximum=20)
+    bridge_node: int = option(
+        NODE_MAX, 'Node-ID of the bridge, for its heartbeat.', minimum=1, maximum=NODE_MAX)
+    disable_word: Literal['disable_operation', 'shutdown', 'disable_voltage'] = option(
+        'disable_operation', 'What disable and the stop send to an enabled drive: 0007h (brakes '
+        'as its 605Ch says), 0006h (as 605Bh says, usually coasts), 0000h (coasts).')
+    homing: bool = option(False, 'Offer ~/home.')
+    homing_timeout: float = option(
+        60.0, 's until a homing that has not ended counts as failed.', minimum=0.1, maximum=3600)
+    nmt_start: bool = option(
+        True, 'Send NMT: pre-operational for the set-up, start behind it, again after a boot-up, '
+        'and at most once a second while it is offline. false: none, and the mapping is written '
+        'only where the node is found pre-operational.')
 
 
 class Cia402(Family):
@@ -126,8 +176,8 @@ class Cia402(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cia402.observer import Cia402Observer
-        from drive_can_bridge.protocols.cia402.prober import Cia402Prober
-        from drive_can_bridge.protocols.cia402.scout import Cia402Scout
+        from drive_can_bridge.protocols.cia402.scanner import Cia402Prober
+        from drive_can_bridge.protocols.cia402.scanner import Cia402Scout
         from drive_can_bridge.protocols.cia402.session import Cia402Session
         return Talk(Cia402Session, Cia402Observer, Cia402Scout, Cia402Prober)
 
@@ -237,10 +287,6 @@ class Cia402(Family):
             if 0 < getattr(options, key) < 0.001:
                 yield Complaint(key, f'{getattr(options, key):g} s is too short, allowed is 0, or '
                                      'at least 0.001 s')
-
-
-_HEARTBEAT = worst_bits(1, extended=False)
-_SYNC = worst_bits(0, extended=False)
 
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:

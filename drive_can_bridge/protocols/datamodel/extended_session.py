@@ -128,7 +128,6 @@ class ExtendedSession(Session):
 
     def begin(self, now: float) -> None:
         self._exchange.stop()
-        self._answers.heeded = not self._verify
         self._differs = self._side.shows_up = False
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._side.begin_stop(now, setpoints=self._verify)
@@ -234,8 +233,9 @@ class ExtendedSession(Session):
         routed = effective(maps.request) == self._wanted[0] and not self._rewrites
         if not routed:
             self.duty.channel(CYCLE, Happened.MISROUTED)
-        elif again and not exchange.cycling:    # its last cycles were not answered, or it runs
-            self.duty.happened(Happened.SILENT)
+        elif again and not exchange.cycling:    # its last cycles have reached what they were for
+            self.duty.happened(
+                Happened.ANSWERED if exchange.book.stop_shown else Happened.SILENT)
         do = self.duty.happened(Happened.MAPS_DIFFER)
         self.lose(sentences.mapping_differs(text), now)
         # a request map that is right still takes neutral cycles, unless it is to be rewritten
@@ -246,7 +246,6 @@ class ExtendedSession(Session):
             exchange.stop()
             return
         self._answers.book.expect_nothing()
-        self._answers.heeded = True  # the request map was read just now
         if not exchange.leaving:
             exchange.run_out(max(now, exchange.timer.began_at + exchange.timer.stop_spacing))
 
@@ -292,7 +291,6 @@ class ExtendedSession(Session):
     # -- cyclic exchange --------------------------------------------------------------------------
 
     def _start_cycling(self, now: float) -> None:
-        self._answers.heeded = not self._verify
         self._answers.book.forget_asked()
         self._exchange.start(now, in_turn=True)
         self.report.advice = sentences.cycles_unanswered()

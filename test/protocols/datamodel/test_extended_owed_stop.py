@@ -203,9 +203,43 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     assert talk.hears(ANSWER, 11.902) == []
     assert talk.samples() == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
-    talk.deactivate(12.0)
+    # whether the request map was still right then nobody has looked
+    sent = talk.deactivate(12.0) + [text for _, text in talk.until(12.004)]
+    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
+    assert confirmed(talk, 12.005) == []
     assert talk.session.stopped
     assert talk.session.state is DriveState.OFFLINE
+
+
+def answered_neutral_cycles(request_map: str) -> Conversation:
+    """Return a drive whose response map differs, and what it says to the look after, at 12.02."""
+    talk = running()
+    look(talk)
+    talk.hears(REQUEST_MAP, 11.003)
+    talk.hears(OTHER_RESPONSE, 11.004)
+    for at in (11.02, 11.04, 11.06):
+        assert talk.until(at + TICK) == [(at, NEUTRAL)]
+        talk.hears(ANSWER, at + 0.002)
+    assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
+    assert talk.hears(request_map, 12.02) == [ASK_RESPONSE_MAP]
+    return talk
+
+
+def test_neutral_cycles_count_when_the_request_map_is_still_right() -> None:
+    talk = answered_neutral_cycles(REQUEST_MAP)
+    assert talk.hears(OTHER_RESPONSE, 12.03) == []
+    assert not talk.session.may_run
+    talk.deactivate(12.04)
+    assert talk.session.stopped
+
+
+def test_neutral_cycles_that_went_elsewhere_are_followed_by_writes() -> None:
+    talk = answered_neutral_cycles(OTHER_REQUEST)
+    assert talk.hears(OTHER_RESPONSE, 12.03) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(12.04)] == [LIMIT_ZERO, ASK_SPEED]
+    assert talk.session.may_run
+    assert confirmed(talk, 12.05) == []
+    assert not talk.session.may_run
 
 
 def neutral_cycles_without_an_answer() -> Conversation:

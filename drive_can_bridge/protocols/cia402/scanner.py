@@ -1,31 +1,132 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Finding out by reads of objects how a drive of CiA 402 wants to be configured.
+Finding drives of CiA 402 among CANopen nodes: the lower half of 1000h says it.
 
-``mode``: 6502h says which there are. ``mapping``: PDOs that are as the file wants them already
-need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without
-1016h nobody watches the bridge.
+Where a master is talking to them already, nobody may ask: then control word and status word at the
+head of PDO1, cycle after cycle beside a SYNC, are a likely one.
+
+How a drive wants to be configured is settled by reads of objects. ``mode``: 6502h says which there
+are. ``mapping``: PDOs that are as the file wants them already need no writing. ``disable_word``:
+605Ch and 605Bh say what brakes. ``bridge_heartbeat``: without 1016h nobody watches the bridge.
 """
 
+from collections import Counter
 from collections.abc import Generator, Sequence
+from typing import Any
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.protocols.canopen import abort_codes, sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind
+from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
+from drive_can_bridge.protocols.canopen.sdo import Kind, Message
+from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.pdo import (
     entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos,
 )
 from drive_can_bridge.protocols.cia402.states import (
     ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION,
 )
-from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question
+from drive_can_bridge.protocols.scanner import (
+    Certainty, Conversation, Finding, Prober, Question, Scout,
+)
+from drive_can_bridge.protocols.telegrams import Direction
 
+
+#: device profile, in the lower half of 1000h
+PROFILE = 0x0192
+#: kinds of drives, in bits 16 to 23 of it
+_KINDS = {1: 'frequency converter', 2: 'servo drive', 4: 'stepper'}
+#: cycles that make process data likely to be what they look like
+_CYCLES = 3
+#: bits of a control word that no mode has
+_RESERVED = 0xFE00
+_IDENTITY = {1: 'vendor', 2: 'product', 3: 'revision', 4: 'serial number'}
 KEYS = ('mode', 'mapping', 'disable_word', 'bridge_heartbeat')
 _DEVICE_PROFILE = 402
 _CONSUMER_HEARTBEAT = 0x1016
 _SILENT = 'no answer: check station, bit rate and power'
+
+
+class Cia402Scout(Scout):
+    """
+    Recognises what nodes answer to anybody's reads of 1000h.
+
+    Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families.
+    """
+
+    protocol = 'cia402'
+    unmistakable = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._types: dict[int, str] = {}
+        self._identities: dict[int, dict[str, str]] = {}
+        self._cycles: Counter[int] = Counter()      # by identifier; SYNC among them
+
+    def begin(self) -> None:
+        # what another scout's question brought is known already
+        self._questions += [sdo.encode_upload(node, sdo.DEVICE_TYPE, 0) for node in range(
+            1, network.NODE_MAX + 1) if node not in self._types]
+        for node in self.sightings:
+            self._ask_identity(node)
+
+    def _ask_identity(self, node: int) -> None:
+        self._questions += [sdo.encode_upload(node, sdo.IDENTITY, subindex)
+                            for subindex in _IDENTITY
+                            if _IDENTITY[subindex] not in self._identities.get(node, ())]
+
+    def settings(self, station: int) -> dict[str, Any]:
+        """Return the mode that moves nothing by itself and needs no short period."""
+        return {'mode': 'pv'}
+
+    def hear(self, frame: Frame, now: float) -> None:
+        base, node = frame.identifier & ~network.NODE_MAX, frame.identifier & network.NODE_MAX
+        if frame.extended:
+            return
+        if frame.identifier == network.SYNC_IDENTIFIER or base in (pdo.RPDO_BASE, pdo.TPDO_BASE):
+            self._hear_cycle(frame, node)
+        elif base == sdo.RESPONSE_BASE and node:
+            self._hear_answer(frame, node)
+
+    def _hear_cycle(self, frame: Frame, node: int) -> None:
+        identifier, data, _ = frame
+        word = int.from_bytes(data[:2], 'little')
+        sync = identifier == network.SYNC_IDENTIFIER
+        told = states.state_of(word)
+        fits = len(data) <= 1 if sync else len(data) >= 2 and node and (
+            told is not states.State.UNKNOWN if identifier < pdo.RPDO_BASE
+            else not word & _RESERVED)
+        self._cycles[identifier] = self._cycles[identifier] + 1 if fits else 0
+        request = pdo.RPDO_BASE + node
+        if identifier == pdo.TPDO_BASE + node and min(self._cycles[each] for each in (
+                identifier, request, network.SYNC_IDENTIFIER)) >= _CYCLES:
+            self.master = f'process data for node {node}'
+            self.nodes.setdefault(node, f'status word {word:04X}h')
+            self._see(node, f'status word {word:04X}h ({told.value}), answered with SYNC',
+                      Certainty.LIKELY)
+
+    def _hear_answer(self, frame: Frame, node: int) -> None:
+        try:
+            (index, subindex), value = sdo.decode_upload(frame.data)
+        except RemoteProtocolError:
+            return
+        if (index, subindex) == (sdo.DEVICE_TYPE, 0):
+            self._types[node] = 'refused' if value is None else f'{value:08X}h'
+            if value is not None and value & 0xFFFF == PROFILE:
+                kind = _KINDS.get(value >> 16 & 0xFF, 'drive')
+                self._types[node] = f'device type {value:08X}h ({kind} of CiA 402)'
+                self._tell(node)
+                self._ask_identity(node)
+        elif index == sdo.IDENTITY and subindex in _IDENTITY and value is not None:
+            self._identities.setdefault(node, {})[_IDENTITY[subindex]] = f'{value:X}h'
+            if node in self.sightings:
+                self._tell(node)
+
+    def _tell(self, node: int) -> None:
+        text = ', '.join((self._types[node], *(
+            f'{name} {value}' for name, value in self._identities.get(node, {}).items())))
+        self.nodes[node] = text
+        self._see(node, text, Certainty.CERTAIN)
 
 
 class Cia402Prober(Prober):
@@ -55,14 +156,15 @@ class Cia402Prober(Prober):
         return Finding('mode', wanted if wanted in names else None, told)
 
     def _mapping(self) -> Generator[Question, Frame | None, Finding]:
-        for pdo in (*request_pdos(self.drive), *response_pdos(self.drive)):
-            found = yield from self._entries(pdo)
-            place = f'{pdo.communication + MAPPING_OFFSET:04X}h'
+        for wanted in (*request_pdos(self.drive), *response_pdos(self.drive)):
+            found = yield from self._entries(wanted)
+            place = f'{wanted.communication + MAPPING_OFFSET:04X}h'
             if found is None:
                 return Finding('mapping', None, f'{place} was not answered')
-            if found != list(pdo.entries):
+            if found != list(wanted.entries):
                 return Finding('mapping', 'configure', (
-                    f'{place} holds {_entries_text(found)} and not {_entries_text(pdo.entries)}'))
+                    f'{place} holds {_entries_text(found)} and not '
+                    f'{_entries_text(wanted.entries)}'))
         return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; '
                                             'configure does no harm')
 
@@ -123,13 +225,13 @@ class Cia402Prober(Prober):
         return int.from_bytes(answer.data, 'little')
 
 
-def _answer(data: bytes, place: tuple[int, int]) -> sdo.Answer | None:
+def _answer(data: bytes, place: tuple[int, int]) -> Message | None:
     """Return the answer to the read of an object; None: it is none."""
     try:
-        found = sdo.decode_answer(data)
+        found = sdo.decode(Direction.RESPONSE, data, segments=False)
     except RemoteProtocolError:
         return None
-    return found if found.object == place and found.kind in (Kind.DATA, Kind.ABORT) else None
+    return found if found.object == place and found.kind in (Kind.UPLOADED, Kind.ABORT) else None
 
 
 def _entries_text(entries: Sequence[int]) -> str:

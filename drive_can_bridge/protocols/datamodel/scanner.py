@@ -1,27 +1,159 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Finding out which parameter numbers a DataModel drive has on the wire, by reading its maps.
+Finding DataModel drives, with 29-bit and with 11-bit identifiers, and how they count parameters.
 
-The maps are eight parameters whose content can be told: Reg.122 to 125 and 126 to 129 hold the
-numbers that the file configures, moved like themselves. Where they hold others, it still tells
-that a drive does not answer for parameters that it has not.
+The numbers on the wire are settled by reading the maps: eight parameters whose content can be
+told. Reg.122 to 125 and 126 to 129 hold the numbers that the file configures, moved like
+themselves. Where they hold others, it still tells that a drive does not answer for parameters that
+it has not.
 """
 
-from collections.abc import Callable, Generator
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
-from drive_can_bridge.protocols.datamodel.mapping import effective
+from drive_can_bridge.protocols.datamodel.mapping import (
+    effective, REQUEST_MAP_BASE, RESPONSE_MAP_BASE,
+)
 from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
-from drive_can_bridge.protocols.prober import Conversation, Finding, Prober, Question
+from drive_can_bridge.protocols.scanner import (
+    Certainty, Conversation, Finding, Prober, Question, Scout,
+)
 
+
+#: the highest station whose both identifiers fit 11 bits with the default bases
+STANDARD_STATION_MAX = 15
+#: a parameter that the manual names, and whose read is no write in any other protocol
+HARMLESS_NUMBER = 30
 #: how far the two ways of counting are apart, of those who count from 0 and from 1
 OFFSETS = (0, -1, 1)
 #: even ones are parameter tasks of CANnord inverters
 _CANNORD_TASKS = range(0x200, 0x400)
+_Asking = Generator[Question, Frame | None, tuple[int, ...] | None]
+
+
+class ExtendedScout(Scout):
+    """
+    Recognises 29-bit identifiers, and reads both maps of each station.
+
+    Its reads have 1 to 4 in the last four bits of the identifier, in which CANnord's 29-bit form
+    has zeros: nobody else takes them for anything.
+    """
+
+    protocol = 'datamodel_extended'
+    unmistakable = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maps: dict[int, dict[int, tuple[int, ...]]] = {}
+
+    def begin(self) -> None:
+        self._questions += [
+            extended.encode_read_request(station, REQUEST_MAP_BASE, extended.SLOTS)
+            for station in range(1, extended.STATION_MAX + 1)]
+
+    def hear_request(self, frame: Frame, now: float) -> None:
+        # its answer repeats the identifier, but for the direction
+        self._request(extended.station_of(frame.identifier), frame.data, now,
+                      service=frame.identifier)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        try:
+            telegram = extended.decode(frame)
+        except RemoteProtocolError:
+            return
+        station = extended.station_of(frame.identifier)
+        service = frame.identifier & ~extended.DIR
+        if isinstance(telegram, extended.CyclicResponse):
+            self._answer(station, 'cyclic responses', now, service=service,
+                         certainty=Certainty.CERTAIN)
+        elif isinstance(telegram, extended.ReadResponse):
+            text = f'answers to reads of P{telegram.number}'
+            if self._answer(station, text, now, service=service) and (
+                    telegram.number in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE)):
+                self._take_map(station, telegram.number, telegram.words)
+        else:
+            if not isinstance(telegram, extended.Write):    # which nobody answers
+                self.hear_request(frame, now)
+            self.master = f'requests to station {station} of {self.protocol}'
+
+    def _take_map(self, station: int, base: int, words: tuple[int, ...]) -> None:
+        maps = self.maps.setdefault(station, {})
+        if len(words) == extended.SLOTS:
+            maps[base] = effective(words)
+        if RESPONSE_MAP_BASE not in maps:
+            self._questions.insert(0, extended.encode_read_request(
+                station, RESPONSE_MAP_BASE, extended.SLOTS))
+        told = ', '.join(f'{name} map {_numbers(maps[key])}' for key, name in (
+            (REQUEST_MAP_BASE, 'request'), (RESPONSE_MAP_BASE, 'response')) if key in maps)
+        if station in self.sightings:
+            self._see(station, told or 'answers to reads of its maps', Certainty.CERTAIN)
+
+    def settings(self, station: int) -> dict[str, Any]:
+        maps = self.maps.get(station, {})
+        request, response = maps.get(REQUEST_MAP_BASE, ()), maps.get(RESPONSE_MAP_BASE, ())
+        return {'request_numbers': _exchangeable(request),
+                'response_numbers': _exchangeable(response),
+                'remarks': [f'its {name} map, {_numbers(numbers)}, cannot be exchanged: map other '
+                            'parameters, each once'
+                            for name, numbers in (('request', request), ('response', response))
+                            if numbers and not _exchangeable(numbers)]}
+
+
+def _exchangeable(numbers: Sequence[int]) -> list[int]:
+    """Return the parameters of a map; none where no bridge can be configured to exchange them."""
+    unfit = extended.CYCLIC_PARAMETER in numbers or len(set(numbers)) < len(numbers) or any(
+        base <= number < base + extended.SLOTS for number in numbers
+        for base in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE))
+    return [] if unfit else list(numbers)
+
+
+class StandardScout(Scout):
+    """
+    Recognises the default identifiers of 11 bits, and reads P30 of each station.
+
+    Not a map: a read of P122 at station 2 is task 7, a write of an EEPROM parameter, to CANnord
+    inverter 249. A read of P30 has 1Eh in that place, which is a read there, too.
+    """
+
+    protocol = 'datamodel_standard'
+    hazard = ('a read on 3F1h to 3FFh looks like TPDO3 of CANopen nodes 113 to 127, and on even '
+              'stations like a task that reads, to CANnord inverters 249 to 255')
+
+    def begin(self) -> None:
+        self._questions += [
+            standard.encode_read_request(standard.REQUEST_ID_BASE + station, HARMLESS_NUMBER, 1)
+            for station in range(1, STANDARD_STATION_MAX + 1)]
+
+    def hear_request(self, frame: Frame, now: float) -> None:
+        station = frame.identifier - standard.REQUEST_ID_BASE
+        if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
+            return
+        try:
+            request = standard.decode_request(frame)
+        except RemoteProtocolError:
+            return
+        if isinstance(request, extended.ReadRequest):
+            self._request(station, frame.data, now)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        self.hear_request(frame, now)
+        station = frame.identifier - standard.RESPONSE_ID_BASE
+        if frame.extended or not 1 <= station <= STANDARD_STATION_MAX:
+            return
+        if len(frame.data) == standard.PAYLOAD:
+            self._answer(station, 'answers to reads', now)
+
+    def settings(self, station: int) -> dict[str, Any]:
+        return {'request_numbers': [], 'response_numbers': [HARMLESS_NUMBER]}
+
+
+def _numbers(numbers: tuple[int, ...]) -> str:
+    return ' '.join(map(str, numbers)) or 'empty'
 
 
 class _Maps(NamedTuple):
@@ -30,9 +162,6 @@ class _Maps(NamedTuple):
 
     def __str__(self) -> str:
         return f'{_numbers(self.request)} | {_numbers(self.response)}'
-
-
-_Asking = Generator[Question, Frame | None, tuple[int, ...] | None]
 
 
 class DataModelProber(Prober):
@@ -156,7 +285,3 @@ def standard_prober(drive: DriveConfiguration) -> DataModelProber:
         drive, [Route(request, STANDARD_IDENTIFIER_MAX, False)], question,
         lambda data: standard.decode_read_response(Frame(response, data, False), SLOTS),
         hazard=hazard, maps_count=False)
-
-
-def _numbers(numbers: tuple[int, ...]) -> str:
-    return ' '.join(map(str, numbers))

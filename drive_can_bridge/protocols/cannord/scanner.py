@@ -1,11 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Finding out how a NORD inverter orders its parameter frames, by reads that it has to refuse.
+Finding CANnord inverters, and how one orders its parameter frames.
 
-``value_order``: an array read of a parameter that is no array is refused with error 4, and error
-numbers are in PWE2, the low word (BU 0060 page 54). ``index_byte``: an array read with a sub-index
-that does not exist is refused with error 3; in the other byte FFh means nothing, and element 0
-answers. The error number stands out in either order, so that neither key needs the other.
+They are recognised by requests and answers that follow each other, or by a read. What is open is
+settled by reads that an inverter has to refuse. ``value_order``: an array read of a parameter that
+is no array is refused with error 4, and error numbers are in PWE2, the low word (BU 0060 page 54).
+``index_byte``: an array read with a sub-index that does not exist is refused with error 3; in the
+other byte FFh means nothing, and element 0 answers. The error number stands out in either order,
+so that neither key needs the other.
 """
 
 from collections.abc import Generator
@@ -14,15 +16,27 @@ from typing import NamedTuple
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
-    broadcasts, identifier, MessageObject, route,
+    ADDRESS_MAX, broadcasts, decode_identifier, identifier, MessageObject, route,
 )
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
+    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, RESPONSES, Task,
 )
-from drive_can_bridge.protocols.prober import (
-    conclude, Conversation, Finding, Prober, Question, spaced,
+from drive_can_bridge.protocols.cannord.process_data import decode_main
+from drive_can_bridge.protocols.cannord.states import ACKNOWLEDGE, QUICK_STOP, READY, RUN, state_of
+from drive_can_bridge.protocols.scanner import (
+    conclude, Conversation, Finding, Prober, Question, Scout, spaced,
 )
 
+
+#: the parameter that is read: the fault number. As a DataModel request its first byte, BCh, is no
+#: function, so that it writes nothing there
+PARAMETER = 700
+_NUMBER_BITS = 0x07FF
+#: the service that goes on beside process data
+_PARAMETERS = 1
+#: control words that masters send; the bits of direction and parameter set left out
+_CONTROL_WORDS = (READY, RUN, QUICK_STOP, ACKNOWLEDGE)
+_CONTROL_MASK = 0x27FF
 #: what to ask where the profile names no parameter of that kind
 SIMPLE = (514, 513)
 ARRAYS = (102, 700)
@@ -33,6 +47,45 @@ _TRIES = 4
 #: sub-index that no array reaches, in byte 2 or in byte 3
 _BEYOND = 0xFF
 _NUMBER_AND_TASK = slice(0, 2)
+
+
+class CannordScout(Scout):
+    """Recognises process data and parameter frames of 11 bits, and reads one parameter."""
+
+    protocol = 'cannord'
+    hazard = ('a task on 200h + 2·address is RPDO1 (process data) or TPDO of CANopen nodes, '
+              'on 300h to 3FEh RPDO2 and TPDO3: a CANopen drive may take it for a command')
+
+    def begin(self) -> None:
+        data = ParameterLayout().encode(Task.READ, PARAMETER)
+        self._questions += [Frame(identifier(MessageObject.PARAMETER_TASK, address), data, False)
+                            for address in range(ADDRESS_MAX + 1)]
+
+    def hear_request(self, frame: Frame, now: float) -> None:
+        self.hear(frame, now)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        found = None if frame.extended else decode_identifier(frame.identifier)
+        if found is None:
+            return
+        kind, station = found
+        data = frame.data
+        if kind is MessageObject.PROCESS_REQUEST and len(data) in (4, 8) and (
+                decode_main(data).word & _CONTROL_MASK in _CONTROL_WORDS):
+            self._request(station, data, now)
+        elif kind is MessageObject.PARAMETER_TASK and len(data) == LENGTH:
+            self._request(station, data, now, service=_PARAMETERS)
+        elif kind is MessageObject.PROCESS_RESPONSE and len(data) in (4, 8):
+            state = state_of(decode_main(data).word)
+            self._answer(station, f'process data, state "{state.value}"', now,
+                         lambda request: len(request) == len(data))
+        elif kind is MessageObject.PARAMETER_RESPONSE and len(data) == LENGTH:
+            self._answer(station, f'answers to tasks for P{_number(data)}', now,
+                         lambda request: _number(request) == _number(data), service=_PARAMETERS)
+
+
+def _number(data: bytes) -> int:
+    return int.from_bytes(data[:2], 'little') & _NUMBER_BITS
 
 
 class _Answer(NamedTuple):

@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Finding out how a PKW mailbox lays out its bytes, by reads that are no writes in any layout.
+Finding CANopen nodes, among them devices with a PKW mailbox, and how one lays out its bytes.
 
-``layout``: register 455 is read in each layout, then a register that does not exist. A device that
-understands repeats toggle, function and register of the one, and puts 4Eh in the place of the
-function for the other. One that looks for the function elsewhere may repeat a request that starts
-nothing there; it never refuses in the place that was asked. ``abort_code_order``: only one order
-of the refusal's words is a code. ``word_order``: values of 32 bits of which one half is 0.
+The layout is settled by reads that are no writes in any layout. ``layout``: register 455 is read
+in each, then a register that does not exist. A device that understands repeats toggle, function
+and register of the one, and puts 4Eh in the place of the function for the other. One that looks
+for the function elsewhere may repeat a request that starts nothing there; it never refuses in the
+place that was asked. ``abort_code_order``: only one order of the refusal's words is a code.
+``word_order``: values of 32 bits of which one half is 0.
 
 Before anything is sent to the mailbox, 1603h is read by SDO: where the receive PDO4 is known to
 map something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
@@ -25,21 +26,132 @@ from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.refusals import describe
-from drive_can_bridge.protocols.prober import (
-    conclude, Conversation, Finding, Prober, Question, spaced,
+from drive_can_bridge.protocols.scanner import (
+    Certainty, conclude, Conversation, Finding, Prober, Question, Scout, spaced,
 )
 
+
+#: the object of the mailbox, in the upper half of a mapping entry
+_MAILBOX = 0x3000
+#: the register that is read through the mailbox: system status
 STATUS = Address(455)
+#: bits of a PDO's identifier entry: it does not exist; 29 bits; and the identifier itself
+_PDO_IDENTIFIER = 0xA00007FF
+#: all bits of address and function that answers repeat, but for the toggle, wherever it stands
+_REPEATED = 0xFF7F7F7F
 #: registers that no device should have; their bytes are no function that writes, in any layout
 MISSING = (Address(9999), Address(65000))
 KEYS = ('layout', 'word_order', 'abort_code_order')
 ORDERS = ('high_first', 'low_first')
-_MAILBOX = 0x3000
 _WIDE_MAX = 12
 #: values that have to agree where no limits help
 _AGREEING = 2
 _SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); '
            'check station, bit rate, request_cob_id and response_cob_id')
+_Asking = Generator[Question, Frame | None, tuple[bytes, Message] | None]
+
+
+class CanopenScout(Scout):
+    """
+    Recognises heartbeats, boot-up messages, mailbox traffic and SDO answers.
+
+    Reads objects that every node has or refuses. 600h to 67Fh mean nothing to other families. The
+    mailbox itself is read only where the node's own receive PDO4 is known to be one, at 500h +
+    node: elsewhere it would be process data. That read is no write in any layout.
+    """
+
+    protocol = 'canopen_pkw'
+    unmistakable = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._mailboxes: set[int] = set()
+        self._facts: dict[int, dict[str, str]] = {}
+
+    def begin(self) -> None:
+        self._questions += [sdo.encode_upload(node, sdo.DEVICE_TYPE, 0)
+                            for node in range(1, network.NODE_MAX + 1)]
+
+    def hear_request(self, frame: Frame, now: float) -> None:
+        base, node = frame.identifier & 0x780, frame.identifier & 0x7F
+        if base == network.REQUEST_BASE:
+            self._request(node, frame.data, now)
+        elif base == sdo.REQUEST_BASE:
+            self._request(node, frame.data, now,
+                          service=int.from_bytes(frame.data[1:4], 'little'))
+
+    def hear(self, frame: Frame, now: float) -> None:
+        if frame.extended:
+            return
+        base, node = frame.identifier & 0x780, frame.identifier & 0x7F
+        try:
+            if frame.identifier == network.NMT_IDENTIFIER:
+                network.decode_nmt(frame.data)
+                self.master = 'NMT commands'
+            elif not node:
+                return
+            elif base == network.HEARTBEAT_BASE:
+                self._fact(node, 'heartbeat', network.decode_heartbeat(frame.data).text)
+            elif base == sdo.RESPONSE_BASE:
+                self._take_upload(node, sdo.decode_upload(frame.data), now)
+            elif base == sdo.REQUEST_BASE and len(frame.data) == 8:
+                self.hear_request(frame, now)
+                self.master = f'SDO requests to node {node}'
+            elif base == network.REQUEST_BASE and len(frame.data) == 8:
+                self.hear_request(frame, now)
+            elif base == network.RESPONSE_BASE and len(frame.data) == 8:
+                if self._answer(node, 'PKW answers', now, lambda request: _repeats(
+                        request, frame.data)) and node in self.sightings:
+                    self._fact(node, 'PKW', 'answers')
+        except RemoteProtocolError:
+            return
+
+    def _take_upload(self, node: int, upload: sdo.Uploaded, now: float) -> None:
+        (index, subindex), value = upload
+        if index == sdo.DEVICE_TYPE:
+            self._fact(node, 'device type', 'refused' if value is None else f'{value:08X}h')
+            for entry in ((sdo.IDENTITY, 1), (sdo.IDENTITY, 2), (sdo.RPDO4_MAPPING, 1)):
+                self._questions.append(sdo.encode_upload(node, *entry))
+        elif value is None:
+            return
+        elif index == sdo.IDENTITY:
+            self._fact(node, 'vendor' if subindex == 1 else 'product', f'{value:X}h')
+        elif index == sdo.RPDO4_MAPPING:
+            told = f'{value >> 16:04X}h'
+            self._fact(node, 'RPDO4 maps', told)
+            if value >> 16 == _MAILBOX and self._answer(
+                    node, told, now, service=_service(index, subindex)) and (
+                    node in self.sightings):
+                self._mailboxes.add(node)
+                self._fact(node, 'mailbox', 'yes')
+                self._questions.append(sdo.encode_upload(node, sdo.RPDO4, 1))
+        elif (index, subindex) == (sdo.RPDO4, 1) and node in self._mailboxes:
+            if value & _PDO_IDENTIFIER == network.REQUEST_BASE + node:
+                # a device that got the function of the first one last, does not answer that one
+                self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
+                    pkw.read_request(STATUS, 1, toggle), pkw.Layout.WORD_LE), False)
+                    for toggle in (False, True)]
+
+    def _fact(self, node: int, name: str, text: str) -> None:
+        facts = self._facts.setdefault(node, {})
+        facts[name] = text
+        told = ', '.join(f'{key} {value}' for key, value in facts.items() if key != 'mailbox')
+        self.nodes[node] = told
+        if node in self._mailboxes:
+            self._see(node, told, Certainty.CERTAIN)
+        elif facts.get('PKW'):
+            self._see(node, told, Certainty.LIKELY)
+
+
+def _service(index: int, subindex: int) -> int:
+    """Return the service that an object is; PKW is 0. Requests hold it in bytes 1 to 3."""
+    return subindex << 16 | index
+
+
+def _repeats(request: bytes, answer: bytes) -> bool:
+    """Tell whether address and function are the same, as in every layout, refusals aside."""
+    different = int.from_bytes(request[:4], 'big') ^ int.from_bytes(answer[:4], 'big')
+    return not different & _REPEATED
 
 
 @dataclass
@@ -54,9 +166,6 @@ class _Evidence:
     def understood(self) -> bool:
         """Both toggles were answered."""
         return len(self.read) == 2
-
-
-_Asking = Generator[Question, Frame | None, tuple[bytes, Message] | None]
 
 
 class PkwProber(Prober):
