@@ -18,8 +18,7 @@ import sys
 import threading
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import add_params_file, bitrate, of_drive
-from drive_can_bridge.cli.command import FAILED, WrongUsage
+from drive_can_bridge.cli.command import add_params_file, bitrate, FAILED, of_drive, WrongUsage
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
