@@ -24,13 +24,13 @@ from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, ParameterCourier, Read, Reply, Step, Words, Write,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
+from drive_can_bridge.protocols.datamodel.setpoint_writer import ControlByNumber
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import (
     SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite,
@@ -91,8 +91,8 @@ class AcyclicSide:
             len(drive.cyclic_request) if polled else 0, slot=self.control_slot if polled else None,
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
-            AcyclicControl(session, session.control, self.channel, self.courier, self.numbers,
-                           self.output, word=word, status=status))
+            ControlByNumber(session, session.control, self.channel, self.courier, self.numbers,
+                            self.output, word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, stop_ended, at_end, self._read_status)

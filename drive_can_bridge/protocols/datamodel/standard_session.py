@@ -54,7 +54,9 @@ class StandardSession(Session):
             self, self._channel, self._round.read, found=self._found, answered=self._answered,
             missed=self._missed)
         self._timer = self._exchange.timer
-        self._writer = SetpointWriter(self, self._side, self._exchange)
+        self._writer = SetpointWriter(
+            self, self._exchange, self._side.courier, self._side.numbers, self._side.output,
+            slot=self._side.control_slot)
         self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
 
