@@ -16,6 +16,10 @@ import sys
 import time
 from typing import Any, NoReturn
 
+# before rclpy is imported: nothing leaves this machine
+os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+os.environ.setdefault('ROS_DOMAIN_ID', '97')
+
 HERE = Path(__file__).resolve().parent
 ANSWER_TIMEOUT = 120.0
 

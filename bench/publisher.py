@@ -3,7 +3,8 @@
 Other processes that publish.
 
 ``publisher.py bare PERIOD`` publishes ``/bare/response`` and nothing else: the bare pair's half.
-``publisher.py commands DRIVES RATE`` publishes setpoints for each of so many drives at a rate.
+``publisher.py commands DRIVES RATE [PREFIX]`` publishes setpoints for each of so many drives at a
+rate.
 ``publisher.py joints DRIVES`` publishes commands for all joints, at the rate that it is told.
 """
 
@@ -32,9 +33,9 @@ def publish_bare(node: Node, period: float) -> None:
         topics.publish_response(time.time_ns(), 0.1, 0.2, 0.3, 4)
 
 
-def publish_commands(node: Node, drives: int, rate: float) -> None:
+def publish_commands(node: Node, drives: int, rate: float, prefix: str = 'drive') -> None:
     """Publish setpoints for ever, serialised beforehand: this process is only the load."""
-    publishers = [node.create_publisher(Float64, f'/drive{number}/command/speed_setpoint', 10)
+    publishers = [node.create_publisher(Float64, f'/{prefix}{number}/command/speed_setpoint', 10)
                   for number in range(drives)]
     values = [serialize_message(Float64(data=value)) for value in (0.0, 0.1)]
     period = max(1.0 / rate, 0.002)
@@ -91,7 +92,8 @@ def main() -> None:
     elif sys.argv[1] == 'bare':
         target, arguments = publish_bare, (node, float(sys.argv[2]))
     else:
-        target, arguments = publish_commands, (node, int(sys.argv[2]), float(sys.argv[3]))
+        target = publish_commands
+        arguments = (node, int(sys.argv[2]), float(sys.argv[3]), *sys.argv[4:])
     threading.Thread(target=target, args=arguments, daemon=True).start()
     serve(commands)
 

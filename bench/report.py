@@ -2,7 +2,7 @@
 """Figures from what the scenarios found, as a table."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 import math
 from typing import Any
 
@@ -15,6 +15,7 @@ class Figure:
     One line of the table.
 
     :param value: as measured; ``floor``: beside it; ``goal``: of ``judged``, at most.
+    :param stolen: share of the time that the hypervisor gave to others meanwhile.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Figure:
     judged: float
     goal: float
     at_least: bool = False
+    stolen: float = 0.0
 
     @property
     def met(self) -> bool:
@@ -30,17 +32,20 @@ class Figure:
         return self.judged >= self.goal if self.at_least else self.judged <= self.goal
 
 
-def exchange_figures(found: dict[str, Any], name: str, goal: float) -> list[Figure]:
+def exchange_figures(found: dict[str, Any], name: str, goal: float,
+                     c_goal: float = math.inf) -> list[Figure]:
     """CPU, exchanges held, period."""
     bridge, floor = found['bridge'], found['floor']
-    cpu = sum(bridge['cpu'].values()) / max(1, bridge['exchanges'])
-    floor_cpu = floor['cpu'] / max(1, floor['exchanges'])
+    cpu = _per_exchange(bridge, 'process_cpu')
+    beside = [Figure(f'CPU of the process per exchange, {name}, beside {language}',
+                     f'{1e6 * cpu:.0f} µs', f'{1e6 * floor_cpu:.0f} µs', cpu / floor_cpu, each)
+              for key, language, each in (('floor', 'Python', goal), ('c_floor', 'C', c_goal))
+              if key in found for floor_cpu in [_per_exchange(found[key], 'cpu')]]
     parts = ', '.join(f'{thread} {1e6 * value / max(1, bridge["exchanges"]):.0f}'
                       for thread, value in bridge['cpu'].items())
     period, sleeping = p99(bridge['period_errors']), p99(found['sleeper'])
     return [
-        Figure(f'CPU per exchange, {name}', f'{1e6 * cpu:.0f} µs ({parts})',
-               f'{1e6 * floor_cpu:.0f} µs', cpu / floor_cpu, goal),
+        *(replace(line, value=f'{line.value} ({parts})') for line in beside[:1]), *beside[1:],
         Figure(f'exchanges/s, {name}', f'{bridge["exchanges"] / bridge["elapsed"]:.0f}',
                f'{bridge["missed"]} missed',
                bridge['exchanges'] / bridge['elapsed'] if not bridge['missed'] else 0.0,
@@ -49,6 +54,10 @@ def exchange_figures(found: dict[str, Any], name: str, goal: float) -> list[Figu
                f'sleeping {1e3 * sleeping:.3f} ms, bare loop '
                f'{1e3 * p99(floor["period_errors"]):.3f} ms', period / sleeping, 2.0),
     ]
+
+
+def _per_exchange(found: dict[str, Any], cpu: str) -> float:
+    return float(found[cpu] / max(1, found['exchanges']))
 
 
 def axes_figures(found: dict[str, Any]) -> list[Figure]:
@@ -209,8 +218,8 @@ def backup_figures(found: dict[str, Any]) -> list[Figure]:
 
 def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     """Cost by number of drives."""
-    costs = {int(number): sum(each['bridge']['cpu'][name] for name in ('timer', 'reader'))
-             / max(1, each['bridge']['exchanges']) for number, each in found.items()}
+    costs = {int(number): _per_exchange(each['bridge'], 'process_cpu')
+             for number, each in found.items()}
     services = {int(number): each['bridge']['cpu']['services'] / each['bridge']['elapsed']
                 for number, each in found.items()}
     least, most = min(costs), max(costs)
@@ -299,9 +308,9 @@ def start_figures(found: dict[str, Any]) -> list[Figure]:
 
 
 FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
-    'full': lambda found: exchange_figures(found, 'subscribed, commands', 1.1),
-    'subscribed': lambda found: exchange_figures(found, 'subscribed', 0.85),
-    'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 0.5),
+    'full': lambda found: exchange_figures(found, 'subscribed, commands', 1.4),
+    'subscribed': lambda found: exchange_figures(found, 'subscribed', 1.3, 2.3),
+    'unsubscribed': lambda found: exchange_figures(found, 'nobody subscribed', 1.2),
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'axes': axes_figures, 'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
@@ -312,24 +321,29 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
 }
 
 
-def figures(results: dict[str, list[Any]]) -> list[Figure]:
+def figures(results: dict[str, list[Any]],
+            stolen: dict[str, list[float]]) -> list[Figure]:
     """Return the figures of each scenario; of several runs the one with the median ratio."""
     lines = []
     for name, runs in results.items():
-        for same in zip(*(FIGURES[name](run) for run in runs)):
+        for same in zip(*([replace(figure, stolen=share) for figure in FIGURES[name](run)]
+                          for run, share in zip(runs, stolen[name]))):
             ordered = sorted(same, key=lambda figure: (
                 math.isnan(figure.judged), figure.judged))
             lines.append(ordered[len(ordered) // 2])
     return lines
 
 
-HEAD = '| figure | measured | beside it | ratio or value | goal | met |\n' + '|' + '---|' * 6
+HEAD = ('| figure | measured | beside it | ratio or value | goal | met | stolen |\n'
+        + '|' + '---|' * 7)
 
 
 def row(line: Figure) -> str:
     """Return a row of a table in Markdown."""
     return (f'| {line.name} | {line.value} | {line.floor} | {line.judged:.3g} '
-            f'| {"≥" if line.at_least else "≤"} {line.goal:g} | {"yes" if line.met else "no"} |')
+            + (f'| {"≥" if line.at_least else "≤"} {line.goal:g} | {"yes" if line.met else "no"} '
+               if math.isfinite(line.goal) else '| | ') +
+            f'| {100 * line.stolen:.1f} % |')
 
 
 def as_json(lines: list[Figure]) -> list[dict[str, Any]]:

@@ -14,11 +14,12 @@ from pathlib import Path
 import statistics
 import subprocess
 import sys
-import tempfile
+from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
 from child import child, HERE
+import native
 from unix_bus import INTERFACE
 from viewer import Viewer
 
@@ -33,6 +34,9 @@ SETTINGS_AT = 1000
 #: bit/s, and s that a drive takes to answer, for a backup
 SLOW = (125_000.0, 0.001)
 RESPONSES = 'actual_speed, motor_current, actual_position, digital_inputs'
+
+#: bare loops in Python and in C: how their topics begin, and what runs them
+FLOORS = {'floor': 'floor.py', 'c_floor': 'native.py'}
 
 #: keys of an axis: what flows is RPDO, SYNC and TPDO
 SERVO = ('        protocol: cia402', '        mode: csp', '        mapping: assume',
@@ -84,7 +88,7 @@ class Bus:
     """
 
     def __init__(self, stack: ExitStack, load: Load, *pace: float) -> None:
-        self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        self._folder = Path(stack.enter_context(TemporaryDirectory()))
         self._load = load
         self.buses = [f'bus{number}' for number in range(load.buses)]
         self.channel = self._folder / self.buses[0]
@@ -214,19 +218,22 @@ def bridge_under(load: Load, bus: Bus, *each: tuple[object, ...]) -> Iterator[Br
 def subscribers(stack: ExitStack, load: Load) -> None:
     """Let another process subscribe to everything, if so wanted."""
     if load.subscribed:
-        stack.enter_context(child('subscriber.py', 'all', 'drive,floor', load.drives))
+        stack.enter_context(child(
+            'subscriber.py', 'all', ','.join(('drive', *FLOORS)), load.drives))
 
 
 def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, Any]:
-    """Measure CPU time and regularity of the exchange beside a bare loop and a sleeping thread."""
+    """
+    Measure CPU time and regularity of the exchange beside bare loops and a sleeping thread.
+
+    Half of the loops run before the bridge and half behind it: the machine's speed drifts.
+    """
     found: dict[str, Any] = {}
     with ExitStack() as stack:
         bus = Bus(stack, load)
         subscribers(stack, load)
         if floor:
-            with child('floor.py', bus.channel, load.drives, load.period) as loop:
-                loop.ask(f'run {SETTLE}')
-                found['floor'] = loop.ask(f'run {duration}')
+            _run_floors(found, load, bus, 0.5 * duration)
         with bridge_under(load, bus) as bridge, child('sleeper.py', load.period) as sleeper:
             sleeper.ask('clear')
             bridge.clear()
@@ -234,7 +241,31 @@ def exchange(load: Load, duration: float, *, floor: bool = True) -> dict[str, An
             found['bridge'] = bridge.result()
             found['sleeper'] = sleeper.ask('errors')
             found['resident_mb'] = bridge.resident_mb()
+        if floor:
+            _run_floors(found, load, bus, 0.5 * duration)
     return found
+
+
+def _run_floors(found: dict[str, Any], load: Load, bus: Bus, duration: float) -> None:
+    """Let the bare loops run one after the other, and add up what they found."""
+    with TemporaryDirectory() as folder:
+        for name, script in FLOORS.items():
+            try:
+                words = [native.build(Path(folder))] if script == 'native.py' else []
+            except native.NotBuilt as error:
+                print(f'no floor in C: {error}', file=sys.stderr)
+                continue
+            with ExitStack() as stack:
+                loop = stack.enter_context(child(
+                    script, *words, name, bus.channel, load.drives, load.period,
+                    int(load.commands > 0.0)))
+                if load.commands:
+                    stack.enter_context(child(
+                        'publisher.py', 'commands', load.drives, load.commands, name))
+                loop.ask(f'run {SETTLE}')
+                result, before = loop.ask(f'run {duration}'), found.get(name)
+                found[name] = {key: value + before[key] for key, value in result.items()
+                               } if before else result
 
 
 def axes(load: Load, duration: float) -> dict[str, Any]:
@@ -561,7 +592,7 @@ def decode(frames: int) -> dict[str, dict[str, float]]:
     """Measure ``drive_can decode`` of a long trace: time, and memory beside a short one."""
     found: dict[str, dict[str, float]] = {}
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        folder = Path(stack.enter_context(TemporaryDirectory()))
         file = folder / 'bench.yaml'
         file.write_text('/**/drive_can_bridge: {ros__parameters: {buses: {main: {interface: '
                         'socketcan, channel: can0}}, drives: {drive0: {bus: main, protocol: '

@@ -1,13 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The topics of a drive of the benches, as the bridge has them."""
 
-import os
 from typing import Any
 
-# before rclpy is imported: nothing leaves this machine
-os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-os.environ.setdefault('ROS_DOMAIN_ID', '97')
-
+import child  # noqa: F401  sets the environment of rclpy
 from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
 from rclpy.node import Node
 from std_msgs.msg import Float64, Int64

@@ -67,7 +67,7 @@ def run(args: Namespace) -> int:
     """
     _check(args)
     try:
-        from drive_can_bridge.ros.client.client_node import ClientNode
+        from drive_can_bridge.ros.client.calls import ClientNode
         client_node = ClientNode('client')     # is being discovered while the rest is imported
         from drive_can_bridge.ros.client import control
         from drive_can_bridge.ros.client.search import Graph

@@ -37,7 +37,7 @@ from drive_can_bridge.core.sentences import no_answer_offline, no_result, Senten
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.exchange.listeners import DriveListener
+from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.exchange.one_master import Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 

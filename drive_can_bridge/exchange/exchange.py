@@ -10,14 +10,15 @@ in the thread that received it: a hop through an executor costs 50 µs and a qua
 
 The timer is a plain thread that sleeps until the earliest of its sessions' deadlines, which are
 absolute: it needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
-outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:mod:`.phases`).
+outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:func:`spread`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import chain, zip_longest
 import math
 import threading
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -25,14 +26,15 @@ from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.exchange.errand import Errand
-from drive_can_bridge.exchange.listeners import BusListener, DriveListener
-from drive_can_bridge.exchange.member import Member, STOP_MARGIN
-from drive_can_bridge.exchange.phases import spread
-from drive_can_bridge.exchange.router import Router
+from drive_can_bridge.exchange.member import BusListener, DriveListener, Member, STOP_MARGIN
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.link import Link
 
+Owner = TypeVar('Owner')
+#: s between two turns at least
+SLOT = 0.0015
+#: share of a period by which it may come before its time, where a thread is awake just then
+EARLY = 0.1
 #: the timer thread passes at least this often (s), so that a longer gap means lost time
 PASS_PERIOD = 0.25
 #: s without a pass after which nothing is believed any more: the process stood still
@@ -43,6 +45,125 @@ LATENESS_MAX = 0.25
 LOOK_PERIOD = 0.05
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
+
+
+class Router(Generic[Owner]):
+    """
+    Routes with masks, grouped by mask.
+
+    A bus has a handful of distinct masks at most, so that a frame costs one masked look-up per
+    mask however many drives there are.
+    """
+
+    def __init__(self) -> None:
+        self._tables: list[tuple[bool, int, dict[int, Owner]]] = []
+        self._hearers: dict[tuple[int, bool], list[Owner]] = {}
+
+    def add(self, routes: Iterable[Route], owner: Owner, overheard: Iterable[Route] = ()) -> None:
+        """
+        Send the frames of these routes to ``owner``.
+
+        :param overheard: what it is to hear of, too, as others may; of one identifier each.
+        """
+        for route in routes:
+            self._table(route.extended, route.mask)[route.identifier & route.mask] = owner
+        for route in overheard:
+            self._hearers.setdefault((route.identifier, route.extended), []).append(owner)
+
+    def hearers(self, frame: Frame) -> Sequence[Owner]:
+        """Return who is to hear of a frame that has no owner; it may be nobody."""
+        return self._hearers.get((frame[0], frame[2]), ())
+
+    def find(self, frame: Frame) -> Owner | None:
+        """Return the owner of a frame, or None."""
+        identifier, _, frame_extended = frame
+        for extended, mask, table in self._tables:
+            if extended == frame_extended:
+                owner = table.get(identifier & mask)
+                if owner is not None:
+                    return owner
+        return None
+
+    def _table(self, extended: bool, mask: int) -> dict[int, Owner]:
+        for known_extended, known_mask, table in self._tables:
+            if (known_extended, known_mask) == (extended, mask):
+                return table
+        table = {}
+        self._tables.append((extended, mask, table))
+        return table
+
+
+def spread(periods: Sequence[float]) -> list[float]:
+    """
+    Return for each drive when in its period its turn is, in s.
+
+    Drives that are all served at the same instant wait for each other: on the wire, where the
+    last of fifteen at 1 Mbit/s gets its request after two and its answer after four of five
+    milliseconds, and again in this process, where each answer is published before the next one is
+    looked at. So drives of the same period are spread over it; but no finer than ``SLOT``,
+    because every turn costs a wake-up, and five exchanges at 1 Mbit/s fill a slot
+    (docs/performance.md has what other slots cost).
+
+    Drives of a period are taken in the order given; as many of them as need be share a slot.
+    """
+    groups: dict[float, list[int]] = {}
+    for index, period in enumerate(periods):
+        groups.setdefault(period, []).append(index)
+    phases = [0.0] * len(periods)
+    for period, members in groups.items():
+        slots = max(1, min(len(members), int(period / SLOT + 1e-6)))
+        for place, index in enumerate(members):
+            phases[index] = place * slots // len(members) * period / slots
+    return phases
+
+
+class Errand:
+    """
+    Calls ``action`` with the time, once a period. No thread waits for another one's call.
+
+    A thread of its own costs a wake-up each time, asks for the interpreter beside threads that
+    need it, and finds its caches cold: together more than what it does. The timer threads of busy
+    buses are awake all the time, and those of idle ones have the time to wake up for it.
+
+    :param action: must not raise; whichever thread calls it has no lock of an exchange.
+    """
+
+    def __init__(self, action: Callable[[float], None]) -> None:
+        self._action = action
+        self._period = math.inf
+        self._due = math.inf
+        self._from = math.inf   # it may come a little before its time
+        self._taken = threading.Lock()
+
+    def begin(self, period: float, now: float) -> None:
+        """Have it done every ``period`` s from now on, for the first time after one."""
+        with self._taken:
+            self._period = period
+            self._plan(now + period)
+
+    def end(self) -> None:
+        """Have it done no more, and wait for a call that is under way."""
+        with self._taken:
+            self._due = self._from = math.inf
+
+    def run(self, now: float) -> float:
+        """Do it if it is due; return when to call next."""
+        if now < self._from:
+            return self._due
+        if not self._taken.acquire(blocking=False):     # another exchange is at it
+            return now + self._period
+        try:
+            if now >= self._from:
+                due = self._due + self._period
+                self._plan(due if due > now else now + self._period)    # never twice to catch up
+                self._action(now)
+            return self._due
+        finally:
+            self._taken.release()
+
+    def _plan(self, due: float) -> None:
+        self._due = due
+        self._from = due - EARLY * self._period
 
 
 class BusExchange:
@@ -355,3 +476,29 @@ class BusExchange:
         if self._note is not None:
             self._note(frame, now, True)
         return True
+
+
+def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
+    """
+    Stop the drives of every exchange that is active, or being stopped, and wait until it is done.
+
+    :return: why the stop frames could not all be sent, by name of the bus.
+    """
+    failures: dict[str, str] = {}
+
+    def stop(exchange: BusExchange) -> None:
+        try:
+            if exchange.deactivate():
+                return
+            reason = exchange.bus_reason or 'the bus blocks'
+        except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
+            reason = f'{type(error).__name__}: {error}'
+        failures[exchange.bus.name] = reason
+
+    threads = [clock.worker(partial(stop, exchange), f'stop {exchange.bus.name}')
+               for exchange in exchanges if exchange.active or not exchange.stopped]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return failures

@@ -8,7 +8,7 @@ takes frames without knowing who sent them: every family tells requests from res
 identifiers. Like sessions, observers have no clock: time is an argument, so that a trace of last
 week is read like the bus of this moment. Exchanges, misses and latencies are counted by the rules
 of the sessions, so that both can be compared: what waits for answers are the watches of
-:mod:`.watches`, of which an observer has those that its family needs.
+:mod:`.pairing`, of which an observer has those that its family needs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -20,18 +20,11 @@ from typing import NamedTuple, Protocol, TypeVar
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.protocols.telegrams import Direction
 
 T = TypeVar('T')
 KeyT = TypeVar('KeyT')
 Handler = Callable[[bytes, float], None]
-
-
-class Direction(Enum):
-    """Who speaks; the value is what a line of text shows."""
-
-    REQUEST = '>'
-    RESPONSE = '<'
-    NEITHER = '-'
 
 
 class Kind(Enum):
@@ -181,12 +174,19 @@ class DriveObserver:
             self.tell(now, direction, kind, title, verdict=Verdict.MALFORMED, remark=str(error))
             return None
 
-    def tell_unanswered(self, due: float, kind: Kind, title: str,
-                        parameters: Sequence[Parameter]) -> None:
-        """Tell that a request of this kind was not answered."""
-        self.observed.unanswered += kind is Kind.PARAMETER
-        self.tell(due, Direction.RESPONSE, kind, title, parameters, verdict=Verdict.LOST,
-                  remark='no answer')
+    def hear(self, identifier: int, direction: Direction, kind: Kind, title: str,
+             decode: Callable[[bytes], T], take: Callable[[T, float], None]) -> None:
+        """
+        Listen to frames with an identifier.
+
+        :param title: what one is called that makes no sense to ``decode``.
+        :param take: takes what the others mean, and their time.
+        """
+        def handler(data: bytes, now: float) -> None:
+            meaning = self.decoded(decode, data, now, direction, kind, title)
+            if meaning is not None:
+                take(meaning, now)
+        self.handlers[identifier] = handler
 
 
 def raws_of(parameters: Sequence[Parameter], words: Sequence[int]) -> list[int]:

@@ -1,10 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``/diagnostics``: one status per bus and per drive, in words that say what to do."""
+"""
+``/diagnostics``: one status per bus and per drive, in words that say what to do.
 
-from collections.abc import Callable
+Also drives that are not there: what is said of one, and who is missing a while after the start.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
 import threading
+import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -18,21 +23,96 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.words import counted, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.ros.absence import absence
-from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
+from drive_can_bridge.ros.commands import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.quality import publisher
+from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.middleware import publisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import with_outlook
 
+#: s after the activation that a drive may take to be seen
+GRACE = 5.0
+_NEVER = 'not seen since start: '
+#: what a session says while it looks for a drive: of what to correct at a first start, which this
+#: one has behind it
+_FIRST_START = frozenset((
+    'looked_for', 'maps_unread', 'cycles_unanswered', 'reads_unanswered', 'rounds_unanswered',
+    'silent', 'reconnected'))
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
 #: s for which a command that changed nothing is worth a warning
 COMMANDS_RECENT = 1.5
+
+
+def absence(drive: DriveNode) -> Sentence:
+    """Say of a drive that is offline since when, and what to do about it."""
+    session, exchange = drive.session, drive.exchange
+    what = session.offline_advice
+    if exchange.bus_state != 'up':      # which is told once, there
+        return (sentences.bus_of_drive_opening if exchange.bus_state == 'opening' else
+                sentences.bus_of_drive_down)(exchange.bus.name)
+    if not session.ever_online:
+        return sentences.never_seen(what)
+    since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))
+    if what.code in _FIRST_START:
+        what = drive.lost_for
+    return sentences.silent_since(since, what)
+
+
+class Attendance:
+    """
+    Says once, a while after each activation, which drives were never seen.
+
+    :param drives: of the bridge.
+    """
+
+    def __init__(self, log: Log, drives: Sequence[DriveNode], clock: Clock) -> None:
+        self._log = log
+        self._drives = drives
+        self._clock = clock
+        self._over = clock.alarm()
+        self._thread = clock.worker(self._run, 'attendance')
+
+    def begin(self) -> None:
+        """Look in a while."""
+        self._over = self._clock.alarm()
+        self._thread = self._clock.worker(self._run, 'attendance')
+        self._thread.start()
+
+    def end(self) -> None:
+        """Do not look any more; wait for a look that is under way."""
+        self._over.ring()
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            if not self._over.wait(self._clock.now() + GRACE):
+                self.look()
+        except Exception as error:  # noqa: BLE001  outermost of a thread: no failure is silent
+            self._log.error(f'attendance: {type(error).__name__}: {error}')
+
+    def look(self) -> None:
+        """Say who is missing."""
+        missing = [drive for drive in self._drives if _never_seen(drive)]
+        if not missing:
+            return
+        for drive in missing:
+            with drive.exchange.lock:
+                text = absence(drive)
+            self._log.speaker(drive.name).warning(f'{_NEVER}{text.removeprefix(_NEVER)}')
+        online = sum(drive.session.online for drive in self._drives)
+        self._log.warning(f'{online} of {counted(len(self._drives), "drive", "drives")} online; '
+                          f'not seen: {", ".join(drive.name for drive in missing)}')
+
+
+def _never_seen(drive: DriveNode) -> bool:
+    session = drive.session
+    return (session.active and not session.ever_online and not session.defect
+            and session.state is DriveState.OFFLINE)
 
 
 @dataclass

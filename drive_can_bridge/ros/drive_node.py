@@ -23,34 +23,31 @@ from drive_can_bridge.core.events import (
     MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
     StationLost,
 )
-from drive_can_bridge.core.requests import (
-    Failure, ReadRequest, Request,
-)
+from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
 from drive_can_bridge.core.sentences import answer_late, bridge_inactive, NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.exchange.listeners import DriveListener
+from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
-from drive_can_bridge.ros.coroutine_services import (
-    control_services, CoroutineServices, Question,
-)
-from drive_can_bridge.ros.event_topic import RequestTopic
-from drive_can_bridge.ros.executor_thread import ExecutorThread
-from drive_can_bridge.ros.gone import GONE
-from drive_can_bridge.ros.identity import IdentityReader
 from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.middleware import GONE, latched_quality, publisher, quality_overrides
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
-from drive_can_bridge.ros.quality import latched_quality, publisher, quality_overrides
-from drive_can_bridge.ros.samples import SamplePublisher
-from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
+from drive_can_bridge.ros.service_thread import (
+    control_services, CoroutineServices, Question, ServiceThread,
+)
 from drive_can_bridge.ros.stamps import Stamps
-
+from drive_can_bridge.ros.threads import ExecutorThread
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]
+#: reads in a row that failed, after which the drive is left alone
+FAILURES_MAX = 2
 
 
 class DriveNode(DriveListener):
@@ -307,3 +304,61 @@ class DriveNode(DriveListener):
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
+
+
+class IdentityReader:
+    """
+    Asks, and puts the answers into words. In the executor's thread.
+
+    They are read once whenever the drive comes online, one after the other, by requests like
+    those of any user: each waits its turn, so that neither cycles nor users are held up by more
+    than one read. What could not be read is left out of the text, and tried again when the drive
+    comes online the next time; a drive that answers none of them is not asked for all.
+
+    :param submit: hands a request to the drive's session, and calls back with its outcomes.
+    :param online: tells whether the drive is; it is asked nothing otherwise.
+    :param tell: takes the text, ``firmware=10205 serial_number=4711``; '' while it is not known.
+    :param warn: takes what could not be read, in words.
+    """
+
+    def __init__(self, profile: Profile, *,
+                 submit: Callable[[ReadRequest, Callable[[tuple[Outcome, ...]], None]], None],
+                 online: Callable[[], bool], tell: Callable[[str], None],
+                 warn: Callable[[str], None]) -> None:
+        self._parameters = tuple(profile.parameters[name] for name in profile.identity)
+        self._submit = submit
+        self._online = online
+        self._tell = tell
+        self._warn = warn
+        self._attempt = 0
+        self._known: list[str] = []
+        self._failures = 0
+
+    def read(self) -> None:
+        """Ask the drive. Whatever was known is not: it may be another one now."""
+        self._attempt += 1
+        self._known.clear()
+        self._failures = 0
+        if self._parameters:
+            self._tell('')
+            self._ask(self._attempt, 0)
+
+    def _ask(self, attempt: int, place: int) -> None:
+        self._submit(ReadRequest((self._parameters[place],)),
+                     partial(self._take, attempt, place))
+
+    def _take(self, attempt: int, place: int, outcomes: tuple[Outcome, ...]) -> None:
+        if attempt != self._attempt or not self._online():
+            return  # the next time that it comes online, all of this begins anew
+        parameter, outcome = self._parameters[place], outcomes[0]
+        if isinstance(outcome, ReadValue):
+            self._failures = 0
+            value = value_text(parameter.value_from_raw(outcome.raw))
+            self._known.append(f'{parameter.name}={value}')
+        elif isinstance(outcome, Failure):
+            self._failures += 1
+            self._warn(f'identity: {parameter.name} ({parameter.address}): {outcome.reason}')
+        if place + 1 < len(self._parameters) and self._failures < FAILURES_MAX:
+            self._ask(attempt, place + 1)
+        else:
+            self._tell(' '.join(self._known))

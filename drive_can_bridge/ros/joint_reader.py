@@ -5,8 +5,8 @@ JointState messages, read from their bytes.
 Who commands joints names the same ones each time. To make an object of a message, with a string
 for each name, costs more than all that is done with its numbers. So the bytes between the numbers
 are compared with those of the message before, and only the numbers are read; where they stand is
-found as for messages that are published (:mod:`.layout`), and tried on a message that was read the
-ordinary way.
+found as for messages that are published (:mod:`.prepared`), and tried on a message that was read
+the ordinary way.
 """
 
 from array import array
@@ -20,8 +20,8 @@ from typing import NamedTuple
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from drive_can_bridge.ros.command_topic import HEADER
-from drive_can_bridge.ros.layout import find_layout, Layout, Number
+from drive_can_bridge.ros.polled_topics import HEADER
+from drive_can_bridge.ros.prepared import find_layout, Layout, Number
 
 #: what a JointState carries beside names
 QUANTITIES = ('position', 'velocity', 'effort')

@@ -5,7 +5,7 @@ All joints of a bridge in one message: ``~/joint_states`` and ``~/joint_commands
 Drives answer one after the other, each with a stamp of its own; what reads joints wants all of
 them in one message (the hardware interface of ros2_control keeps the latest message only). So at a
 rate of its own the newest sample of each is taken together, under the stamp of the oldest; by the
-timer thread of an exchange, which is awake in any case (:mod:`~drive_can_bridge.exchange.errand`).
+timer thread of an exchange, which is awake in any case (``exchange.Errand``).
 
 It always names the same joints: the hardware interface copies a message while it reads the one
 before, and fails when the number of names has changed. A joint whose drive is not online has NaN
@@ -28,16 +28,14 @@ from sensor_msgs.msg import JointState
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, JointConfiguration
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.exchange.errand import Errand
+from drive_can_bridge.exchange.exchange import Errand
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.gone import GONE
 from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader, QUANTITIES
-from drive_can_bridge.ros.layout import Number
 from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.middleware import Audience, GONE, publisher, state_quality
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
-from drive_can_bridge.ros.prepared import PreparedMessage
-from drive_can_bridge.ros.quality import Audience, publisher, state_quality
+from drive_can_bridge.ros.prepared import Number, PreparedMessage
 from drive_can_bridge.ros.stamps import NO_STAMP, Stamps
 
 STATES = '~/joint_states'

@@ -5,22 +5,301 @@ The log of the bridge, written by a thread of its own.
 A line costs tens of microseconds at best, and whatever the file of the log and its subscribers
 take at worst. Most of what there is to say is found out with a bus lock held. So one that has a
 line puts it into a bounded queue and goes on; what does not fit is counted and said later. How
-much drives and buses may say is limited before (:mod:`.log_limit`).
+much drives and buses may say is limited before (:class:`LogLimit`).
+
+A status bit that flips in every cycle is news a hundred times a second. The first few times a line
+is written at once and as it is; from then on it is held, and summed up once in a while, with how
+often it came and when it came last. Nothing is lost in silence: what differs is a line of its own,
+what was held is written in the end, in the order in which it came last, and whatever could not
+even be held is counted.
+
+============== ======================================================================
+of one line    :data:`FEW` times at once (a topic: once), then a summary every
+               :data:`SUM_UP` s; after :data:`QUIET` s without it, it is news again
+of a speaker   :data:`BURST` different lines at once, then :data:`RATE` a second
+of all         :data:`BURST_OF_ALL` at once, then :data:`RATE_OF_ALL` a second
+============== ======================================================================
+
+Errors, and warnings that tell of a danger, wait for nobody else: they have an allowance of their
+own, as large as the first one, and none in common with other speakers.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
 import math
+import threading
 from typing import Any
 
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.standard_outputs import MOMENT, Taking
-from drive_can_bridge.ros.log_limit import Level, LogLimit, Speaker
 
+#: times that a line is written at once before it is summed up
+FEW = 5
+#: s between two summaries of a speaker
+SUM_UP = 10.0
+#: s without a line after which it is news again
+QUIET = 5.0
+#: different lines of a speaker: so many at once, and so many per second
+BURST, RATE = 100, 1.0
+#: the same for all speakers together
+BURST_OF_ALL, RATE_OF_ALL = 500, 20.0
+#: lines of a speaker that are remembered
+TOPICS_MAX = 256
 #: lines that may wait
 LINES_MAX = 1000
 
+
+class Level(Enum):
+    """How much a line matters."""
+
+    INFO = 'info'
+    WARNING = 'warning'
+    ERROR = 'error'
+    FATAL = 'fatal'
+
+
 #: in the queue: the thread has to look what there is to be summed up, or to end
 _LOOK, _END = (Level.INFO, 'look'), (Level.INFO, 'end')
+
+
+class _Allowance:
+    """So many at once, and then so many per second."""
+
+    def __init__(self, size: int, rate: float) -> None:
+        self._size, self._rate = float(size), rate
+        self._left, self._at = self._size, -math.inf
+
+    def wait(self, now: float) -> float:
+        """Return the s until there is one."""
+        self._left = min(self._size, self._left + (now - self._at) * self._rate)
+        self._at = now
+        return max(0.0, (1.0 - self._left) / self._rate)
+
+    def take(self) -> None:
+        """Take the one for which :meth:`wait` has just returned 0."""
+        self._left -= 1.0
+
+
+@dataclass(slots=True)
+class _Topic:
+    """
+    What became of one line, or of all lines of one topic.
+
+    :ivar written: how often, at once, since it was news.
+    :ivar era: of the speaker, when it was written last; ``in_era``: how often in that.
+    :ivar held: how often it came since it was written; ``since`` when for the first time.
+    """
+
+    level: Level
+    text: str
+    urgent: bool
+    exact: bool
+    seen_at: float
+    era: int
+    in_era: int = 0
+    written: int = 0
+    held: int = 0
+    since: float = 0.0
+
+    def summary(self, now: float) -> str:
+        """Say how often it came, and when last."""
+        held, ago = self.held, now - self.seen_at
+        last = f'{ago:.0f} s ago' if ago >= 1.0 else ''
+        span = f'in {max(1.0, now - self.since):.0f} s'
+        if self.exact and (self.written or held > 1):
+            more = ' more' if self.written else ''
+            told = f'{held}{more} {"time" if held == 1 else "times"} {span}'
+        elif held > 1:
+            told = f'and {held - 1} more like it {span}'
+        else:
+            return f'{self.text} ({last})' if last else self.text
+        return f'{self.text} ({told}, the last {last})' if last else f'{self.text} ({told})'
+
+
+class Speaker:
+    """
+    One drive, one bus: a source of lines of the log.
+
+    :param name: stands before each line; '': nothing does.
+    """
+
+    def __init__(self, name: str, limit: 'LogLimit') -> None:
+        self._prefix = f'{name}: ' if name else ''
+        self._limit = limit
+        self._topics: dict[str, _Topic] = {}    # the one that came last at the end
+        self._own, self._urgent = _Allowance(BURST, RATE), _Allowance(BURST, RATE)
+        self._era = 0
+        self._left_out = 0
+        #: when what is held is to be summed up
+        self.due = math.inf
+
+    def info(self, text: str) -> None:
+        """Log what is as it should be."""
+        self._say(Level.INFO, text)
+
+    def warning(self, text: str, *, urgent: bool = False) -> None:
+        """
+        Log what somebody should look at.
+
+        :param urgent: it tells of a danger.
+        """
+        self._say(Level.WARNING, text, urgent=urgent)
+
+    def error(self, text: str) -> None:
+        """Log what does not work."""
+        self._say(Level.ERROR, text, urgent=True)
+
+    def warn(self, topic: str, text: str, *, once: bool = False) -> None:
+        """
+        Log a warning whose text may vary; what repeats is counted, and the newest text told.
+
+        :param once: repetitions are not logged at all, until :meth:`reset`.
+        """
+        self._say(Level.WARNING, text, topic=topic, once=once)
+
+    def reset(self) -> None:
+        """Begin anew: the next warning of each topic is news."""
+        with self._limit.lock:
+            self._era += 1
+
+    def sum_up(self, now: float, *, all_of_it: bool = False) -> None:
+        """
+        Write what was held, as far as there is an allowance for it. The lock must be held.
+
+        :param all_of_it: whether there is or not.
+        """
+        self.due = math.inf
+        summed_up = newest = None
+        for newest in self._topics.values():
+            if newest.held:
+                wait = 0.0 if all_of_it else self._wait(newest.urgent, now)
+                if wait > 0.0:
+                    self.due = now + wait
+                    return
+                self._sum_up(newest, now)
+                summed_up = newest
+        if self._left_out:
+            self._emit(Level.WARNING, f'{self._left_out} more lines left out: too many different '
+                                      f'ones at once')
+            self._left_out = 0
+        if summed_up is not None and newest is not None and summed_up is not newest:
+            # written before all this, which was over by then: how it is now stands last
+            ago = now - newest.seen_at
+            self._emit(newest.level, f'{newest.text} (this came last, {ago:.0f} s ago)')
+
+    def _say(self, level: Level, text: str, *, topic: str = '', once: bool = False,
+             urgent: bool = False) -> None:
+        limit = self._limit
+        with limit.lock:
+            if limit.over:
+                self._emit(level, text)
+                return
+            now = limit.clock()
+            known = self._topics.pop(topic or text, None)
+            if known is None:
+                known = _Topic(level, text, urgent, not topic, now, self._era)
+            elif once and known.written and known.era == self._era:
+                self._topics[topic] = known
+                return
+            quiet = now - known.seen_at >= QUIET
+            anew = known.era != self._era
+            written = 0 if quiet else known.written
+            if quiet or anew:
+                known.era, known.in_era = self._era, 0
+            self._topics[topic or text] = known
+            few = 1 if topic else FEW
+            if ((not known.held or quiet or anew and topic)
+                    and written < FEW and known.in_era < few
+                    and self._wait(urgent, now) <= 0.0):
+                if known.held:
+                    self._sum_up(known, now)
+                known.written = written + 1
+                known.in_era += 1
+                self._emit(level, text)
+            else:
+                self._hold(known, now)
+            known.level, known.text, known.seen_at = level, text, now
+            if len(self._topics) > TOPICS_MAX:
+                self._make_room(now)
+
+    def _make_room(self, now: float) -> None:
+        """Forget the line that has not come for the longest time."""
+        oldest = self._topics.pop(next(iter(self._topics)))
+        if oldest.held and oldest.urgent and self._wait(True, now) <= 0.0:
+            self._sum_up(oldest, now)   # whatever flood drives it out
+        else:
+            self._left_out += oldest.held
+
+    def _hold(self, topic: _Topic, now: float) -> None:
+        if not topic.held:
+            topic.since = now
+        topic.held += 1
+        if self.due == math.inf:
+            self.due = now + SUM_UP
+            self._limit.wake()
+
+    def _wait(self, urgent: bool, now: float) -> float:
+        """Take the allowance for a line, or return the s until there is one."""
+        allowances = (self._urgent,) if urgent else (self._own, self._limit.of_all)
+        wait = max(allowance.wait(now) for allowance in allowances)
+        if wait <= 0.0:
+            for allowance in allowances:
+                allowance.take()
+        return wait
+
+    def _sum_up(self, topic: _Topic, now: float) -> None:
+        self._emit(topic.level, topic.summary(now))
+        topic.written = max(topic.written, 1)
+        topic.held = 0
+
+    def _emit(self, level: Level, text: str) -> None:
+        self._limit.emit(level, f'{self._prefix}{text}')
+
+
+class LogLimit:
+    """
+    All speakers of a log. From any thread; nobody waits for anything but another short line.
+
+    :param emit: writes a line; must not wait.
+    :param wake: is called when :meth:`wait` has become shorter; must not wait either.
+    :param clock: steady, in s.
+    """
+
+    def __init__(self, emit: Callable[[Level, str], None], wake: Callable[[], None],
+                 clock: Callable[[], float]) -> None:
+        self.emit, self.wake, self.clock = emit, wake, clock
+        self.lock = threading.RLock()
+        #: nobody will sum up anything any more: everything is written
+        self.over = False
+        self.of_all = _Allowance(BURST_OF_ALL, RATE_OF_ALL)
+        self._speakers: dict[str, Speaker] = {}
+
+    def speaker(self, name: str) -> Speaker:
+        """Return the one of this name, always the same."""
+        with self.lock:
+            if name not in self._speakers:
+                self._speakers[name] = Speaker(name, self)
+            return self._speakers[name]
+
+    def wait(self) -> float | None:
+        """Return the s until :meth:`sum_up` has something to do; None: it has nothing to do."""
+        with self.lock:
+            due = min((speaker.due for speaker in self._speakers.values()), default=math.inf)
+            return None if due == math.inf else max(0.0, due - self.clock())
+
+    def sum_up(self, *, all_of_it: bool = False) -> None:
+        """
+        Write what was held long enough.
+
+        :param all_of_it: everything that is held, because nobody will call any more.
+        """
+        with self.lock:
+            now, self.over = self.clock(), self.over or all_of_it
+            for speaker in sorted(self._speakers.values(), key=lambda each: each.due):
+                if all_of_it or speaker.due <= now:
+                    speaker.sum_up(now, all_of_it=all_of_it)
 
 
 class Log:

@@ -69,7 +69,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from drive_can_bridge.ros.middleware import begin_with_small_histories
+    from drive_can_bridge.ros.middleware import set_up_fast_dds
 
     try:
         with _quiet_rcl():
@@ -84,7 +84,7 @@ def _main(watcher: SignalWatcher, arguments: list[str]) -> int:
         print(f'drive_can_bridge: {rest[0]}: only ROS arguments are taken '
               f'(drive_can_bridge --ros-args --params-file FILE)', file=sys.stderr)
         return 2
-    begin_with_small_histories()
+    set_up_fast_dds()
     try:
         with _quiet_rcl():
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -108,7 +108,7 @@ def _run(watcher: SignalWatcher, arguments: Sequence[str]) -> int:
 
     from drive_can_bridge.clock import SteadyClock
     from drive_can_bridge.ros.bridge_node import BridgeNode
-    from drive_can_bridge.ros.executor_thread import ExecutorThread
+    from drive_can_bridge.ros.threads import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
 
     clock = SteadyClock()

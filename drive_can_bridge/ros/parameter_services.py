@@ -4,7 +4,7 @@ A drive's parameters as the parameters of its node.
 
 The six standard services, so that ``ros2 param`` and rqt_reconfigure work on a drive. Reading and
 writing goes over acyclic frames: the callbacks are coroutines, which wait for the session's answer
-without holding up anybody (:mod:`.coroutine_services`).
+without holding up anybody (:mod:`.service_thread`).
 """
 
 from collections.abc import Callable, Sequence
@@ -26,16 +26,14 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, ReadRequest, ReadValue,
-    Request, WriteRequest, Written,
+    Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.sentences import bridge_inactive, Sentence
 from drive_can_bridge.core.text import printable, TEXT_MAX
-from drive_can_bridge.ros.coroutine_services import CoroutineServices, Question
-from drive_can_bridge.ros.log_limit import BURST
+from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
-from drive_can_bridge.ros.service_thread import ServiceThread
+from drive_can_bridge.ros.service_thread import CoroutineServices, Question, ServiceThread
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 

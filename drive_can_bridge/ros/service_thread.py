@@ -8,20 +8,29 @@ thousand parameters is served before the one who wants a stop. So services of dr
 by threads that have nothing else to do, straight from a wait set of their own; those that stop
 machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
 halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
+
+Callbacks that are coroutines wait for answers without an executor, too: one thread begins a
+coroutine, the one that answers goes on with it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Generator, Mapping
 from contextlib import ExitStack
 from functools import partial
-from typing import Any
+import threading
+from typing import Any, Generic, TypeVar
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
+from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
-from drive_can_bridge.ros.gone import GONE
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.ros.middleware import GONE
+from drive_can_bridge.ros.polled_topics import PolledGroup
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
@@ -36,6 +45,9 @@ Answer = Callable[[Any], None]
 Callback = Callable[[Any, Answer], None]
 #: takes service, response and the header of the request
 Send = Callable[[Service, Any, Any], None]
+AnswerT = TypeVar('AnswerT')
+#: takes request and response, and returns the response
+Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]
 
 
 class Pace:
@@ -226,3 +238,108 @@ class ServiceThread:
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._report(f'internal error in an answer: {type(error).__name__}: {error}')
         return True
+
+
+class Question(Generic[AnswerT]):
+    """
+    What such a coroutine awaits: something that is asked when it is awaited.
+
+    :param ask: takes what is to be called with the answer, once, from any thread, or at once.
+    """
+
+    __slots__ = ('ask',)
+
+    def __init__(self, ask: Callable[[Callable[[AnswerT], None]], None]) -> None:
+        self.ask = ask
+
+    def __await__(self) -> Generator[Any, AnswerT, AnswerT]:
+        return (yield self)
+
+
+class CoroutineServices:
+    """
+    Such services of one node. No two of their coroutines run at the same time.
+
+    :param callbacks: by name, with the type of the service.
+    :ivar calls: how many callers wait for their answer.
+    """
+
+    def __init__(self, node: Node, thread: ServiceThread,
+                 callbacks: Mapping[str, tuple[Any, Serve]]) -> None:
+        self._thread = thread
+        self.calls = 0
+        self._counting = threading.Lock()
+        self._running = threading.Lock()
+        self._services: dict[Service, Callback] = {
+            node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
+                                qos_profile=qos_profile_parameters):
+            partial(self._begin, callback, kind.Response)
+            for name, (kind, callback) in callbacks.items()}
+
+    def serve(self) -> None:
+        """Begin to serve."""
+        for service, callback in self._services.items():
+            self._thread.serve(service, callback, self._ended)
+
+    def destroy(self) -> None:
+        """Let go of the services. Before the node is destroyed."""
+        self._thread.forget(list(self._services))
+
+    def _begin(self, callback: Serve, response: Callable[[], Any], request: Any,
+               answer: Answer) -> None:
+        with self._counting:
+            self.calls += 1
+        self._go_on(callback(request, response()), answer, None)
+
+    def _go_on(self, coroutine: Coroutine[Any, Any, Any], answer: Answer, found: Any) -> None:
+        """Run a coroutine until it asks something, or to its end."""
+        try:
+            with self._running:
+                question: Question[Any] = coroutine.send(found)
+            question.ask(lambda what: self._thread.later(
+                partial(self._go_on, coroutine, answer, what)))
+        except StopIteration as end:
+            answer(end.value)
+        except BaseException:
+            coroutine.close()
+            self._ended()
+            raise
+
+    def _ended(self) -> None:
+        """Record that one caller less waits: it was answered, or nothing comes of it."""
+        with self._counting:
+            self.calls -= 1
+
+
+def _never(_: Any, response: Any) -> Any:
+    raise RuntimeError('such services are taken by a thread of their own')
+
+
+#: hands a request to the session; answered by its outcome
+Submit = Callable[[ControlRequest], Question[ControlCompleted]]
+
+
+def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
+                     controlled: bool, homing: bool = False) -> CoroutineServices:
+    """
+    Return the control services of a drive.
+
+    :param thread: serves them, and those of other drives, but nothing else.
+    :param controlled: it has a control word.
+    :param homing: it can be asked to look for its reference.
+    """
+    def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
+        async def callback(request: Any, response: Any) -> Any:
+            outcome = await submit(ControlRequest(wanted(request)))
+            response.success, response.message = outcome.success, outcome.message
+            return response
+        return callback
+    services: dict[str, tuple[type, Serve]] = {
+        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))}
+    if controlled:
+        services['enable'] = SetBool, serving(
+            lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
+        services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
+    if homing:
+        services['home'] = Trigger, serving(lambda _: ControlAction.HOME)
+    return CoroutineServices(node, thread, services)

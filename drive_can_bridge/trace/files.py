@@ -25,7 +25,7 @@ import can
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.trace import candump
-from drive_can_bridge.transport.messages import message_of, record_of
+from drive_can_bridge.transport.tap import message_of, record_of
 
 
 def labels(buses: Iterable[BusConfiguration]) -> dict[str, str]:

@@ -22,7 +22,8 @@ import math
 from typing import Any
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.observer import Direction, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 
 #: digits behind the point that a scale may ask for
 _DIGITS_MAX = 6

@@ -11,7 +11,8 @@ from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfig
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.observer import Direction, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Telegram, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 
 #: shortest stretch of time of a curve in s, and how many there are at most: a picture has fewer
 #: columns of pixels

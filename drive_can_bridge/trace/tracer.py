@@ -17,8 +17,9 @@ from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import column_lines, printable
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Handler, Kind, Observed, Telegram, Verdict,
+    DriveObserver, Handler, Kind, Observed, Telegram, Verdict,
 )
+from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.trace.files import Channels
 from drive_can_bridge.transport.error_frames import decode_error_frame
 

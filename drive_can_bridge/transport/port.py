@@ -23,9 +23,7 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
-from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.adapters import check_channel
-from drive_can_bridge.transport.device_lock import DeviceLock
 from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
@@ -33,8 +31,12 @@ from drive_can_bridge.transport.error_frames import (
 from drive_can_bridge.transport.failures import (
     in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause,
 )
-from drive_can_bridge.transport.places import adapter_of, device_of, is_absent, SERIAL_INTERFACES
-from drive_can_bridge.transport.serial_writer import announcing, SerialWriter, watched
+from drive_can_bridge.transport.places import (
+    adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES,
+)
+from drive_can_bridge.transport.serial_writer import (
+    AdapterAnswers, announcing, SerialWriter, watched,
+)
 
 # A frame's own time stamp is believed if it is that much older than now at most, or if the frame
 # may have waited for so long: adapters that count from power-up, and clocks that were set, fall

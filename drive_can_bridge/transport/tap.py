@@ -13,9 +13,8 @@ import can
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.transport.failures import gone, in_words, with_outlook
-from drive_can_bridge.transport.messages import record_of
 from drive_can_bridge.transport.places import adapter_of, is_absent
 from drive_can_bridge.transport.port import open_port, Port
 
@@ -25,6 +24,29 @@ QUEUE_MAX = 200_000
 _PATIENCE = 0.05
 #: s by which a stamp may differ from now to be believed: machines stand still for some of them
 _STAMP_AGE_MAX = 10.0
+
+
+def record_of(message: can.Message, channel: str | int) -> Record:
+    """Return a message as an entry of a trace."""
+    kind = RecordKind.DATA
+    if message.is_error_frame:
+        kind = RecordKind.ERROR
+    elif message.is_remote_frame:
+        kind = RecordKind.REMOTE
+    elif message.is_fd:
+        kind = RecordKind.FD
+    return Record(message.timestamp, channel, message.arbitration_id, bytes(message.data),
+                  message.is_extended_id, kind, not message.is_rx)
+
+
+def message_of(record: Record, channel: int) -> can.Message:
+    """Return an entry as a message; formats number the buses."""
+    kind = record.kind
+    return can.Message(
+        timestamp=record.time, arbitration_id=record.identifier, data=record.data,
+        is_extended_id=record.extended, is_error_frame=kind is RecordKind.ERROR,
+        is_remote_frame=kind is RecordKind.REMOTE, is_fd=kind is RecordKind.FD,
+        is_rx=not record.sent, channel=channel)
 
 
 class Tap:

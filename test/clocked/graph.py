@@ -588,7 +588,7 @@ class Service(Entity):
 
 
 class Responses:
-    """Sends answers in place of :class:`drive_can_bridge.ros.rcl_response.RclResponses`."""
+    """Sends answers in place of :class:`drive_can_bridge.ros.answers.RclResponses`."""
 
     def prepare(self, service: Any, message: Any, header: Any) -> Any:
         """Make an answer ready."""

@@ -4,7 +4,7 @@
 import math
 import threading
 
-from drive_can_bridge.exchange.errand import Errand
+from drive_can_bridge.exchange.exchange import Errand
 
 
 def test_once_a_period_and_a_little_early_where_a_thread_is_awake() -> None:
@@ -19,6 +19,15 @@ def test_once_a_period_and_a_little_early_where_a_thread_is_awake() -> None:
     assert errand.run(11.5) == 12.0
     assert errand.run(12.3) == 13.0
     assert done == [10.95, 12.3]
+
+
+def test_it_is_due_at_the_moment_from_which_it_may_come() -> None:
+    done: list[float] = []
+    errand = Errand(done.append)
+    errand.begin(2.0, now=0.0)
+    assert errand.run(1.75) == 2.0
+    assert errand.run(1.8) == 4.0       # a tenth of a period early
+    assert done == [1.8]
 
 
 def test_what_was_missed_is_left_out() -> None:

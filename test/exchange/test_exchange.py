@@ -3,9 +3,7 @@
 
 import time
 
-from builders import (
-    CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write,
-)
+from builders import CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write
 from clocks import HandClock, REAL
 from exchange_builders import all_routes, Bench, BusNotes
 from jumping import JumpingClock
@@ -21,8 +19,7 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
-from drive_can_bridge.exchange.exchange import BusExchange, LOOK_PERIOD, PASS_PERIOD
-from drive_can_bridge.exchange.stop import stop_all
+from drive_can_bridge.exchange.exchange import BusExchange, LOOK_PERIOD, PASS_PERIOD, stop_all
 
 ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'

@@ -5,7 +5,7 @@ from builders import drive
 from exchange_builders import Bench
 import pytest
 
-from drive_can_bridge.exchange.phases import spread
+from drive_can_bridge.exchange.exchange import spread
 
 
 def test_one_drive_has_the_bus_for_itself() -> None:
@@ -17,11 +17,10 @@ def test_drives_are_spread_over_their_period() -> None:
 
 
 def test_no_finer_than_a_slot() -> None:
-    # fifteen drives every 5 ms: five slots of three
+    # fifteen drives every 5 ms: three slots of five
     phases = spread([0.005] * 15)
-    assert phases == pytest.approx(
-        [0.0] * 3 + [0.001] * 3 + [0.002] * 3 + [0.003] * 3 + [0.004] * 3)
-    assert len(set(phases)) == 5  # equal ones exactly: they are served together
+    assert phases == pytest.approx([0.0] * 5 + [0.005 / 3] * 5 + [0.01 / 3] * 5)
+    assert len(set(phases)) == 3  # equal ones exactly: they are served together
 
 
 def test_each_period_for_itself() -> None:

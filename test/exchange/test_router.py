@@ -5,7 +5,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.exchange.router import Router
+from drive_can_bridge.exchange.exchange import Router
 
 ROUTES = {
     'one': [Route(0x00200000, 0x0FE00000, True)],

@@ -13,7 +13,7 @@ pytest.importorskip('rclpy')
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.ros.absence import absence, Attendance
+from drive_can_bridge.ros.diagnostics import absence, Attendance
 
 
 def drive(name: str = 'lift', **changes: Any) -> Any:

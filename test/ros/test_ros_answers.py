@@ -18,10 +18,11 @@ from std_srvs.srv import Trigger
 from waiting import clock
 from world import World
 
-from drive_can_bridge.ros import answers as answers_module, rcl_response
-from drive_can_bridge.ros.answers import Answers, WAITING_MAX
+from drive_can_bridge.ros import answers as answers_module
+from drive_can_bridge.ros.answers import (
+    Answers, RclResponses, Response, Unfit, Unreachable, WAITING_MAX,
+)
 from drive_can_bridge.ros.polled_topics import PolledGroup
-from drive_can_bridge.ros.rcl_response import RclResponses, Response, Unfit, Unreachable
 from drive_can_bridge.ros.service_thread import ServiceThread
 
 #: what DDS does (test/real.py)
@@ -198,32 +199,32 @@ def _caller(client: Client, _client_context: ClientContext, answers: Answers) ->
 
 
 def _other_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response, '_HEAD', rcl_response._HEAD + 8)
+    monkeypatch.setattr(answers_module, '_HEAD', answers_module._HEAD + 8)
 
 
 def _no_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response, '_HEAD', 0)
+    monkeypatch.setattr(answers_module, '_HEAD', 0)
 
 
 def _too_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response, '_HEAD', 1 << 40)
+    monkeypatch.setattr(answers_module, '_HEAD', 1 << 40)
 
 
 def _other_fields(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response, '_INFO', struct.Struct('qqq16s'))
+    monkeypatch.setattr(answers_module, '_INFO', struct.Struct('qqq16s'))
 
 
 def _no_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response.rclpy_implementation, '__file__', '/no/such.so')
+    monkeypatch.setattr(answers_module.rclpy_implementation, '__file__', '/no/such.so')
 
 
 def _no_function(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_response.rclpy_implementation, '__file__', 'libc.so.6')
+    monkeypatch.setattr(answers_module.rclpy_implementation, '__file__', 'libc.so.6')
 
 
 def _no_capsule(monkeypatch: pytest.MonkeyPatch) -> None:
-    functions = rcl_response._functions_of
-    monkeypatch.setattr(rcl_response, '_functions_of', lambda kind: functions(int))
+    functions = answers_module._functions_of
+    monkeypatch.setattr(answers_module, '_functions_of', lambda kind: functions(int))
 
 
 @REAL_DDS

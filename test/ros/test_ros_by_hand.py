@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from drive_can_bridge.cli import control
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.process.locks import bridges, Presence
-from drive_can_bridge.ros.client import client_node
+from drive_can_bridge.ros.client import calls
 
 HOIST = {**LIFT, 'station': 3}
 Run = Callable[..., tuple[int, list[str], str]]
@@ -42,7 +42,7 @@ def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nobody look for a bridge."""
     def look(*_: Any) -> None:
         raise AssertionError('looked for a bridge')
-    monkeypatch.setattr(client_node.ClientNode, '__init__', look)
+    monkeypatch.setattr(calls.ClientNode, '__init__', look)
 
 
 def states(bridge: Any, *names: str) -> list[str]:

@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 from waiting import clock
 
-from drive_can_bridge.ros.command_topic import CommandTopic
+from drive_can_bridge.ros.polled_topics import CommandTopic
 
 MS = 1_000_000
 

@@ -14,9 +14,10 @@ from std_srvs.srv import Trigger
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, Noted, StationFound, StationLost
-from drive_can_bridge.protocols.observer import Direction, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.ros.diagnostics import Report
-from drive_can_bridge.ros.flight_watch import Occasions
+from drive_can_bridge.ros.fleet import Occasions
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.tracer import Tracer
 

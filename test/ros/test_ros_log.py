@@ -12,7 +12,7 @@ import pytest
 from rclpy.logging import get_logging_directory
 from waiting import wait_for
 
-from drive_can_bridge.ros import log_limit
+from drive_can_bridge.ros import log as log_module
 from drive_can_bridge.ros.log import LINES_MAX, Log
 
 
@@ -87,7 +87,7 @@ def test_the_end_does_not_wait_for_ever() -> None:
 
 
 def test_its_thread_sums_up_what_repeats_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_limit, 'SUM_UP', 0.05)
+    monkeypatch.setattr(log_module, 'SUM_UP', 0.05)
     logger = Logger()
     log = Log(logger, REAL)
     for _ in range(500):

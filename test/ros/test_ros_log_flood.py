@@ -6,14 +6,14 @@ from clients import Client, WARN
 import pytest
 
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
-from drive_can_bridge.ros import log_limit
+from drive_can_bridge.ros import log as log_module
 
 FLIPS = 400
 
 
 def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_limit, 'SUM_UP', 1.0)
+    monkeypatch.setattr(log_module, 'SUM_UP', 1.0)
     # nobody answers, so that nothing is told but what is told here
     one = bridge(parameters(lift={**LIFT, 'parameter_timeout': 60.0}), simulated=False)
     client.listen()

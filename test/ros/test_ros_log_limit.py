@@ -5,7 +5,7 @@ import re
 
 from hypothesis import given, settings, strategies as st
 
-from drive_can_bridge.ros.log_limit import (
+from drive_can_bridge.ros.log import (
     BURST, BURST_OF_ALL, FEW, Level, LogLimit, QUIET, RATE_OF_ALL, SUM_UP, TOPICS_MAX,
 )
 

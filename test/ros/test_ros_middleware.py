@@ -10,7 +10,7 @@ import pytest
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from drive_can_bridge.resources import config_file
-from drive_can_bridge.ros.middleware import begin_with_small_histories, FILES, VARIABLES
+from drive_can_bridge.ros.middleware import FILES, set_up_fast_dds, VARIABLES
 
 #: prints how many bytes services take of the allocator; what is resident says less: memory that
 #: was freed before, while modules were imported, is used again
@@ -50,15 +50,15 @@ def test_small_histories_save_half_of_the_memory() -> None:
     if 'fastrtps' not in get_rmw_implementation_identifier():
         pytest.skip('another middleware')
     environment: dict[str, str] = {}
-    begin_with_small_histories(environment)
-    assert environment == {VARIABLES[0]: str(config_file('fastdds/histories.xml'))}
+    set_up_fast_dds(environment)
+    assert environment == {VARIABLES[0]: str(config_file('fastdds/profiles.xml'))}
     assert growth(**environment) < 0.7 * growth()
 
 
 @pytest.mark.parametrize('name', VARIABLES)
 def test_profiles_of_somebody_else_are_left_alone(name: str) -> None:
     environment = {name: '/my/profiles.xml'}
-    begin_with_small_histories(environment)
+    set_up_fast_dds(environment)
     assert environment == {name: '/my/profiles.xml'}
 
 
@@ -68,5 +68,5 @@ def test_a_file_in_the_working_directory_counts_too(
     (tmp_path / name).touch()
     monkeypatch.chdir(tmp_path)
     environment: dict[str, str] = {}
-    begin_with_small_histories(environment)
+    set_up_fast_dds(environment)
     assert not environment

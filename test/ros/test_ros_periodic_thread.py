@@ -7,7 +7,7 @@ from clocks import HandClock
 import pytest
 from waiting import clock, pause, wait_for
 
-from drive_can_bridge.ros.periodic_thread import PeriodicThread
+from drive_can_bridge.ros.threads import PeriodicThread
 
 
 def test_again_and_again_until_stopped() -> None:

@@ -12,7 +12,7 @@ from processes import Client, Process, Processes
 import pytest
 from waiting import wait_for
 
-from drive_can_bridge.transport.device_lock import DeviceLock
+from drive_can_bridge.transport.places import DeviceLock
 
 #: nothing here may depend on how busy the machine is
 PATIENT: dict[str, Any] = {'missed_limit': 100, 'parameter_timeout': 10.0}

@@ -2,7 +2,8 @@
 """Curves in bounded memory."""
 
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.observer import Direction, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.trace.series import Curve, Lanes, Marks
 
 

@@ -22,8 +22,8 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module
-from drive_can_bridge.transport.adapter_answers import AdapterAnswers
 from drive_can_bridge.transport.port import open_port, Port
+from drive_can_bridge.transport.serial_writer import AdapterAnswers
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
 

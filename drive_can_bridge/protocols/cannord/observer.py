@@ -6,7 +6,7 @@ An answer to process data counts for the last frame that the inverter was sent. 
 group that is the individual frame of its turn; nobody answers the broadcast.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -25,9 +25,10 @@ from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
+    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
 )
-from drive_can_bridge.protocols.watches import CYCLES_WAITED, CyclicWatch, Questions
+from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
+from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
@@ -35,7 +36,12 @@ _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
 #: what tasks ask for that ask for no value
 _TITLES = {Task.NONE: 'no task', Task.READ_ELEMENTS: 'read number of elements'}
 
+#: what responses are called that are none to reads or writes
+_ANSWER_TITLES = {Response.NONE: 'no task', Response.ELEMENTS: 'number of elements'}
+
 TaskKey = tuple[int, int]
+#: of a task: its key, itself, and whether a double word travels
+Span = tuple[TaskKey, Task, bool]
 T = TypeVar('T', Task, Response)
 
 
@@ -57,9 +63,11 @@ class CannordObserver(DriveObserver):
         self.handlers |= {
             objects[MessageObject.PROCESS_REQUEST]: self._take_request,
             objects[MessageObject.PROCESS_RESPONSE]: self._take_response,
-            objects[MessageObject.PARAMETER_TASK]: self._take_task,
-            objects[MessageObject.PARAMETER_RESPONSE]: self._take_task_response,
         }
+        self.hear(objects[MessageObject.PARAMETER_TASK], _REQUEST, _PARAMETER, 'parameter task',
+                  partial(self._frame, Task), self._take_task)
+        self.hear(objects[MessageObject.PARAMETER_RESPONSE], _RESPONSE, _PARAMETER,
+                  'parameter response', partial(self._frame, Response), self._take_task_response)
         broadcast = broadcast_identifier(drive)
         self._paced_by_broadcast = leads and broadcast is not None
         if leads and broadcast is not None:
@@ -78,8 +86,8 @@ class CannordObserver(DriveObserver):
         # a member of a group is asked once in a while, and has one period to answer
         self._cycle = CyclicWatch(
             self, drive.period * (CYCLES_WAITED if broadcast is None else 1.0))
-        self._questions: Questions[TaskKey, Task] = Questions(
-            self, drive.parameter_timeout, self._unanswered)
+        self._requests: Requests[TaskKey] = Requests(
+            self, drive.parameter_timeout, self._content, missing='parameter response')
 
     # -- process data -----------------------------------------------------------------------------
 
@@ -136,73 +144,51 @@ class CannordObserver(DriveObserver):
         frame = self._layout.decode(data)
         return frame, meaning(frame.identifier)
 
-    def _take_task(self, data: bytes, now: float) -> None:
-        decoded = self.decoded(partial(self._frame, Task), data, now, _REQUEST, _PARAMETER,
-                               'parameter task')
-        if decoded is None:
-            return
-        frame, task = decoded
+    def _take_task(self, told: tuple[ParameterFrame, Task], now: float) -> None:
+        frame, task = told
         key = frame.number, frame.index
-        self.observed.requests += 1
-        self._questions.ask(key, task, now)
         _, double, _ = WRITES.get(task, (False, False, False))
-        parameter = self._parameter(key, task, double=double)
-        if task in WRITES:
-            self.tell(now, _REQUEST, _PARAMETER, 'write', (parameter,),
-                      (parameter.raw_from_word(frame.value if double else frame.word),))
-        else:
-            self.tell(now, _REQUEST, _PARAMETER, _TITLES.get(task, 'read'), (parameter,))
+        words = (frame.value if double else frame.word,) if task in WRITES else None
+        self._requests.ask(key, (key, task, double), now, words, title=_TITLES.get(task, ''))
 
-    def _take_task_response(self, data: bytes, now: float) -> None:
-        decoded = self.decoded(partial(self._frame, Response), data, now, _RESPONSE, _PARAMETER,
-                               'parameter response')
-        if decoded is None:
-            return
-        frame, response = decoded
+    def _take_task_response(self, told: tuple[ParameterFrame, Response], now: float) -> None:
+        frame, response = told
         key = self._key_of(frame, response)
-        asked = self._questions.about.get(key)
-        task = Task.READ if asked is None else asked
-        verdict, latency = self._questions.answer(key, now)
-        title = 'write' if task in WRITES else 'read'
-        parameter = self._parameter(key, task, double=response in DOUBLE_RESPONSES)
-        parameters: tuple[Parameter, ...] = (parameter,)
-        raws: tuple[int, ...] = ()
-        remark = ''
-        if response is Response.REFUSED:
-            verdict, remark = Verdict.REFUSED, error_text(frame.word)
-        elif asked is not None and response not in RESPONSES[asked]:
-            verdict, remark = Verdict.MALFORMED, f'response {int(response)} to task {int(asked)}'
-        if response is Response.NONE:
-            title, parameters, remark = 'no task', (), ''
-        elif response is Response.ELEMENTS:
-            title, remark = 'number of elements', f'{frame.word} elements'
-        elif response is not Response.REFUSED:
-            raws = parameter.raw_from_word(frame.answered),
-        self.tell(now, _RESPONSE, _PARAMETER, title, parameters, raws, verdict=verdict,
-                  remark=remark, latency=latency)
+        asked = self._requests.about.get(key)
+        task: Task = Task.READ if asked is None else asked.span[1]
+        refused = response is Response.REFUSED
+        span = None if response is Response.NONE else (key, task, response in DOUBLE_RESPONSES)
+        fits = asked is None or refused or response in RESPONSES[task]
+        valued = response not in _ANSWER_TITLES
+        self._requests.answer(
+            key, Asked(span, task in WRITES, title=_ANSWER_TITLES.get(response, '')), now,
+            (frame.answered,) if valued else None,
+            refusal=error_text(frame.word) if refused else '',
+            wrong='' if fits else f'response {int(response)} to task {int(task)}',
+            remark=f'{frame.word} elements' if response is Response.ELEMENTS else '')
 
     def _key_of(self, frame: ParameterFrame, response: Response) -> TaskKey:
         """Return the task that a response belongs to; a refusal need not repeat the index."""
         key = frame.number, frame.index
         if response is Response.REFUSED and frame.index == 0:
-            asked = self._questions.about
+            asked = self._requests.about
             return key if key in asked else next(
                 (other for other in reversed(asked) if other[0] == frame.number), key)
         return key
 
-    def _parameter(self, key: TaskKey, task: Task, *, double: bool) -> Parameter:
-        """Return the parameter that a task is about, with the width that travels."""
-        number, index = key
+    def _content(self, span: Span | None, words: Sequence[int] | None,
+                 ) -> tuple[tuple[Parameter, ...], list[int]]:
+        """Return the parameter that a task is about, with the width that travels; its value."""
+        if span is None:
+            return (), []
+        (number, index), task, double = span
         array, _, _ = WRITES.get(task, (task is Task.READ_ARRAY, False, False))
         subindex = index if array or index else None
-        listed = self._listed.get((number, subindex))
-        if listed is not None and (listed.type.bits == 32) is double:
-            return listed
-        name = listed.name if listed is not None else f'p{number}' + (
-            '' if subindex is None else f'.{subindex}')
-        return Parameter(name, ParameterType.UINT32 if double else ParameterType.UINT16,
-                         number=number, subindex=subindex, listed=False)
-
-    def _unanswered(self, key: TaskKey, task: Task, due: float) -> None:
-        self.tell_unanswered(due, _PARAMETER, 'parameter response',
-                             (self._parameter(key, task, double=False),))
+        parameter = self._listed.get((number, subindex))
+        if parameter is None or (parameter.type.bits == 32) is not double:
+            name = parameter.name if parameter is not None else f'p{number}' + (
+                '' if subindex is None else f'.{subindex}')
+            parameter = Parameter(
+                name, ParameterType.UINT32 if double else ParameterType.UINT16,
+                number=number, subindex=subindex, listed=False)
+        return (parameter,), raws_of([parameter], words or ())

@@ -4,42 +4,38 @@
 from collections.abc import Callable
 
 from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, Telegram, Verdict,
-)
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
+from drive_can_bridge.protocols.observer import DriveObserver, Emit, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE, _NETWORK = Direction.REQUEST, Direction.RESPONSE, Kind.NETWORK
 _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
              for command in network.NmtCommand}
 
 
-def node_handlers(observer: DriveObserver, node: int,
-                  booted: Callable[[], None]) -> dict[int, Handler]:
+def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None]) -> None:
     """
-    Return who says what the heartbeats and emergency messages of a node mean, by identifier.
+    Have heartbeats and emergency messages of a node told.
 
     :param booted: called when the node has started.
     """
-    def take_heartbeat(data: bytes, now: float) -> None:
-        state = observer.decoded(
-            network.decode_heartbeat, data, now, _RESPONSE, _NETWORK, 'heartbeat')
-        if state is network.NmtState.BOOT_UP:
+    def take_heartbeat(state: NmtState, now: float) -> None:
+        if state is NmtState.BOOT_UP:
             booted()
             observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
                           remark='the device has started')
-        elif state is not None:
+        else:
             observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
 
-    def take_emergency(data: bytes, now: float) -> None:
-        emergency = observer.decoded(
-            network.decode_emergency, data, now, _RESPONSE, _NETWORK, 'emergency')
-        if emergency is not None:
-            over = emergency.code == network.NO_ERROR
-            observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
-                          verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
+    def take_emergency(emergency: Emergency, now: float) -> None:
+        over = emergency.code == network.NO_ERROR
+        observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
+                      verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
 
-    return {network.HEARTBEAT_BASE + node: take_heartbeat,
-            network.EMERGENCY_BASE + node: take_emergency}
+    observer.hear(network.HEARTBEAT_BASE + node, _RESPONSE, _NETWORK, 'heartbeat',
+                  network.decode_heartbeat, take_heartbeat)
+    observer.hear(network.EMERGENCY_BASE + node, _RESPONSE, _NETWORK, 'emergency',
+                  network.decode_emergency, take_emergency)
 
 
 class NmtObserver(DriveObserver):
@@ -52,13 +48,11 @@ class NmtObserver(DriveObserver):
     def __init__(self, nodes: dict[int, str], emit: Emit) -> None:
         super().__init__('', emit)
         self._nodes = nodes
-        self.handlers[network.NMT_IDENTIFIER] = self._take
+        self.hear(network.NMT_IDENTIFIER, _REQUEST, _NETWORK, 'NMT', network.decode_nmt,
+                  self._take)
 
-    def _take(self, data: bytes, now: float) -> None:
-        decoded = self.decoded(network.decode_nmt, data, now, _REQUEST, _NETWORK, 'NMT')
-        if decoded is None:
-            return
-        command, node = decoded
+    def _take(self, told: tuple[int, int], now: float) -> None:
+        command, node = told
         what = _COMMANDS.get(command)
         self.emit(Telegram(
             now, self._nodes.get(node, ''), _REQUEST, _NETWORK, 'NMT',

@@ -2,62 +2,73 @@
 """
 Objects of a CANopen node by SDO (CiA 301): reads of any length, writes of up to four bytes.
 
-======== =========================================================================================
-bytes    request (600h + node), response (580h + node)
-======== =========================================================================================
-0        upload 40h → 43h, 47h, 4Bh, 4Fh: 4, 3, 2, 1 data bytes, 42h: not told how many; 41h, 40h:
-         more than fit, segments follow. Segment 60h, 70h (bit 4: toggle) → bit 4 likewise, bits 3
-         to 1: unused bytes, bit 0: the last one. Download 23h, 27h, 2Bh, 2Fh → 60h. 80h: refused,
-         or given up by the client
-1, 2     index, low byte first; of a segment: data from here on
-3        sub-index
-4 to 7   data, low byte first; 41h: how many bytes follow; 80h: the abort code
-======== =========================================================================================
+The commands are the rows of :class:`Kind`; requests go to 600h + node, responses to 580h + node.
+Numbers are sent low byte first. Of the head, byte 0, the bits that a row leaves open say:
+
+====================== =====================================================================
+row                    bits
+====================== =====================================================================
+with index and data    1: data in this frame; 0: their length is told, bits 3 and 2: unused bytes
+with index and number  0: the number of bytes to come is told; of an abort: none
+segments               4: toggle; bits 3 to 1: unused bytes, bit 0: the last one
+====================== =====================================================================
 """
 
 from enum import Enum
-import struct
 from typing import NamedTuple
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.canopen.network import check_node
+from drive_can_bridge.protocols.telegrams import Direction, TelegramType
 
 REQUEST_BASE = 0x600
 RESPONSE_BASE = 0x580
 LENGTH = 8
 EXPEDITED_MAX = 4
-UPLOAD = 0x40
+SEGMENT_MAX = 7
 DEVICE_TYPE = 0x1000
 IDENTITY = 0x1018
 RPDO4 = 0x1403
 RPDO4_MAPPING = 0x1603
-_ABORT = 0x80
-_SPECIFIER = 0xE0
-_SEGMENT, _DOWNLOAD, _DOWNLOADED = 0x60, 0x20, 0x60
-_EXPEDITED, _SIZED, _TOGGLE, _LAST = 0x02, 0x01, 0x10, 0x01
-_LAYOUT = struct.Struct('<BHBI')
+TOGGLE = 0x10
+_SIZED, _LAST = 0x01, 0x01
+_REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 
 
 class Kind(Enum):
-    """What a server says."""
+    """What a client asks for, and what a server says; an abort may answer everything."""
 
-    DATA = 'data'
-    LONG = 'segments follow'
-    SEGMENT = 'segment'
-    WRITTEN = 'written'
-    ABORT = 'refused'
+    UPLOAD = TelegramType(_REQUEST, 0x40, 0xE0, '<BHB4x', 'head index subindex',
+                          'UPLOADED UPLOAD_BEGUN')
+    UPLOADED = TelegramType(_RESPONSE, 0x42, 0xE2, '<BHB4s', 'head index subindex data')
+    UPLOAD_BEGUN = TelegramType(_RESPONSE, 0x40, 0xE2, '<BHBI', 'head index subindex number')
+    SEGMENT_WANTED = TelegramType(_REQUEST, 0x60, 0xE0, '<B7x', 'head', 'SEGMENT')
+    SEGMENT = TelegramType(_RESPONSE, 0x00, 0xE0, '<B7s', 'head data')
+    DOWNLOAD = TelegramType(_REQUEST, 0x22, 0xE2, '<BHB4s', 'head index subindex data',
+                            'DOWNLOADED')
+    DOWNLOADED = TelegramType(_RESPONSE, 0x60, 0xE0, '<BHB4x', 'head index subindex')
+    DOWNLOAD_BEGUN = TelegramType(_REQUEST, 0x20, 0xE2, '<BHBI', 'head index subindex number',
+                                  'DOWNLOADED')
+    SEGMENT_SENT = TelegramType(_REQUEST, 0x00, 0xE0, '<B7s', 'head data', 'SEGMENT_TAKEN')
+    SEGMENT_TAKEN = TelegramType(_RESPONSE, 0x20, 0xE0, '<B7x', 'head')
+    ABORT = TelegramType(Direction.NEITHER, 0x80, 0xFF, '<BHBI', 'head index subindex number')
+
+    def answers(self, request: 'Kind') -> bool:
+        """Tell whether this says that a request of the same object was carried out."""
+        return self.name in request.value.answers.split()
 
 
-class Answer(NamedTuple):
+class Message(NamedTuple):
     """
-    A response of the server.
+    A request or a response.
 
     :param object: index and sub-index; None: a segment does not say.
-    :param data: what was read, as far as it is in this frame.
-    :param number: of a refusal: the abort code; of ``LONG``: how many bytes follow, 0: not told.
+    :param data: what is read or written, as far as it is in this frame.
+    :param number: of an abort: its code; of a transfer that begins: how many bytes follow, 0: not
+        told.
     :param toggle: of a segment: its toggle bit, 0 or 10h.
-    :param last: no segment follows; for ``DATA``: the length was told.
+    :param last: no segment follows; with object and data: their length is told.
     """
 
     kind: Kind
@@ -80,19 +91,31 @@ class Uploaded(NamedTuple):
     value: int | None
 
 
+def encode(message: Message) -> bytes:
+    """Encode a request or a response; the length of data is told."""
+    kind, place, data, number, toggle, last = message
+    row = kind.value
+    head = row.code | toggle
+    if place is None:
+        head |= (SEGMENT_MAX - len(data) << 1 | _LAST * last) * ('data' in row.names)
+    elif 'data' in row.names:
+        head |= EXPEDITED_MAX - len(data) << 2 | _SIZED
+    elif number and kind is not Kind.ABORT:
+        head |= _SIZED
+    index, subindex = place or (0, 0)
+    return row.pack({'head': head, 'index': index, 'subindex': subindex, 'data': data,
+                     'number': number})
+
+
+def request(node: int, message: Message) -> Frame:
+    """Encode a request to a node."""
+    check_node(node)
+    return Frame(REQUEST_BASE + node, encode(message), False)
+
+
 def encode_upload(node: int, index: int, subindex: int) -> Frame:
     """Encode the request to read an object."""
-    return _request(node, UPLOAD, index, subindex)
-
-
-def encode_segment(node: int, toggle: int) -> Frame:
-    """
-    Encode the request for the next segment.
-
-    :param toggle: 0 for the first one, then 10h and 0 in turns.
-    """
-    check_node(node)
-    return Frame(REQUEST_BASE + node, bytes((_SEGMENT | toggle,)).ljust(LENGTH, b'\0'), False)
+    return request(node, Message(Kind.UPLOAD, (index, subindex)))
 
 
 def encode_download(node: int, index: int, subindex: int, data: bytes) -> Frame:
@@ -103,46 +126,39 @@ def encode_download(node: int, index: int, subindex: int, data: bytes) -> Frame:
     """
     if not 1 <= len(data) <= EXPEDITED_MAX:
         raise LocalProtocolError(f'{len(data)} bytes cannot be written: 1 to {EXPEDITED_MAX}')
-    head = _DOWNLOAD | EXPEDITED_MAX - len(data) << 2 | _EXPEDITED | _SIZED
-    return _request(node, head, index, subindex, int.from_bytes(data, 'little'))
+    return request(node, Message(Kind.DOWNLOAD, (index, subindex), data))
 
 
-def encode_abort(node: int, index: int, subindex: int, code: int) -> Frame:
-    """Encode the end of a transfer that the client gives up."""
-    return _request(node, _ABORT, index, subindex, code)
-
-
-def _request(node: int, head: int, index: int, subindex: int, value: int = 0) -> Frame:
-    check_node(node)
-    return Frame(REQUEST_BASE + node, _LAYOUT.pack(head, index, subindex, value), False)
-
-
-def decode_answer(data: bytes, *, segments: bool = False) -> Answer:
+def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Message:
     """
-    Decode a response.
+    Decode a request or a response.
 
-    :param segments: one is expected: a head of a segment is no other then.
+    :param segments: they are expected: else no head is that of one.
     :raises RemoteProtocolError: it is none, or malformed.
     """
     if len(data) != LENGTH:
         raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {LENGTH}')
-    head, index, subindex, value = _LAYOUT.unpack(data)
-    place = index, subindex
-    if head == _ABORT:
-        return Answer(Kind.ABORT, place, number=value)
-    specifier = head & _SPECIFIER
-    if specifier == 0 and segments:
-        return Answer(Kind.SEGMENT, None, data[1:LENGTH - (head >> 1 & 0x07)],
-                      toggle=head & _TOGGLE, last=bool(head & _LAST))
-    if specifier == UPLOAD and head & _EXPEDITED:
-        sized = bool(head & _SIZED)
-        unused = head >> 2 & 0x03 if sized else 0
-        return Answer(Kind.DATA, place, data[4:LENGTH - unused], last=sized)
-    if specifier == UPLOAD:
-        return Answer(Kind.LONG, place, number=value if head & _SIZED else 0, last=False)
-    if specifier == _DOWNLOADED:
-        return Answer(Kind.WRITTEN, place)
-    raise RemoteProtocolError(f'SDO command {head:02X}h is no answer that was asked for')
+    head = data[0]
+    kind = next((kind for kind in Kind if head & kind.value.mask == kind.value.code
+                 and kind.value.is_sent_by(direction)
+                 and (segments or 'index' in kind.value.names)), None)
+    if kind is None:
+        raise RemoteProtocolError(f'SDO command {head:02X}h is no ' + (
+            'request that is known here' if direction is _REQUEST
+            else 'answer that was asked for'))
+    fields = kind.value.unpack(data)
+    content, number = fields.get('data', b''), fields.get('number', 0)
+    if 'index' not in fields:
+        if content:
+            content = content[:SEGMENT_MAX - (head >> 1 & 0x07)]
+        return Message(kind, None, content, toggle=head & TOGGLE,
+                       last=not content or bool(head & _LAST))
+    sized = bool(head & _SIZED)
+    if content and sized:
+        content = content[:EXPEDITED_MAX - (head >> 2 & 0x03)]
+    return Message(kind, (fields['index'], fields['subindex']), content,
+                   number if sized or kind is Kind.ABORT else 0,
+                   last=sized if content else 'number' not in fields or kind is Kind.ABORT)
 
 
 def decode_upload(data: bytes) -> Uploaded:
@@ -151,44 +167,8 @@ def decode_upload(data: bytes) -> Uploaded:
 
     :raises RemoteProtocolError: it is no answer to an upload.
     """
-    answer = decode_answer(data)
-    if answer.object is None or answer.kind is Kind.WRITTEN:
+    answer = decode(_RESPONSE, data, segments=False)
+    if answer.object is None or answer.kind is Kind.DOWNLOADED:
         raise RemoteProtocolError(f'SDO command {data[0]:02X}h is no answer to an upload')
     return Uploaded(answer.object, int.from_bytes(answer.data, 'little')
-                    if answer.kind is Kind.DATA else None)
-
-
-class Requested(NamedTuple):
-    """
-    A request of a client, for who looks on.
-
-    :param object: index and sub-index; None: a segment of the transfer before.
-    :param data: what is written; None: it reads.
-    :param abort: the code of a transfer given up; None: it is none.
-    """
-
-    object: tuple[int, int] | None
-    data: bytes | None = None
-    abort: int | None = None
-
-
-def decode_request(data: bytes) -> Requested:
-    """
-    Decode a request: uploads, downloads in one frame, segments, aborts.
-
-    :raises RemoteProtocolError: it is none of them.
-    """
-    if len(data) != LENGTH:
-        raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {LENGTH}')
-    head, index, subindex, value = _LAYOUT.unpack(data)
-    place, specifier = (index, subindex), head & _SPECIFIER
-    if head == _ABORT:
-        return Requested(place, abort=value)
-    if specifier == UPLOAD:
-        return Requested(place)
-    if specifier == _DOWNLOAD:
-        unused = head >> 2 & 0x03 if head & _SIZED else 0
-        return Requested(place, data[4:LENGTH - unused] if head & _EXPEDITED else b'')
-    if specifier in (_SEGMENT, 0):
-        return Requested(None)
-    raise RemoteProtocolError(f'SDO command {head:02X}h is no request that is known here')
+                    if answer.kind is Kind.UPLOADED else None)

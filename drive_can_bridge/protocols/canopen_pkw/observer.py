@@ -12,14 +12,15 @@ from functools import partial
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
-from drive_can_bridge.protocols.canopen.observer import node_handlers
+from drive_can_bridge.protocols.canopen.observer import hear_node
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
+    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
 )
-from drive_can_bridge.protocols.request_watch import Asked, Requests
+from drive_can_bridge.protocols.pairing import Asked, Requests
+from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 _PARAMETER = Kind.PARAMETER
@@ -31,13 +32,13 @@ class PkwObserver(DriveObserver):
     def __init__(self, drive: DriveConfiguration, emit: Emit) -> None:
         super().__init__(drive.name, emit)
         options = drive.options
-        self._decode = partial(pkw.decode, layout=Layout(options.layout))
         self._abort_order: str = options.abort_code_order
-        self.handlers |= {
-            **node_handlers(self, drive.station, self._booted),
-            options.request_cob_id: self._take_request,
-            options.response_cob_id: self._take_response,
-        }
+        hear_node(self, drive.station, self._booted)
+        decode = partial(pkw.decode, layout=Layout(options.layout))
+        for identifier, direction, title, take in (
+                (options.request_cob_id, _REQUEST, 'PKW request', self._take_request),
+                (options.response_cob_id, _RESPONSE, 'PKW response', self._take_response)):
+            self.hear(identifier, direction, _PARAMETER, title, decode, take)
         placement = self._placement = Placement.of(drive)
         self._spans = listed_by(
             drive.profile.parameters.values(), lambda parameter: (
@@ -50,10 +51,7 @@ class PkwObserver(DriveObserver):
 
     # -- the mailbox ------------------------------------------------------------------------------
 
-    def _take_request(self, data: bytes, now: float) -> None:
-        message = self.decoded(self._decode, data, now, _REQUEST, _PARAMETER, 'PKW request')
-        if message is None:
-            return
+    def _take_request(self, message: Message, now: float) -> None:
         repeated = message.function_byte == self._last_byte
         self._last_byte = message.function_byte
         if message.code == Function.NONE:
@@ -68,10 +66,7 @@ class PkwObserver(DriveObserver):
             futile=repeated, wrong='the function byte is that of the request before: nothing is '
             'started' if repeated else '')
 
-    def _take_response(self, data: bytes, now: float) -> None:
-        message = self.decoded(self._decode, data, now, _RESPONSE, _PARAMETER, 'PKW response')
-        if message is None:
-            return
+    def _take_response(self, message: Message, now: float) -> None:
         if message.code == Function.NONE:
             self.tell(now, _RESPONSE, _PARAMETER, 'idle response')
             return
@@ -87,7 +82,8 @@ class PkwObserver(DriveObserver):
         if asked is None:
             return
         self._requests.answer(
-            key, asked, now, message.words, refusal=self._refusal(message) if refused else '',
+            key, asked, now, None if asked.writes else message.words,
+            refusal=self._refusal(message) if refused else '',
             parts=addresses.instead_of(asked.span, self._wanted))
 
     def _meant(self, message: Message, now: float, direction: Direction,

@@ -15,9 +15,10 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind
+from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
+from drive_can_bridge.protocols.telegrams import Direction
 
 #: bytes of an object that are read at most
 LENGTH_MAX = 256
@@ -100,7 +101,7 @@ class SdoCourier(Courier[Ask, Reply]):
             return self._take_segment(found, now)
         if step is None or not _belongs(found, step):
             raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
-        if found.kind is Kind.LONG:
+        if found.kind is Kind.UPLOAD_BEGUN:
             self._collected, self._toggle = bytearray(), 0
             self._ask_segment(now)
             return True
@@ -109,23 +110,23 @@ class SdoCourier(Courier[Ask, Reply]):
             return Reply(abort=found.number)
         return Reply(found.data, sized=found.last)
 
-    def decode(self, answer: bytes) -> sdo.Answer:
+    def decode(self, answer: bytes) -> Message:
         """
         Decode a response.
 
         :raises RemoteProtocolError: it is none.
         """
-        return sdo.decode_answer(answer, segments=self._collected is not None)
+        return sdo.decode(Direction.RESPONSE, answer, segments=self._collected is not None)
 
     def answers(self, answer: bytes, step: Ask) -> bool:
         """Tell whether a response may be that to a transfer that was given up."""
-        return _belongs(sdo.decode_answer(answer), step)
+        return _belongs(sdo.decode(Direction.RESPONSE, answer, segments=False), step)
 
-    def _take_segment(self, found: sdo.Answer, now: float) -> Reply | bool:
+    def _take_segment(self, found: Message, now: float) -> Reply | bool:
         if self._collected is None or found.toggle != self._toggle:
             raise RemoteProtocolError('SDO segment out of turn')
         self._collected += found.data
-        self._toggle ^= 0x10
+        self._toggle ^= sdo.TOGGLE
         if not found.last:
             if len(self._collected) > LENGTH_MAX:
                 self._give_up(_TOO_LONG)
@@ -139,12 +140,14 @@ class SdoCourier(Courier[Ask, Reply]):
 
     def _ask_segment(self, now: float) -> None:
         self.deadline = now + self.retry.timeout
-        self._send(sdo.encode_segment(self._node, self._toggle), None)
+        self._send(sdo.request(self._node, Message(
+            Kind.SEGMENT_WANTED, None, toggle=self._toggle)), None)
 
     def _give_up(self, code: int) -> None:
         step = self.step
         if step is not None:
-            self._send(sdo.encode_abort(self._node, step.index, step.subindex, code), None)
+            self._send(sdo.request(self._node, Message(
+                Kind.ABORT, (step.index, step.subindex), number=code)), None)
 
     def handle_timer(self, now: float) -> Reply | bool:
         if self._collected is not None and self.busy and now >= self.deadline:
@@ -173,13 +176,13 @@ class SdoCourier(Courier[Ask, Reply]):
 SdoChannel = Channel[Ask, Reply]
 
 
-def _belongs(found: sdo.Answer, step: Ask) -> bool:
+def _belongs(found: Message, step: Ask) -> bool:
     if step.pause:
         return False
     place = step.index, step.subindex
     if found.kind is Kind.ABORT:    # of a command that it does not know, some say no object
         return found.object in (place, (0, 0))
-    wanted = (Kind.DATA, Kind.LONG) if step.data is None else (Kind.WRITTEN,)
-    return found.object == place and found.kind in wanted
+    asked = Kind.UPLOAD if step.data is None else Kind.DOWNLOAD
+    return found.object == place and found.kind.answers(asked)
 
 

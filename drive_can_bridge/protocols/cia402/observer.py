@@ -7,23 +7,24 @@ nobody asks: an exchange is a complete set of them.
 """
 
 from collections.abc import Sequence
+from functools import partial
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
-from drive_can_bridge.protocols.canopen.observer import NmtObserver, node_handlers
-from drive_can_bridge.protocols.canopen.sdo import Kind as Said
+from drive_can_bridge.protocols.canopen.network import NmtState
+from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
+from drive_can_bridge.protocols.canopen.sdo import Kind as Said, Message
 from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo import Pdo
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict,
+    DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict,
 )
-from drive_can_bridge.protocols.request_watch import Asked, Requests
-from drive_can_bridge.protocols.watches import CYCLES_WAITED, CyclicWatch
+from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
+from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 _CYCLIC, _PARAMETER, _NETWORK = Kind.CYCLIC, Kind.PARAMETER, Kind.NETWORK
@@ -73,12 +74,17 @@ class Cia402Observer(DriveObserver):
         self._arrived: set[int] = set()
         self._told = False              # something since the last SYNC
         node = drive.station
-        self.handlers |= {
-            **node_handlers(self, node, self._booted),
-            sdo.REQUEST_BASE + node: self._take_sdo_request,
-            sdo.RESPONSE_BASE + node: self._take_sdo_response,
-            **{pdo.identifier: self._request_handler(pdo) for pdo in request_pdos(drive)},
-            **{pdo.identifier: self._response_handler(pdo) for pdo in responses}}
+        hear_node(self, node, self._booted)
+        self.hear(sdo.REQUEST_BASE + node, _REQUEST, _PARAMETER, 'SDO request',
+                  partial(sdo.decode, _REQUEST), self._take_sdo_request)
+        self.hear(sdo.RESPONSE_BASE + node, _RESPONSE, _PARAMETER, 'SDO response',
+                  lambda data: sdo.decode(_RESPONSE, data, segments=self._transfer is not None),
+                  self._take_sdo_response)
+        self.handlers |= {pdo.identifier: self._request_handler(pdo)
+                          for pdo in request_pdos(drive)}
+        for pdo in responses:
+            self.hear(pdo.identifier, _RESPONSE, _CYCLIC, 'cyclic response', pdo.unpack,
+                      partial(self._take_response, pdo))
         self._cycle: CyclicWatch | None = None
         self._events: EventWatch | None = None
         if drive.options.transmission == 'sync':
@@ -107,25 +113,18 @@ class Cia402Observer(DriveObserver):
                 self.tell(now, _REQUEST, _CYCLIC, 'cyclic request', pdo.parameters, raws)
         return take
 
-    def _response_handler(self, pdo: Pdo) -> Handler:
-        title = 'cyclic response'
-
-        def take(data: bytes, now: float) -> None:
-            raws = self.decoded(pdo.unpack, data, now, _RESPONSE, _CYCLIC, title)
-            if raws is None:
-                return
-            verdict, latency = Verdict.NORMAL, math.nan
-            self._arrived.add(pdo.number)
-            if self._arrived == self._all:
-                self._arrived.clear()
-                if self._cycle is not None:
-                    verdict, latency = self._cycle.answer(now)
-                elif self._events is not None:
-                    self.due(self._events.complete(now))
-            remark = state_of(raws[0]).value if pdo.parameters[0].name == STATUS_NAME else ''
-            self.tell(now, _RESPONSE, _CYCLIC, title, pdo.parameters, raws, verdict=verdict,
-                      remark=remark, latency=latency)
-        return take
+    def _take_response(self, pdo: Pdo, raws: Sequence[int], now: float) -> None:
+        verdict, latency = Verdict.NORMAL, math.nan
+        self._arrived.add(pdo.number)
+        if self._arrived == self._all:
+            self._arrived.clear()
+            if self._cycle is not None:
+                verdict, latency = self._cycle.answer(now)
+            elif self._events is not None:
+                self.due(self._events.complete(now))
+        remark = state_of(raws[0]).value if pdo.parameters[0].name == STATUS_NAME else ''
+        self.tell(now, _RESPONSE, _CYCLIC, 'cyclic response', pdo.parameters, raws,
+                  verdict=verdict, remark=remark, latency=latency)
 
     def _booted(self) -> None:
         self._transfer = None
@@ -133,49 +132,35 @@ class Cia402Observer(DriveObserver):
 
     # -- parameters -------------------------------------------------------------------------------
 
-    def _take_sdo_request(self, data: bytes, now: float) -> None:
-        title = 'SDO request'
-        request = self.decoded(sdo.decode_request, data, now, _REQUEST, _PARAMETER, title)
-        if request is None:
-            return
-        place, written, abort = request
-        if place is None:
+    def _take_sdo_request(self, request: Message, now: float) -> None:
+        if request.object is None:
             return      # the next segment: the transfer was told
+        place, written = request.object, request.data
         self._transfer = None
-        if abort is not None:
+        if request.kind is Said.ABORT:
             self.tell(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
-                      remark=abort_codes.describe(abort))
+                      remark=abort_codes.describe(request.number))
             return
-        self._requests.ask(place, place, now, None if written is None else [
+        self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
             int.from_bytes(written, 'little'), len(written)])
 
-    def _take_sdo_response(self, data: bytes, now: float) -> None:
-        title = 'SDO response'
-        transfer = self._transfer
-        try:
-            answer = sdo.decode_answer(data, segments=transfer is not None)
-        except RemoteProtocolError as error:
-            self.tell(now, _RESPONSE, _PARAMETER, title, verdict=Verdict.MALFORMED,
-                      remark=str(error))
-            return
-        if answer.object is None:
+    def _take_sdo_response(self, answer: Message, now: float) -> None:
+        place = answer.object
+        if place is None:
             self._take_segment(answer, now)
             return
         self._transfer = None
-        place = answer.object
-        asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.WRITTEN)
-        if answer.kind is Said.ABORT:
-            self._requests.answer(place, asked, now, [],
-                                  refusal=abort_codes.describe(answer.number))
-            return
-        if answer.kind is Said.LONG:
+        asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.DOWNLOADED)
+        if answer.kind is Said.UPLOAD_BEGUN:
             self._transfer, self._text = place, b''
-        self._requests.answer(place, asked, now, [] if not answer.data else [
-            int.from_bytes(answer.data, 'little'), len(answer.data)])
+        self._requests.answer(
+            place, asked, now, [] if not answer.data else [
+                int.from_bytes(answer.data, 'little'), len(answer.data)],
+            refusal=abort_codes.describe(answer.number) if answer.kind is Said.ABORT else '')
 
-    def _take_segment(self, answer: sdo.Answer, now: float) -> None:
+    def _take_segment(self, answer: Message, now: float) -> None:
         self._text += answer.data
-        if answer.last and self._transfer is not None:
+        if answer.kind is Said.SEGMENT and answer.last and self._transfer is not None:
             parameters, _ = self._content(self._transfer, None)
             self._transfer = None
             self.tell(now, _RESPONSE, _PARAMETER, 'read', parameters,
@@ -204,8 +189,10 @@ class NetworkObserver(DriveObserver):
             {drive.station: drive.name for drive in drives}, emit).handlers
         self._drives = [each for each in observers if isinstance(each, Cia402Observer)]
         self.handlers[network.SYNC_IDENTIFIER] = self._take_sync
-        self.handlers |= {network.HEARTBEAT_BASE + drive.options.bridge_node: self._take_bridge
-                          for drive in drives if drive.options.bridge_heartbeat > 0}
+        for drive in drives:
+            if drive.options.bridge_heartbeat > 0:
+                self.hear(network.HEARTBEAT_BASE + drive.options.bridge_node, _REQUEST, _NETWORK,
+                          'heartbeat', network.decode_heartbeat, self._take_bridge)
 
     def _take_sync(self, data: bytes, now: float) -> None:
         for each in self._drives:
@@ -215,10 +202,8 @@ class NetworkObserver(DriveObserver):
         self.tell(now, _REQUEST, _CYCLIC, 'SYNC',
                   remark=f'all nodes, counter {data[0]}' if data else 'all nodes')
 
-    def _take_bridge(self, data: bytes, now: float) -> None:
-        state = self.decoded(network.decode_heartbeat, data, now, _REQUEST, _NETWORK, 'heartbeat')
-        if state is not None:
-            self.tell(now, _REQUEST, _NETWORK, 'heartbeat', remark=f'of the bridge: {state.text}')
+    def _take_bridge(self, state: NmtState, now: float) -> None:
+        self.tell(now, _REQUEST, _NETWORK, 'heartbeat', remark=f'of the bridge: {state.text}')
 
 
 def make_observers(drives: Sequence[DriveConfiguration], emit: Emit) -> list[DriveObserver]:

@@ -18,7 +18,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind
+from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo import entry_text, MAPPING_OFFSET, Pdo
@@ -28,6 +28,7 @@ from drive_can_bridge.protocols.cia402.states import (
 from drive_can_bridge.protocols.scanner import (
     Certainty, Conversation, Finding, Prober, Question, Scout,
 )
+from drive_can_bridge.protocols.telegrams import Direction
 
 
 #: device profile, in the lower half of 1000h
@@ -223,13 +224,13 @@ class Cia402Prober(Prober):
         return int.from_bytes(answer.data, 'little')
 
 
-def _answer(data: bytes, place: tuple[int, int]) -> sdo.Answer | None:
+def _answer(data: bytes, place: tuple[int, int]) -> Message | None:
     """Return the answer to the read of an object; None: it is none."""
     try:
-        found = sdo.decode_answer(data)
+        found = sdo.decode(Direction.RESPONSE, data, segments=False)
     except RemoteProtocolError:
         return None
-    return found if found.object == place and found.kind in (Kind.DATA, Kind.ABORT) else None
+    return found if found.object == place and found.kind in (Kind.UPLOADED, Kind.ABORT) else None
 
 
 def _entries_text(entries: Sequence[int]) -> str:

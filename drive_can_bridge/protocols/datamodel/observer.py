@@ -12,11 +12,13 @@ from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
-    Direction, DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict,
+    DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict,
+)
+from drive_can_bridge.protocols.pairing import (
+    Asked, CYCLES_WAITED, CyclicWatch, Requests, WriteGap,
 )
 from drive_can_bridge.protocols.polling import Chunk
-from drive_can_bridge.protocols.request_watch import Asked, Requests
-from drive_can_bridge.protocols.watches import CYCLES_WAITED, CyclicWatch, WriteGap
+from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 _CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
@@ -154,20 +156,19 @@ class StandardObserver(DriveObserver):
         super().__init__(drive.name, emit)
         options = drive.options
         self._strict: bool = options.length_policy == 'strict'
-        self._request = standard.identifier(options.request_id_base, drive.station)
-        self._response = standard.identifier(options.response_id_base, drive.station)
-        self.handlers |= {self._request: self._take_request, self._response: self._take_response}
+        request, self._response = (
+            standard.identifier(base, drive.station)
+            for base in (options.request_id_base, options.response_id_base))
+        self.hear(request, _REQUEST, _PARAMETER, 'frame', lambda data: standard.decode_request(
+            Frame(request, data, False)), self._take_request)
+        self.handlers[self._response] = self._take_response
         self._traffic = _Traffic(self, drive, plan=reads(drive), setpoints=drive.cyclic_request)
         self._last: Chunk | None = None
 
-    def _take_request(self, data: bytes, now: float) -> None:
-        request = self.decoded(
-            lambda data: standard.decode_request(Frame(self._request, data, False)),
-            data, now, _REQUEST, _PARAMETER, 'frame')
-        if request is not None:
-            if isinstance(request, ReadRequest):
-                self._last = Chunk(request.number, request.count)
-            self._traffic.take(request, now)
+    def _take_request(self, request: ReadRequest | Write, now: float) -> None:
+        if isinstance(request, ReadRequest):
+            self._last = Chunk(request.number, request.count)
+        self._traffic.take(request, now)
 
     def _take_response(self, data: bytes, now: float) -> None:
         chunk = self._last

@@ -17,9 +17,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.ros.client.calls import (
-    Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service,
+    ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service,
 )
-from drive_can_bridge.ros.client.client_node import ClientNode
 from drive_can_bridge.ros.client.search import find_bridge, Graph, nobody, Search
 from drive_can_bridge.ros.recognition import namespace_of, sampled_among, stoppable_among
 

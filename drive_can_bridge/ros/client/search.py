@@ -23,8 +23,7 @@ from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
-from drive_can_bridge.ros.client.calls import Inbox, NodeCalls
-from drive_can_bridge.ros.client.client_node import ClientNode
+from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
 #: s between two looks at what has arrived

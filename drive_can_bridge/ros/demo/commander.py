@@ -23,7 +23,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.monitor.snapshot import read_status, Report
-from drive_can_bridge.ros.gone import RCLError
+from drive_can_bridge.ros.middleware import RCLError
 from drive_can_bridge.ros.monitor.client import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.names import quantity_of

@@ -24,9 +24,8 @@ from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import is_ros_name, Place, Status
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
-    Inbox, latched_quality, log_quality, newest_quality, NodeCalls,
+    ClientNode, Inbox, latched_quality, log_quality, newest_quality, NodeCalls,
 )
-from drive_can_bridge.ros.client.client_node import ClientNode
 from drive_can_bridge.ros.messages import drive_value, facts_of, limits_of, plain
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,

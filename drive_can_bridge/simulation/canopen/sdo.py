@@ -7,20 +7,13 @@ Block transfer is refused.
 
 from typing import Protocol
 
-from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.protocols.canopen import abort_codes, sdo
+from drive_can_bridge.protocols.canopen.sdo import Kind, Message
+from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.simulation.plant import Refusal
 from drive_can_bridge.simulation.registers import Refused
 
-LENGTH = 8
-EXPEDITED_MAX = 4
-SEGMENT_MAX = 7
-
-#: command specifiers, bits 7 to 5 of the first byte
-DOWNLOAD_SEGMENT, DOWNLOAD, UPLOAD, UPLOAD_SEGMENT, ABORT = range(5)
-#: bits of the first byte
-EXPEDITED, SIZE_GIVEN, TOGGLE, LAST = 0x02, 0x01, 0x10, 0x01
-RESPONSE_UPLOAD, RESPONSE_DOWNLOAD, RESPONSE_ABORT = 0x40, 0x60, 0x80
-RESPONSE_SEGMENT = 0x20
 #: bytes that a segmented write may have
 WRITE_MAX = 1024
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
@@ -54,7 +47,7 @@ class SdoServer:
     def __init__(self, objects: Objects, *, segmented_writes: bool = False) -> None:
         self._objects = objects
         self._segmented_writes = segmented_writes
-        self._address = b'\0\0\0'
+        self._place = 0, 0
         self._toggle = 0
         self.reset()
 
@@ -66,76 +59,64 @@ class SdoServer:
 
     def answer(self, request: bytes) -> bytes | None:
         """Return the response to a request; None: there is none."""
-        if len(request) != LENGTH:
+        if len(request) != sdo.LENGTH:
             return None
-        head, command = request[0], request[0] >> 5
         try:
-            if command == UPLOAD_SEGMENT:
-                return self._upload_segment(head)
-            if command == DOWNLOAD_SEGMENT:
-                return self._download_segment(head, request)
-            self.reset()
-            if command == ABORT:
-                return None
-            self._address = request[1:4]
-            place = self._place
-            if command == UPLOAD:
-                return self._upload(self._objects.read_object(*place))
-            if command == DOWNLOAD and head & EXPEDITED:
-                unused = head >> 2 & 0x03 if head & SIZE_GIVEN else 0
-                self._objects.write_object(*place, request[4:LENGTH - unused])
-                return self._response(RESPONSE_DOWNLOAD)
-            if command == DOWNLOAD and self._segmented_writes:
-                self._written, self._toggle = b'', 0
-                self._announced = int.from_bytes(request[4:], 'little') if (
-                    head & SIZE_GIVEN) else 0
-                return self._response(RESPONSE_DOWNLOAD)
-            raise Refused(abort_codes.UNKNOWN_COMMAND)
+            answer = self._serve(request)
         except Refused as error:
             self.reset()
-            return self._response(RESPONSE_ABORT, error.code.to_bytes(4, 'little'))
+            answer = Message(Kind.ABORT, self._place, number=error.code)
+        return None if answer is None else sdo.encode(answer)
 
-    def _response(self, head: int, data: bytes = b'') -> bytes:
-        return bytes((head,)) + self._address + data.ljust(LENGTH - 4, b'\0')
-
-    @property
-    def _place(self) -> tuple[int, int]:
-        return int.from_bytes(self._address[:2], 'little'), self._address[2]
-
-    def _download_segment(self, head: int, request: bytes) -> bytes:
-        if self._written is None:
+    def _serve(self, request: bytes) -> Message | None:
+        try:
+            kind, place, data, number, toggle, last = sdo.decode(Direction.REQUEST, request)
+        except RemoteProtocolError:
+            self._place = int.from_bytes(request[1:3], 'little'), request[3]
+            raise Refused(abort_codes.UNKNOWN_COMMAND) from None
+        if place is None:
+            under_way = self._rest if kind is Kind.SEGMENT_WANTED else self._written is not None
+            if not under_way:
+                raise Refused(abort_codes.UNKNOWN_COMMAND)
+            if toggle != self._toggle:
+                raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
+            self._toggle ^= sdo.TOGGLE
+            return self._next_segment(toggle) if kind is Kind.SEGMENT_WANTED else (
+                self._take_segment(data, toggle, last))
+        self.reset()
+        if kind is Kind.ABORT:
+            return None
+        self._place = place
+        if kind is Kind.UPLOAD:
+            return self._upload(self._objects.read_object(*place))
+        if kind is Kind.DOWNLOAD:
+            self._objects.write_object(*place, data)
+        elif self._segmented_writes:
+            self._written, self._toggle, self._announced = b'', 0, number
+        else:
             raise Refused(abort_codes.UNKNOWN_COMMAND)
-        if head & TOGGLE != self._toggle:
-            raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
-        data = self._written = self._written + request[1:LENGTH - (head >> 1 & 0x07)]
+        return Message(Kind.DOWNLOADED, place)
+
+    def _take_segment(self, data: bytes, toggle: int, last: bool) -> Message:
+        data = self._written = (self._written or b'') + data
         if len(data) > (self._announced or WRITE_MAX):
             raise Refused(TYPE_TOO_LONG)
-        if head & LAST:
+        if last:
             if len(data) < self._announced:
                 raise Refused(TYPE_TOO_SHORT)
             self.reset()
             self._objects.write_object(*self._place, data)
-        response = bytes((RESPONSE_SEGMENT | self._toggle,)).ljust(LENGTH, b'\0')
-        self._toggle ^= TOGGLE
-        return response
+        return Message(Kind.SEGMENT_TAKEN, None, toggle=toggle)
 
-    def _upload(self, data: bytes) -> bytes:
-        if len(data) <= EXPEDITED_MAX:
-            unused = EXPEDITED_MAX - len(data)
-            return self._response(RESPONSE_UPLOAD | unused << 2 | EXPEDITED | SIZE_GIVEN, data)
+    def _upload(self, data: bytes) -> Message:
+        if len(data) <= sdo.EXPEDITED_MAX:
+            return Message(Kind.UPLOADED, self._place, data)
         self._rest, self._toggle = data, 0
-        return self._response(RESPONSE_UPLOAD | SIZE_GIVEN, len(data).to_bytes(4, 'little'))
+        return Message(Kind.UPLOAD_BEGUN, self._place, number=len(data))
 
-    def _upload_segment(self, head: int) -> bytes:
-        if not self._rest:
-            raise Refused(abort_codes.UNKNOWN_COMMAND)
-        if head & TOGGLE != self._toggle:
-            raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
-        segment, self._rest = self._rest[:SEGMENT_MAX], self._rest[SEGMENT_MAX:]
-        response = bytes((
-            self._toggle | SEGMENT_MAX - len(segment) << 1 | LAST * (not self._rest),))
-        self._toggle ^= TOGGLE
-        return response + segment.ljust(SEGMENT_MAX, b'\0')
+    def _next_segment(self, toggle: int) -> Message:
+        segment, self._rest = self._rest[:sdo.SEGMENT_MAX], self._rest[sdo.SEGMENT_MAX:]
+        return Message(Kind.SEGMENT, None, segment, toggle=toggle, last=not self._rest)
 
 
 def checked_length(data: bytes, length: int) -> bytes:

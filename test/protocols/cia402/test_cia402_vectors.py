@@ -13,6 +13,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind
 from drive_can_bridge.protocols.cia402 import pdo, states
+from drive_can_bridge.protocols.telegrams import Direction
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'cia402.json').read_text(
     encoding='utf-8'))
@@ -38,8 +39,8 @@ def content(row: dict[str, Any]) -> bytes:
     return bytes.fromhex(row['content'])
 
 
-def decoded(row: dict[str, Any], **more: Any) -> sdo.Answer:
-    return sdo.decode_answer(frame(row['frame']).data, **more)
+def decoded(row: dict[str, Any], *, segments: bool = False) -> sdo.Message:
+    return sdo.decode(Direction.RESPONSE, frame(row['frame']).data, segments=segments)
 
 
 def test_all_vectors_are_run_and_have_sources() -> None:
@@ -60,8 +61,8 @@ def test_upload(row: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize('row', rows('uploaded'))
 def test_uploaded(row: dict[str, Any]) -> None:
-    assert decoded(row) == sdo.Answer(
-        Kind.DATA, place(row), content(row), last=row.get('size_told', True))
+    assert decoded(row) == sdo.Message(
+        Kind.UPLOADED, place(row), content(row), last=row.get('size_told', True))
 
 
 @pytest.mark.parametrize('row', rows('download'))
@@ -71,28 +72,30 @@ def test_download(row: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize('row', rows('downloaded'))
 def test_downloaded(row: dict[str, Any]) -> None:
-    assert decoded(row) == sdo.Answer(Kind.WRITTEN, place(row))
+    assert decoded(row) == sdo.Message(Kind.DOWNLOADED, place(row))
 
 
 @pytest.mark.parametrize('row', rows('upload_begun'))
 def test_upload_by_segments_begins(row: dict[str, Any]) -> None:
-    assert decoded(row) == sdo.Answer(Kind.LONG, place(row), number=row['size'], last=False)
+    assert decoded(row) == sdo.Message(
+        Kind.UPLOAD_BEGUN, place(row), number=row['size'], last=False)
 
 
 @pytest.mark.parametrize('row', rows('segment_wanted'))
 def test_segment_is_asked_for(row: dict[str, Any]) -> None:
-    assert sdo.encode_segment(node(row), row['toggle'] << 4) == frame(row['frame'])
+    assert sdo.request(node(row), sdo.Message(
+        Kind.SEGMENT_WANTED, None, toggle=row['toggle'] << 4)) == frame(row['frame'])
 
 
 @pytest.mark.parametrize('row', rows('segment'))
 def test_segment(row: dict[str, Any]) -> None:
-    assert decoded(row, segments=True) == sdo.Answer(
+    assert decoded(row, segments=True) == sdo.Message(
         Kind.SEGMENT, None, content(row), toggle=row['toggle'] << 4, last=row['last'])
 
 
 @pytest.mark.parametrize('row', rows('abort'))
 def test_abort(row: dict[str, Any]) -> None:
-    assert decoded(row) == sdo.Answer(Kind.ABORT, place(row), number=int(row['code'], 16))
+    assert decoded(row) == sdo.Message(Kind.ABORT, place(row), number=int(row['code'], 16))
     assert decoded(row, segments=True).kind is Kind.ABORT
 
 
@@ -181,4 +184,4 @@ def test_command_bytes_of_all_sizes() -> None:
         assert sdo.encode_download(5, 0x2000, 1, data).data[0] == int(
             heads['download'][str(size)], 16)
         answer = bytes((int(heads['uploaded'][str(size)], 16), 0, 0x20, 1)) + data.ljust(4, b'\0')
-        assert sdo.decode_answer(answer).data == data
+        assert sdo.decode(Direction.RESPONSE, answer).data == data

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-An executor in a thread of its own, which no callback can bring down.
+Threads of the bridge: an executor's, which no callback can bring down, and a periodic one's.
 
 A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
 with the executor's wait. Results of other threads are left here.
@@ -12,9 +12,7 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import (
-    ExternalShutdownException, ShutdownException, SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 
 from drive_can_bridge.clock import Clock
 
@@ -73,3 +71,52 @@ class ExecutorThread:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._clock.wait(self._clock.now() + ERROR_PAUSE)
+
+
+class PeriodicThread:
+    """
+    Calls ``action`` every ``period`` s of the steady clock, for the first time after one.
+
+    A timer of rclpy would do as well. But each time it is due the executor looks at every service
+    of every drive anew: 12 ms of computing for 15 drives, beside an exchange that wants the
+    interpreter every 0.3 ms.
+
+    :param failed: takes one line about an exception that ``action`` let escape.
+    """
+
+    def __init__(self, name: str, period: float, action: Callable[[], None],
+                 failed: Callable[[str], None], clock: Clock) -> None:
+        self._period = period
+        self._now = clock.now
+        self._action = action
+        self._failed = failed
+        self._changed = clock.alarm()   # an Event costs more than many an action
+        self._ending = False
+        self._thread = clock.worker(self._run, name)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def set_period(self, period: float) -> None:
+        """Begin anew with another period, in s."""
+        self._period = period
+        self._changed.ring()
+
+    def stop(self) -> None:
+        """End, and wait for a call that is under way."""
+        self._ending = True
+        self._changed.ring()
+        self._thread.join(5.0)
+
+    def _run(self) -> None:
+        due = self._now() + self._period
+        while not self._ending:
+            if self._changed.wait(due):
+                due = self._now() + self._period
+                continue
+            try:
+                self._action()
+            except Exception as error:  # noqa: BLE001  outermost loop of a thread
+                self._failed(f'{type(error).__name__}: {error}')
+            due = max(due + self._period, self._now())  # never twice to catch up

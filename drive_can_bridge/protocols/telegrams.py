@@ -1,0 +1,66 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What a row says in the table of telegrams of a protocol.
+
+The tables are enums whose values are such rows: :class:`.canopen.sdo.Command`,
+:class:`.canopen_pkw.pkw.Function`, :class:`.cannord.parameter_frame.Task` and ``Response``.
+Sessions, simulated drives and ``decode`` read and write frames by them, and take from them which
+answer belongs to which request. ``test/protocols/test_telegrams.py`` wants a frame of a named
+source for every row, and sees every change of one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+import struct
+from typing import Any
+
+
+class Direction(Enum):
+    """Who speaks; the value is what a line of text shows."""
+
+    REQUEST = '>'
+    RESPONSE = '<'
+    NEITHER = '-'
+
+
+@dataclass(frozen=True)
+class TelegramType:
+    """
+    One row.
+
+    :param direction: who sends it; ``NEITHER``: both sides may.
+    :param code: what tells it from others of its direction, and ``mask``: the bits that tell.
+    :param layout: its data bytes, for :mod:`struct`.
+    :param fields: names of the numbers and bytes in it, in order.
+    :param answers: names of the rows that may answer it.
+    """
+
+    direction: Direction
+    code: int
+    mask: int
+    layout: str
+    fields: str
+    answers: str = ''
+
+    def is_sent_by(self, direction: Direction) -> bool:
+        """Tell whether it goes this way."""
+        return self.direction in (direction, Direction.NEITHER)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The fields, one by one."""
+        return self.fields.split()
+
+    @cached_property
+    def _packing(self) -> struct.Struct:
+        return struct.Struct(self.layout)
+
+    def pack(self, values: Mapping[str, Any]) -> bytes:
+        """Return the data bytes of the fields; what is no field of it is left out."""
+        return self._packing.pack(*[values[name] for name in self.names])
+
+    def unpack(self, data: bytes) -> dict[str, Any]:
+        """Return the fields; the data have their length."""
+        return dict(zip(self.names, self._packing.unpack(data)))
