@@ -37,6 +37,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
+from drive_can_bridge.protocols.placement import SentWrites
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -128,14 +129,14 @@ class MailboxCourier(Courier[Step, Reply]):
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
     :param retry: how long and how often the device is asked.
-    :param wrote: takes every write that left.
+    :param sent: keeps the books of what left.
     """
 
     def __init__(self, send: Callable[[Message, Left], None], *, order: str, retry: RetryPolicy,
-                 wrote: Callable[[Write], None] = lambda _: None) -> None:
+                 sent: SentWrites[Span] | None = None) -> None:
         super().__init__(retry)
         self._send = send
-        self._wrote = wrote
+        self._sent = sent
         self._order = order
         self._synchronised = False
         self._toggle = False            # of the last request
@@ -231,8 +232,8 @@ class MailboxCourier(Courier[Step, Reply]):
             self._toggle = not self._toggle     # the device has not seen this one
 
     def _write_left(self, write: Write, sent: bool, now: float) -> None:
-        if sent:
-            self._wrote(write)
+        if sent and self._sent is not None:
+            self._sent.note(write.span, write.words)
         self._left(sent, now)
 
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:

@@ -38,7 +38,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.session import Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network
@@ -47,17 +47,19 @@ from drive_can_bridge.protocols.canopen.node import (
     Change, Node, START_PERIOD, START_SPACING,
 )
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    MailboxChannel, MailboxCourier, Procedure,
+)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polled_exchange import PolledExchange
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, PolledSession, Raws
 
 
-class PkwSession(Session):
+class PkwSession(PolledSession):
     """NMT supervision, the polled exchange, and the requests of users between its reads."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
@@ -72,16 +74,12 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._started_at = -math.inf    # by NMT, the last time
-        sent = SentWrites(self.sent, placement)
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry,
-            wrote=lambda write: sent.note(write.span, write.words)))
-        self._writers = Writers(self, self._channel, self.stop_ended)
-        self._rounds = Rounds(self, self._channel, self._writers.write_setpoints)
-        self._exchange = PolledExchange(
-            self, self._channel, self._rounds.read, found=self._found,
-            answered=self._rounds.ended, missed=self._missed,
-            present=lambda: not self._node.heartbeat_lost)
+            sent=SentWrites(self.sent, placement)))
+        self._writers = Writers(self, self._channel)
+        self._rounds = Rounds(self, self._channel, self._writers)
+        self._exchange = PolledExchange(self, self._channel)
         self.users = Users(
             self, procedures.RegisterAccess(self._channel, self.retry, placement),
             blocked=self._refusal, control_refusal=self._writers.control_refusal)
@@ -127,14 +125,24 @@ class PkwSession(Session):
 
     # -- online and offline -----------------------------------------------------------------------
 
-    def _found(self, now: float) -> None:
+    def read_round(self) -> Procedure:
+        return self._rounds.read()
+
+    def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
+        self._rounds.ended(now, found=found)
+
+    @property
+    def present(self) -> bool:
+        return not self._node.heartbeat_lost
+
+    def round_found(self, now: float) -> None:
         self._course.end()
         self.be_online()
         self._writers.forget()
         self.control_changed(now)
         self._writers.write_setpoints(now)
 
-    def _missed(self, reason: Sentence, now: float) -> None:
+    def round_missed(self, reason: Sentence, now: float) -> None:
         if reason and self.online:
             gap = self._rounds.gap
             self._silent(sentences.lost_because(reason, gap) if gap else reason, now)
@@ -323,7 +331,8 @@ class PkwSession(Session):
         if self.stage is not Stage.RUNNING:
             return soonest
         soonest = min(soonest, self._round_due, self._course.next_timer(),
-                      self._node.next_timer(), self.setpoints.expires_at, self.neutral_stop.next_timer())
+                      self._node.next_timer(), self.setpoints.expires_at,
+                      self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
     # -- state ------------------------------------------------------------------------------------

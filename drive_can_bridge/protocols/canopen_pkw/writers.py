@@ -18,7 +18,7 @@ a device under local control, say, takes it as soon as it is back under remote c
 """
 
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
@@ -51,12 +51,10 @@ class Writers:
     """
     What writes to one drive.
 
-    :param stop_ended: called when a stop has run its course.
     :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
-    def __init__(self, session: Session, channel: MailboxChannel,
-                 stop_ended: Callable[[], None]) -> None:
+    def __init__(self, session: Session, channel: MailboxChannel) -> None:
         drive = session.configuration
         self._session = session
         self._channel = channel
@@ -75,7 +73,7 @@ class Writers:
         self._made_room = False                 # for setpoints, in this round
         self._patience = STOP_PATIENCE          # s until a stop is written again
         self._stop: SafeStop[Step, Reply] = SafeStop(
-            session, channel, stop_ended, status_word(drive), self._read_status)
+            session, channel, session.stop_ended, status_word(drive), self._read_status)
         self.again = StopAgain(
             session, channel, self._stop, lambda now: self.stop(now, again=True))
 
@@ -99,7 +97,7 @@ class Writers:
         Write a control word that has changed.
 
         :param known: the status was read just now, or there is none. A word that may start the
-            drive is repeated only then: one that was off meanwhile, unseen, must not start by that.
+            drive is repeated only then: one that was off, unseen, must not start by that.
         """
         control, word, waits = self._session.control, self._word, self._output.holds_word()
         if control is not None and word is not None and not waits:

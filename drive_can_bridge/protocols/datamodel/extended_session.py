@@ -74,14 +74,7 @@ class ExtendedSession(Session):
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
-        self._side = AcyclicSide(
-            self,
-            encode_read=lambda number, count: extended.encode_read_request(
-                station, number, count),
-            encode_write=lambda number, words: extended.encode_write(station, number, words),
-            decode=lambda frame, step: extended.decode_answer(
-                frame, station, None if step is None else step.key, strict=strict),
-            together=extended.SLOTS, stop_ended=self._stop_ended)
+        self._side = AcyclicSide(self, extended.AcyclicCodec(station, strict))
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
         self._codec = CyclicCodec(
@@ -304,11 +297,11 @@ class ExtendedSession(Session):
             self._exchange.timer.stop()
             if self._side.control_slot is not None and not self._exchange.book.missed_in_row:
                 self._side.stop.look(now)
-            self._stop_ended()
+            self.stop_ended()
         elif self._differs:
             self._exchange.stop()
 
-    def _stop_ended(self) -> None:
+    def stop_ended(self) -> None:
         if (self.stage is Stage.STOPPING and not self._side.stop.running
                 and (self._exchange.cycles_left == 0 or not self._exchange.cycling)):
             self._exchange.doubt_the_end()

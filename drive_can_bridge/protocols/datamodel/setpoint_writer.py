@@ -29,7 +29,6 @@ from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 
-Rounds = PolledExchange[Step, Reply]
 #: s between two looks at the status word, while a request is under way and otherwise
 STATUS_PERIOD_PENDING = 0.05
 STATUS_PERIOD = 0.5
@@ -135,7 +134,7 @@ class SetpointWriter:
     :ivar word_written_at: when the control word left last.
     """
 
-    def __init__(self, session: Session, exchange: Rounds, courier: ParameterCourier,
+    def __init__(self, session: Session, exchange: PolledExchange, courier: ParameterCourier,
                  numbers: Numbers, output: AcyclicOutput, *, slot: int | None) -> None:
         self.word_written_at = -math.inf
         self._session = session
