@@ -145,7 +145,6 @@ class MailboxCourier(Courier[Step, Reply]):
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
         self._late = False                      # at first
-        self._patience = 0.0                    # s that an answer has if it did at once
 
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
@@ -223,13 +222,18 @@ class MailboxCourier(Courier[Step, Reply]):
             return
         if sent:
             if self._late:
-                self.deadline = self._until = max(self._until, now + 0.5 * self._patience)
+                more = 0.5 * self._patience(self.step)
+                self.deadline = self._until = max(self._until, now + more)
             return
         self._refused_at = now
         if isinstance(self.step, Write) and self.step.blind:
             self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
+
+    def _patience(self, step: Step | None) -> float:
+        """Return how many s the answer to a step has."""
+        return self.retry.timeout if step is None or step.timeout is None else step.timeout
 
     def _write_left(self, write: Write, sent: bool, now: float) -> None:
         if sent and self._sent is not None:
@@ -251,15 +255,13 @@ class MailboxCourier(Courier[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self.retry.timeout if step.timeout is None else step.timeout
         left = self._left
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             left = partial(self._write_left, step)
-        self._patience = timeout
-        self.deadline = self._until = now + timeout
+        self.deadline = self._until = now + self._patience(step)
         self._send(self._request, left)
 
 

@@ -27,7 +27,7 @@ class Rounds:
     The rounds of one drive.
 
     :param writers: write setpoints between two reads: commands do not wait for slow rounds.
-    :ivar status_known: the status was read just now, or there is none to be read.
+    :ivar blank: there is no status to be read.
     :ivar gap: what the last one asked for in vain, though others were answered, in words.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
@@ -42,7 +42,7 @@ class Rounds:
         self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
         status = status_word(drive)
         self._status = None if status is None else (status, self._placement.span(status))
-        self.status_known = status is None
+        self.blank = status is None
         self.gap = NOTHING
         self.refusals: dict[Span, Sentence] = {}
         self._words: dict[Address, int] = {}    # those of refused registers are missing
@@ -88,13 +88,12 @@ class Rounds:
             self._session.control_changed(now)
 
     def _take_status(self, words: dict[Address, int]) -> None:
-        now, control = self._channel.now, self._session.control
+        now, gate = self._channel.now, self._session.gate
         raw = self._status_among(words)
-        if raw is not None and control is not None:
-            self.status_known = True
-            self._session.gate.status(raw, now)
-        self._session.control_changed(now)
-        self.status_known = self._status is None
+        if raw is not None:
+            gate.status(raw, now)
+        gate.follow()
+        self._writers.write_control(now, known=self.blank or raw is not None)
 
     def _status_among(self, words: dict[Address, int]) -> int | None:
         return None if self._status is None else self._placement.raw_among(*self._status, words)

@@ -263,7 +263,7 @@ class PkwSession(PolledSession):
 
     def see_to_control_word(self, now: float) -> None:
         if self.online:
-            self._writers.write_control(now, known=self._rounds.status_known)
+            self._writers.write_control(now, known=self._rounds.blank)
 
     # -- frames -----------------------------------------------------------------------------------
 
