@@ -8,20 +8,22 @@ The page is made from the profiles; a test compares it. To write it anew:
 
 from collections.abc import Iterator
 from pathlib import Path
+import re
 
 from drive_can_bridge.profiles.catalogue import check, Checked
 from drive_can_bridge.resources import profiles_directory, share_directory
 
 PAGE = 'profile_trust.md'
 #: how the entries of each kind are headed, in the order of the page
-TITLES: dict[bool | None, str] = {True: 'verified', False: 'not verified', None: 'not judged'}
+TITLES: dict[bool | None, str] = {True: 'Verified; open', False: 'Not verified; open',
+                                None: 'Not judged; open'}
 
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-Which entries of the shipped profiles are backed by a document, and by which. *Verified*: address,
-type, scale and unit are. *Open*: what nothing backs. None has been compared with a device. What
-has no number is in process data only.
+What of each entry nothing backs, and in brackets which documents back the rest (of each entry by
+itself they stand in the profile). *Verified*: address, type, scale and unit are backed. None has
+been compared with a device.
 
 Made by `docs/profile_provenance.py`; edit the profiles ([keys](profiles.md)).
 """
@@ -45,31 +47,34 @@ def _section(checked: Checked) -> Iterator[str]:
           'them verified.'
     yield ''
     for verified, title in TITLES.items():
-        if rows := _rows(checked, verified):
-            yield f'| {title} | open | source |'
-            yield '|---|---|---|'
-            for row, names in rows.items():
-                yield f'| {", ".join(names)} | {" | ".join(row)} |'
+        if groups := _groups(checked, verified):
+            yield f'### {title}'
             yield ''
+            for still_open, (names, sources) in groups.items():
+                yield f'* {", ".join(names)}: {still_open} ({", ".join(sources)})' \
+                    if still_open else f'* {", ".join(names)}: nothing'
+            yield ''
+    yield '### Sources'
+    yield ''
     for key, text in checked.sources.items():
         yield f'* **{key}**: {text}'
 
 
-def _rows(checked: Checked, verified: bool | None) -> dict[tuple[str, ...], list[str]]:
-    """Return the entries, with their addresses, by what is open of them and their sources."""
-    rows: dict[tuple[str, ...], list[str]] = {}
+def _groups(checked: Checked, verified: bool | None) -> dict[str, tuple[list[str], list[str]]]:
+    """Return entries and sources by what is open of them."""
+    groups: dict[str, tuple[list[str], list[str]]] = {}
     for name, entry in checked.entries.items():
         parameter = checked.loaded.profile.parameters[name]
         if parameter.verified is not verified:
             continue
-        row = _cell(entry.get('open', '')), _cell(entry.get('source', ''))
-        address = '' if parameter.number is parameter.index is None else f' {parameter.address}'
-        rows.setdefault(row, []).append(f'`{name}`{address}')
-    return rows
-
-
-def _cell(text: str) -> str:
-    return text.replace('|', '\\|')
+        names, sources = groups.setdefault(entry.get('open', ''), ([], []))
+        # what is verified has its address in the profile; the other one is to be compared
+        address = '' if verified or parameter.number is parameter.index is None else (
+            f' {parameter.address}')
+        names.append(f'`{name}`{address}')
+        sources += [each for each in re.split(r', (?![^(]*\))', entry.get('source', ''))
+                    if each not in sources]
+    return groups
 
 
 def main() -> None:

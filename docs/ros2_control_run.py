@@ -33,7 +33,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 import yaml  # noqa: E402
 
 from drive_can_bridge.cli.main import main as drive_can  # noqa: E402
-from drive_can_bridge.simulation.plant import Mechanics  # noqa: E402
+from drive_can_bridge.simulation.registers import Mechanics  # noqa: E402
 
 FOLDER = HERE.parent / 'config' / 'ros2_control'
 AXES = ('shoulder', 'elbow', 'wrist')

@@ -8,13 +8,11 @@ import os
 from pathlib import Path
 
 from drive_can_bridge.backup.document import head_of, settings_of, written
-from drive_can_bridge.cli.arguments import output
-from drive_can_bridge.cli.atomic_write import differs, write_atomically
-from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage
+from drive_can_bridge.cli.command import agreed, complain, FAILED, output, say, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, chosen, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import print_json
+from drive_can_bridge.cli.output import differs, print_json, write_atomically
 from drive_can_bridge.client.drive import Drive, ReadOutcome
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter

@@ -7,13 +7,21 @@ Whatever it raises, :mod:`.main` says in one line.
 """
 
 import argparse
+from argparse import ArgumentParser, ArgumentTypeError
+from collections.abc import Callable
 from contextlib import suppress
+import math
+import os
+from pathlib import Path
+import re
 import sys
 import termios
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
-from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.configuration import BridgeConfiguration
+from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.monitor.snapshot import is_ros_name
 
 FAILED = 1
 WRONG_USAGE = 2
@@ -22,6 +30,12 @@ LINE_MAX = 4000
 _NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your installation '
            "(/opt/ros/jazzy/setup.bash), or get it as wheels with the extra 'ros' of this package "
            "(pip install '.[ros]')")
+#: stands for ``--params-file`` in commands that have no way through a bridge
+PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'
+Parsed = TypeVar('Parsed')
+#: what an argument that begins with the name of a drive looks like
+_EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
+             '--axis': 'DRIVE:KEY=VALUE, for example lift:load=0.3'}
 
 
 class WrongUsage(DriveCanError):
@@ -110,3 +124,87 @@ def answered(question: str) -> bool:
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
     print(printable(f'{question} [y/N] ', None), end='', file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ('y', 'yes')
+
+
+def above_zero(text: str) -> float:
+    """Read a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise ArgumentTypeError(f'{text}: allowed is a number above 0')
+    return value
+
+
+def bitrate(text: str) -> int:
+    """Read a bit rate, ``125000`` or ``500k`` or ``1M``."""
+    found = re.fullmatch(r'([0-9]+(?:\.[0-9]+)?)([kKmM]?)(?:bit/s)?', text.strip())
+    value = float(found[1]) * {'': 1.0, 'k': 1e3, 'm': 1e6}[found[2].lower()] if found else 0.0
+    if not 1000 <= value <= 8e6:
+        raise ArgumentTypeError(f'{text}: allowed are 1000 to 8000000 bit/s, also as 500k')
+    return round(value)
+
+
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """Return what reads an integer within limits."""
+    def read(text: str) -> int:
+        if not (text.isdecimal() and low <= int(text) <= high):
+            raise ArgumentTypeError(f'{text}: allowed are {low} to {high}')
+        return int(text)
+    return read
+
+
+def output(text: str) -> str:
+    """Read the name of a file, or directory, that is written; its last slash matters to some."""
+    if text in ('', '-'):
+        raise ArgumentTypeError(f'{text!r} names no file')
+    return text
+
+
+def output_path(text: str) -> Path:
+    """Read the same as a path."""
+    return Path(output(text))
+
+
+def namespace(text: str) -> str:
+    """Read ``/cell1``, or ``cell1``; '' for the root."""
+    name = f'/{text.strip("/")}'
+    if name != '/' and not is_ros_name(name):
+        raise ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
+    return name if name != '/' else ''
+
+
+def add_params_file(parser: ArgumentParser, help_text: str) -> None:
+    """Add the option that names the parameter file; the environment stands for it."""
+    default = os.environ.get(PARAMS_FILE)
+    parser.add_argument('-p', '--params-file', metavar='FILE', type=Path, required=not default,
+                        default=Path(default) if default else None,
+                        help=f'{help_text} (default: ${PARAMS_FILE})')
+
+
+def add_seconds(parser: ArgumentParser) -> None:
+    """Add the option that ends listening."""
+    parser.add_argument('--seconds', metavar='S', type=above_zero, default=math.inf,
+                        help='end by itself after that time (default: runs until Ctrl-C)')
+
+
+def of_drive(option: str, text: str, configuration: BridgeConfiguration,
+             parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
+    """
+    Read an argument that begins with the name of a drive.
+
+    :param option: ``--fault`` or ``--axis``.
+    :param parse: reads what stands behind the colon; may raise ValueRefused.
+    :raises WrongUsage: it makes no sense; says what is allowed.
+    """
+    name, colon, rest = text.partition(':')
+    if not colon:
+        raise WrongUsage(f'{option} {text}: write {_EXAMPLES[option]}')
+    if name not in configuration.drives:
+        raise WrongUsage(f"{option} {text}: no drive '{name}'; drives: "
+                         f"{', '.join(configuration.drives) or 'none'}")
+    try:
+        return name, parse(rest)
+    except ValueRefused as error:
+        raise WrongUsage(f'{option} {text}: {error}') from None

@@ -48,7 +48,7 @@ def define(parser: ArgumentParser) -> None:
 
 
 def _namespace(text: str) -> str:
-    from drive_can_bridge.cli.arguments import namespace
+    from drive_can_bridge.cli.command import namespace
     return namespace(text)
 
 

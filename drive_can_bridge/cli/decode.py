@@ -8,8 +8,7 @@ import json
 from pathlib import Path
 import sys
 
-from drive_can_bridge.cli.arguments import add_params_file, add_seconds
-from drive_can_bridge.cli.command import complain, FAILED, WrongUsage
+from drive_can_bridge.cli.command import add_params_file, add_seconds, complain, FAILED, WrongUsage
 from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration

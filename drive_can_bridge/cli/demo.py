@@ -10,8 +10,7 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from drive_can_bridge.cli.arguments import above_zero, of_drive, whole
-from drive_can_bridge.cli.command import what_is_missing, WrongUsage
+from drive_can_bridge.cli.command import above_zero, of_drive, what_is_missing, whole, WrongUsage
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import SignalWatcher

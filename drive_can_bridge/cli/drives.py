@@ -12,8 +12,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from drive_can_bridge.cli.arguments import namespace
-from drive_can_bridge.cli.command import complain, what_is_missing, WrongUsage
+from drive_can_bridge.cli.command import complain, namespace, what_is_missing, WrongUsage
 from drive_can_bridge.cli.output import Bar, waiting
 from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source

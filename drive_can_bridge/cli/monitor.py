@@ -12,12 +12,11 @@ import json
 import os
 import sys
 
-from drive_can_bridge.cli.arguments import namespace
-from drive_can_bridge.cli.command import what_is_missing
+from drive_can_bridge.cli.command import namespace, what_is_missing
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.source import Source
+from drive_can_bridge.monitor.snapshot import Source
 from drive_can_bridge.monitor.summary import balance, documents, Lines
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher

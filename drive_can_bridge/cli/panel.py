@@ -10,8 +10,7 @@ from collections.abc import Callable
 import socket
 import sys
 
-from drive_can_bridge.cli.arguments import namespace, whole
-from drive_can_bridge.cli.command import what_is_missing
+from drive_can_bridge.cli.command import namespace, what_is_missing, whole
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment

@@ -5,10 +5,8 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter, SUP
 from pathlib import Path
 from typing import Any
 
-from drive_can_bridge.cli.arguments import output_path
-from drive_can_bridge.cli.atomic_write import differs, write_atomically
-from drive_can_bridge.cli.command import agreed, complain, FAILED, say, WrongUsage
-from drive_can_bridge.cli.output import print_json, print_table
+from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
+from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.build import Built

@@ -8,8 +8,7 @@ from typing import Any
 
 from rich.live import Live
 
-from drive_can_bridge.cli.arguments import above_zero
-from drive_can_bridge.cli.command import FAILED
+from drive_can_bridge.cli.command import above_zero, FAILED
 from drive_can_bridge.cli.drives import (
     add_words, complete_words, opened, read_all, source_of, split_words,
 )

@@ -9,8 +9,9 @@ from pathlib import Path
 import sys
 from typing import Any, TextIO
 
-from drive_can_bridge.cli.arguments import above_zero, add_params_file, add_seconds, output_path
-from drive_can_bridge.cli.command import complain, WrongUsage
+from drive_can_bridge.cli.command import (
+    above_zero, add_params_file, add_seconds, complain, output_path, WrongUsage,
+)
 from drive_can_bridge.cli.output import print_json
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drive_can_bridge.backup.document import Backup, is_setting, read_backup
-from drive_can_bridge.backup.plan import (
-    Change, LeftAlone, names_to_read, other_type, plan_restore, problems_in, RestorePlan,
-    says_nothing, strangers, why_left_alone,
+from drive_can_bridge.backup.restore import (
+    Change, LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in,
+    RestorePlan, Restorer, RestoreResult, says_nothing, strangers, why_left_alone,
 )
-from drive_can_bridge.backup.restore import NotAsInFile, Restorer, RestoreResult
 from drive_can_bridge.cli.command import (
     agreed, complain, FAILED, must_be_answerable, say, WrongUsage,
 )

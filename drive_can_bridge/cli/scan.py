@@ -17,10 +17,10 @@ import re
 import shlex
 from typing import Any
 
-from drive_can_bridge.cli.arguments import above_zero, bitrate, output_path
-from drive_can_bridge.cli.atomic_write import differs, write_atomically
-from drive_can_bridge.cli.command import agree_to_hazard, agreed, complain, FAILED, WrongUsage
-from drive_can_bridge.cli.output import print_json
+from drive_can_bridge.cli.command import (
+    above_zero, agree_to_hazard, agreed, bitrate, complain, FAILED, output_path, WrongUsage,
+)
+from drive_can_bridge.cli.output import differs, print_json, write_atomically
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING

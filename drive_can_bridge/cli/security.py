@@ -9,11 +9,12 @@ import argparse
 import ipaddress
 from pathlib import Path
 
-from drive_can_bridge.cli.arguments import namespace, output_path, whole
-from drive_can_bridge.cli.atomic_write import write_atomically
+from drive_can_bridge.cli.command import namespace, output_path, whole
+from drive_can_bridge.cli.output import write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.security.policy import BRIDGE, OPERATOR, policy, VIEWER
-from drive_can_bridge.security.tls import bridge_profile, client_profile, Meeting
+from drive_can_bridge.security.policy import (
+    BRIDGE, bridge_profile, client_profile, Meeting, OPERATOR, policy, VIEWER,
+)
 
 _NODE = 'drive_can_bridge'
 _POLICY, _TLS_BRIDGE, _TLS_CLIENT = 'policy.xml', 'tls_bridge.xml', 'tls_client.xml'

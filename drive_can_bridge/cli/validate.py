@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from drive_can_bridge.cli.command import FAILED
-from drive_can_bridge.configuration.bus_check import Adapters, bus_shares
+from drive_can_bridge.configuration.checks import Adapters, bus_shares
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError

@@ -10,13 +10,15 @@ What values were a moment ago, and how fast counters count.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Enum, IntEnum
 from itertools import islice
 import math
 import re
+from typing import Protocol
 
+from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.monitor.values import ParameterInfo
 
@@ -354,3 +356,73 @@ class Snapshot:
     def drive(self, name: str) -> DriveSnapshot | None:
         """Return a drive by its full name."""
         return next((drive for drive in self.drives if drive.name == name), None)
+
+
+class Source(Protocol):
+    """Fills a model; what takes time happens in :meth:`poll`, and is over soon."""
+
+    def poll(self, now: float) -> None:
+        """Take what has arrived, and ask for what is missing."""
+
+    def focus(self, *drives: str) -> None:
+        """Look at drives closely: all of their samples, and their bits."""
+
+    def glance(self, now: float) -> None:
+        """Take the samples of what is looked at closely, and nothing else."""
+
+    def watch(self, wanted: bool) -> None:
+        """Ask for samples, or for none: nobody looks at them."""
+
+    @property
+    def busy(self) -> bool:
+        """Wait for an answer to something: polling soon is worth it."""
+
+    def close(self) -> None:
+        """Leave."""
+
+
+class Stop(Enum):
+    """What ends the movement of a drive."""
+
+    QUICK_STOP = 'quick_stop'
+    DISABLE = 'disable'
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """
+    What became of a request to a drive.
+
+    :param text: what the bridge or the drive says, in words; may be '' after a success.
+    """
+
+    success: bool
+    text: str = ''
+
+
+class Operations(Protocol):
+    """
+    Asks drives for what a person wants; none of it ever moves one.
+
+    The answer comes in a later :meth:`poll`, in its thread.
+    """
+
+    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
+        """
+        Take the answers that have arrived.
+
+        :param stops: of each drive: their services are kept at hand, so that a stop waits for no
+            discovery.
+        :return: somebody still waits for an answer.
+        """
+
+    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+        """Stop a drive."""
+
+    def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
+              now: float) -> None:
+        """Write a parameter of a drive."""
+
+    def read(self, drive: str, names: Sequence[str],
+             done: Callable[[Sequence[Value | None]], None], now: float) -> None:
+        """Read parameters of a drive; None: could not be read."""

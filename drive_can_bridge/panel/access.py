@@ -25,7 +25,7 @@ from urllib.parse import parse_qs
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from drive_can_bridge.monitor.source import Stop
+from drive_can_bridge.monitor.snapshot import Stop
 
 #: as in panel.css, which who is not let in does not get
 _STYLE = """

@@ -30,7 +30,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot
-from drive_can_bridge.monitor.source import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.panel.access import ROLE, Role
 from drive_can_bridge.panel.feed import Feed
 

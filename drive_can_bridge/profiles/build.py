@@ -15,8 +15,9 @@ from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_
 from drive_can_bridge.configuration.yaml_nodes import SIZE_MAX
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.profiles.catalogue import family_complaints
-from drive_can_bridge.profiles.names import name_of, unique
-from drive_can_bridge.profiles.text import block, comment, entry_lines, one_line, scalar
+from drive_can_bridge.profiles.names import (
+    block, comment, entry_lines, name_of, one_line, scalar, unique,
+)
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: identity object of CiA 301: vendor, product, revision, serial number

@@ -16,11 +16,10 @@ import unicodedata
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
-from drive_can_bridge.profiles.names import known_unit, name_of, split_unit, unit
+from drive_can_bridge.profiles.names import known_unit, name_of, one_line, split_unit, unit
 from drive_can_bridge.profiles.numerals import (
     decimal_sign, factor, integer, interval, is_hexadecimal_only, Measure, measure, rounded,
 )
-from drive_can_bridge.profiles.text import one_line
 
 #: ends the search for headings
 _HEAD_ROWS = 60

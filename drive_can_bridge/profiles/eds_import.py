@@ -23,9 +23,8 @@ from typing import Any
 from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
 from drive_can_bridge.profiles.catalogue import check, Checked
 from drive_can_bridge.profiles.csv_import import access_of
-from drive_can_bridge.profiles.names import unit
+from drive_can_bridge.profiles.names import one_line, unit
 from drive_can_bridge.profiles.numerals import rounded
-from drive_can_bridge.profiles.text import one_line
 from drive_can_bridge.resources import command_that_brings, profiles_directory
 
 #: how the library needs these keys to be written

@@ -19,7 +19,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger as TriggerService
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.configuration.declare import identity_name
+from drive_can_bridge.configuration.load import identity_name
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )

@@ -2,6 +2,5 @@
 """
 Who may talk: the SROS2 policy of a bridge, and TLS between hosts.
 
-:mod:`.names` lists what a bridge offers, :mod:`.policy` says who may use it, :mod:`.tls` writes
-profiles for Fast DDS. Nothing here is needed by a bridge that runs.
+Nothing here is needed by a bridge that runs.
 """

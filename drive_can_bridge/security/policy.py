@@ -18,6 +18,7 @@ The topics and services of a bridge and its drives, by what they are for.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from xml.etree import ElementTree
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
@@ -33,6 +34,12 @@ STATES = ('get_available_states', 'get_available_transitions', 'get_state',
 TRANSITIONS = ('change_state',)
 #: what every node has
 TYPE_DESCRIPTION = 'get_type_description'
+_NAMESPACE = 'http://www.eprosima.com'
+_TRANSPORT = 'drive_can_tls'
+#: a peer without a certificate of ours is shown out
+_VERIFY = ('VERIFY_PEER', 'VERIFY_FAIL_IF_NO_PEER_CERT')
+#: what is older than TLS 1.2
+_OPTIONS = ('NO_SSLV2', 'NO_SSLV3', 'NO_TLSV1', 'NO_TLSV1_1')
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +127,7 @@ def _enclave(parent: ElementTree.Element, path: str) -> ElementTree.Element:
 
 def _add_bridge(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str) -> None:
     for number, node in enumerate(nodes):
-        profile = _profile(profiles, namespace, node.node)
+        profile = _enclave_profile(profiles, namespace, node.node)
         shared = [_EVENTS, _LOG, _DIAGNOSTICS] if number == 0 else [_EVENTS]
         _rule(profile, 'topics', 'publish', [*shared, *_own(node.shown)])
         _rule(profile, 'topics', 'subscribe', [_CLOCK, _EVENTS, *_own(node.taken)])
@@ -139,18 +146,19 @@ def _add_client(profiles: ElementTree.Element, nodes: list[NodeNames], namespace
             used['publish'] += _absolute(place, node, node.taken)
             used['request'] += _absolute(place, node, node.obeyed)
     # access goes by enclave: what one of its nodes may use, all of them may
-    profile = _profile(profiles, '/', OPERATOR[1:] if acts else VIEWER[1:])
+    profile = _enclave_profile(profiles, '/', OPERATOR[1:] if acts else VIEWER[1:])
     _rule(profile, 'topics', 'publish', used['publish'])
     _rule(profile, 'topics', 'subscribe', seen)
     _rule(profile, 'services', 'request', used['request'])
     for node_name in (profile.attrib['node'], *_TOOLS):
         # every node announces its parameters, writes to the log, and has this service
-        profile = _profile(profiles, '/', node_name)
+        profile = _enclave_profile(profiles, '/', node_name)
         _rule(profile, 'topics', 'publish', [_EVENTS, _LOG])
         _rule(profile, 'services', 'reply', [f'~/{TYPE_DESCRIPTION}'])
 
 
-def _profile(parent: ElementTree.Element, namespace: str, node: str) -> ElementTree.Element:
+def _enclave_profile(parent: ElementTree.Element, namespace: str,
+                     node: str) -> ElementTree.Element:
     return ElementTree.SubElement(parent, 'profile', ns=namespace, node=node)
 
 
@@ -168,3 +176,74 @@ def _own(names: Iterable[str]) -> list[str]:
 
 def _absolute(place: str, node: NodeNames, names: Iterable[str]) -> list[str]:
     return [f'{place}/{node.node}/{name}' for name in names]
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """
+    Where bridge and clients meet.
+
+    :param host: address of the bridge's host, as clients reach it.
+    :param port: of TCP.
+    :param certificates: directory with ``key.pem``, ``cert.pem``, ``ca.pem`` on each host.
+    """
+
+    host: str = '127.0.0.1'
+    port: int = 5100
+    certificates: Path = Path('/etc/drive_can/certificates')
+
+
+def bridge_profile(meeting: Meeting) -> str:
+    """Write the profile of the bridge's host."""
+    return _transport_profile(meeting, listens=True)
+
+
+def client_profile(meeting: Meeting) -> str:
+    """
+    Write the profile of Fast DDS for all other hosts: TCP only, both sides show a certificate.
+
+    The bridge listens, everybody else connects to it. There is no element for a password: an
+    empty one is not the same as none, and keeps a key without a password from being read.
+    """
+    return _transport_profile(meeting, listens=False)
+
+
+def _transport_profile(meeting: Meeting, *, listens: bool) -> str:
+    root = ElementTree.Element('dds', xmlns=_NAMESPACE)
+    profiles = ElementTree.SubElement(root, 'profiles')
+    descriptors = ElementTree.SubElement(profiles, 'transport_descriptors')
+    transport = ElementTree.SubElement(descriptors, 'transport_descriptor')
+    _text(transport, 'transport_id', _TRANSPORT)
+    _text(transport, 'type', 'TCPv4')
+    if listens:
+        ports = ElementTree.SubElement(transport, 'listening_ports')
+        _text(ports, 'port', str(meeting.port))
+    tls = ElementTree.SubElement(transport, 'tls')
+    for name, file in (('private_key_file', 'key.pem'), ('cert_chain_file', 'cert.pem'),
+                       ('verify_file', 'ca.pem')):
+        _text(tls, name, str(meeting.certificates / file))
+    modes = ElementTree.SubElement(tls, 'verify_mode')
+    for mode in _VERIFY:
+        _text(modes, 'verify', mode)
+    options = ElementTree.SubElement(tls, 'options')
+    for option in _OPTIONS:
+        _text(options, 'option', option)
+    participant = ElementTree.SubElement(
+        profiles, 'participant', profile_name=_TRANSPORT, is_default_profile='true')
+    rtps = ElementTree.SubElement(participant, 'rtps')
+    _text(ElementTree.SubElement(rtps, 'userTransports'), 'transport_id', _TRANSPORT)
+    _text(rtps, 'useBuiltinTransports', 'false')
+    if not listens:
+        builtin = ElementTree.SubElement(rtps, 'builtin')
+        peers = ElementTree.SubElement(builtin, 'initialPeersList')
+        locator = ElementTree.SubElement(ElementTree.SubElement(peers, 'locator'), 'tcpv4')
+        _text(locator, 'address', meeting.host)
+        _text(locator, 'physical_port', str(meeting.port))
+        _text(locator, 'port', '0')
+    ElementTree.indent(root)
+    return ('<?xml version="1.0" encoding="UTF-8"?>\n'
+            f'{ElementTree.tostring(root, encoding="unicode")}\n')
+
+
+def _text(parent: ElementTree.Element, name: str, text: str) -> None:
+    ElementTree.SubElement(parent, name).text = text

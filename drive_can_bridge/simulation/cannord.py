@@ -8,25 +8,77 @@ to process data shows the inverter as it was before them, as the manuals warn. W
 it sends its process data unasked.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 import math
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    LENGTH, ParameterLayout, Response, Task,
+    LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, Response, Task, VALUE_RESPONSES, WRITES,
 )
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
 )
-from drive_can_bridge.simulation.cannord_plant import InverterPlant
-from drive_can_bridge.simulation.cannord_table import CannordTable
+from drive_can_bridge.protocols.cannord.states import (
+    ENABLE_OPERATION, FAULT_RESET, NO_DISABLE_VOLTAGE, NO_QUICK_STOP, STATUS_BITS, SWITCH_ON,
+)
+from drive_can_bridge.simulation import quantities
+from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, RUNNING, State
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.registers import PlantFactory, Refused
+from drive_can_bridge.simulation.motor import MotorPlant, WARNING_TEMPERATURE
+from drive_can_bridge.simulation.quantities import clamp, nearest_raw, Quantity
+from drive_can_bridge.simulation.registers import (
+    Mechanics, PlantFactory, Refusal, Refused, Registers,
+)
 
+(INVALID_NUMBER, CANNOT_BE_CHANGED, LIMIT_EXCEEDED, WRONG_SUBINDEX, NOT_AN_ARRAY, INVALID_TYPE,
+ ) = range(6)
+INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
+
+_ARRAY_READS = (Task.READ_ARRAY, Task.READ_ELEMENTS)
+_NEGATIVE = 0xFFFF
+_LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
+WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
+    1 << STATUS_BITS[name] for name in (
+        'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
+#: what an SK 5xxE says of itself, by parameter number: version of the data base
+IDENTITY = {742: 1}
+
+#: status bits of a state: those of OFF2 and OFF3 come from the control word in two states
+_STATUS = {
+    State.SWITCH_ON_DISABLED: 0x40,
+    State.READY_TO_SWITCH_ON: 0x31,
+    State.SWITCHED_ON: 0x33,
+    State.OPERATION_ENABLED: 0x37,
+    State.SHUTDOWN: 0x37,
+    State.QUICK_STOP: 0x17,
+    State.FAULT: 0x08,
+}
+#: OFF2 and OFF3 in the control word, and how far on they stand in the status word
+_OFF = NO_DISABLE_VOLTAGE | NO_QUICK_STOP
+_OFF_SHIFT = 3
+#: the parameter set, in both
+_SET = states.PARAMETER_SETS - 1 << states.PARAMETER_SET_SHIFT
+
+_MACHINE = Machine((
+    Rule(FAULTS, 0, 0, None),
+    Rule(None, NO_DISABLE_VOLTAGE, 0, State.SWITCH_ON_DISABLED),
+    Rule((State.QUICK_STOP,), 0, 0, None),              # ends at standstill only
+    Rule(RUNNING, NO_QUICK_STOP, 0, State.QUICK_STOP),
+    Rule(None, NO_QUICK_STOP, 0, State.SWITCH_ON_DISABLED),
+    Rule(RUNNING, SWITCH_ON, 0, State.SHUTDOWN),
+    Rule(None, SWITCH_ON, 0, State.READY_TO_SWITCH_ON),
+    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),      # left with bit 0 = 0 only
+    Rule(None, ENABLE_OPERATION, ENABLE_OPERATION, State.OPERATION_ENABLED),
+    Rule(None, 0, 0, State.SWITCHED_ON),
+), reset=(FAULT_RESET, FAULT_RESET), power_on=(State.SWITCH_ON_DISABLED, _OFF),
+    # b4 = 0 uses the quick stop ramp, too, but leaves the inverter enabled
+    ramp=states.ENABLE_RAMP)
 #: P513, s that may pass between two telegrams; 0 or less: any
 TELEGRAM_TIMEOUT = 513
 #: what the fault number shows after that time: E10.2
@@ -34,6 +86,198 @@ TIMEOUT_FAULT = 10.2
 #: P515
 CAN_ADDRESS = 515
 _RESERVED_BIT = 0x2000
+
+
+@dataclass
+class Group:
+    """All entries with one number, by sub-index; one without a sub-index counts as 0."""
+
+    members: dict[int, Parameter] = field(default_factory=dict)
+    plain: bool = False
+
+    @property
+    def array(self) -> bool:
+        """Array tasks are possible."""
+        return not self.plain or len(self.members) > 1
+
+    @property
+    def sets(self) -> bool:
+        """Each parameter set has a value of its own."""
+        return self.plain and len(self.members) > 1
+
+
+def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, Group]:
+    groups: dict[int, Group] = {}
+    for parameter in parameters.values():
+        if parameter.number is None or parameter.number > NUMBER_MAX:
+            continue
+        group = groups.setdefault(parameter.number, Group())
+        group.members[parameter.subindex or 0] = parameter
+        group.plain = group.plain or parameter.subindex is None
+    return groups
+
+
+class CannordTable:
+    """
+    Everything that the parameter channel reaches.
+
+    What kind of parameter a number is follows from the entries of the profile that have it:
+
+    ===================================== =====================================================
+    entries                               kind
+    ===================================== =====================================================
+    one without ``subindex``              simple
+    all with ``subindex``                 array; element = sub-index
+    one without, others with ``subindex`` one value per parameter set; the one without is
+                                          set 1, sub-index 1 to 3 are the sets 2 to 4
+    ===================================== =====================================================
+
+    A sub-index counts in array tasks and in plain ones: the rule in the manuals wants array
+    tasks, examples in the manuals use plain ones. The motor obeys the values of the *active*
+    parameter set.
+    """
+
+    def __init__(self, registers: Registers) -> None:
+        self._registers = registers
+        self._groups = groups_of(registers.parameters)
+        self._active = 1
+
+    def answer(self, task: ParameterFrame) -> tuple[Response, int]:
+        """
+        Carry out a task.
+
+        :return: response identifier, and the value, negative where it is.
+        :raises Refused: with the error number of the manual.
+        """
+        what = task.identifier
+        if what not in list(Task):
+            raise Refused(INVALID_TASK)
+        if what == Task.NONE:
+            return Response.NONE, 0
+        group = self._groups.get(task.number)
+        if group is None:
+            raise Refused(INVALID_NUMBER)
+        array, double, eeprom = WRITES.get(what, (what in _ARRAY_READS, False, False))
+        if array and not group.array:
+            raise Refused(NOT_AN_ARRAY)
+        if what == Task.READ_ELEMENTS:
+            return Response.ELEMENTS, max(group.members) + 1
+        # The manuals contradict each other on a sub-index in plain tasks: where there is something
+        # to choose, it counts here, as in their examples; a simple parameter has no use for it.
+        parameter = group.members.get(task.index if group.array else 0)
+        if parameter is None:
+            raise Refused(WRONG_SUBINDEX)
+        if what in WRITES:
+            self._write(parameter, task.value, double=double, eeprom=eeprom)
+        elif not parameter.readable:
+            raise Refused(CANNOT_BE_REPRESENTED)
+        response = VALUE_RESPONSES[array, parameter.type.bits == 32]
+        return response, self._registers.raw(parameter.name)
+
+    def select_set(self, parameter_set: int) -> None:
+        """Make a parameter set, 1 to 4, the active one."""
+        if parameter_set == self._active:
+            return
+        self._active = parameter_set
+        for group in self._groups.values():
+            active = group.members.get(parameter_set - 1)
+            if group.sets and active is not None:
+                self._registers.stand_ins[group.members[0].name] = active.name
+
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter with a number and sub-index; None: there is none."""
+        parameter = self.numbered(raw.number or 0, raw.subindex or 0)
+        return parameter.name if parameter else None
+
+    def numbered(self, number: int, subindex: int = 0) -> Parameter | None:
+        """Return the parameter with a number and sub-index; None: there is none."""
+        group = self._groups.get(number)
+        return group.members.get(subindex) if group else None
+
+    def _write(self, parameter: Parameter, value: int, *, double: bool, eeprom: bool) -> None:
+        if (parameter.type.bits == 32) is not double:
+            raise Refused(INVALID_TYPE)
+        high, low = value >> 16, value & 0xFFFF
+        if not double and high not in (0, _NEGATIVE):
+            raise Refused(LIMIT_EXCEEDED)
+        # a negative word says so in the upper half, or comes without anything there
+        raw = low - 0x10000 if high and not double else parameter.raw_from_word(value)
+        refusal = self._registers.refusal({parameter.name: raw})
+        if refusal is not None:
+            raise Refused(LIMIT_EXCEEDED if refusal in _LIMITS else CANNOT_BE_CHANGED)
+        self._registers.write(parameter.name, raw, keep=eeprom, wear=int(eeprom))
+
+
+class InverterPlant(MotorPlant):
+    """
+    The motor of one inverter. See the base class.
+
+    Control words: BU 0050 page 30 (bits) and page 38 (states); where the two differ, on what bit
+    3 = 0 leads to, page 38 counts. A word with bit 10 = 0 is ignored as a whole.
+
+    In process data 4000h is 100 % of the maximum frequency, whatever the profile calls it: so
+    every frequency or speed among the actual values tells the same share of 100 % as the motor
+    has, in hertz as in percent.
+    """
+
+    def __init__(self, registers: Registers, configuration: DriveConfiguration,
+                 mechanics: Mechanics) -> None:
+        # entries of the sets 2 to 4, by name: the motor knows set 1 and what stands in for it
+        self._of_sets = {
+            member.name: group.members[0] for group in groups_of(registers.parameters).values()
+            if group.sets for index, member in group.members.items() if index != 0}
+        super().__init__(
+            registers, configuration, mechanics, operation=Operation(_MACHINE),
+            movable={name: parameter for name, parameter in registers.parameters.items()
+                     if name not in self._of_sets})
+        moved = self.speed_setpoint
+        self._mover = moved if moved in configuration.cyclic_request else None
+
+    def command(self, value: float) -> float:
+        """Return what the last control word makes of the frequency setpoint."""
+        operation, word = self.operation, self.operation.word
+        if self._mover is None:
+            return value
+        if operation.state is State.SHUTDOWN:
+            return 0.0
+        if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
+            return self.motor.speed
+        if not word & states.ENABLE_SETPOINT:
+            return 0.0
+        # rotation right has priority
+        if word & states.ROTATE_LEFT and not word & states.ROTATE_RIGHT:
+            name = self._mover.name
+            raw = self.registers.clamped(name, -self.registers.plain(name))
+            return float(self._mover.value_from_raw(raw))
+        return value
+
+    @property
+    def status_word(self) -> int:
+        motor, operation = self.motor, self.operation
+        target = self.target if operation.enabled and not operation.stopping else 0.0
+        word = _STATUS[operation.state] | operation.word & _SET | BUS_CONTROL
+        if operation.state in (State.SWITCH_ON_DISABLED, State.FAULT):
+            word |= (operation.word & _OFF) << _OFF_SHIFT
+        if motor.temperature > WARNING_TEMPERATURE:
+            word |= WARNING
+        if motor.speed == target:
+            word |= SETPOINT_REACHED
+        # at standstill the manuals' examples show "right"
+        return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
+
+    def initial(self, parameter: Parameter) -> int:
+        """Return what a new inverter has in a register: the same in all parameter sets."""
+        first = self._of_sets.get(parameter.name, parameter)
+        return IDENTITY.get(parameter.number or 0) or super().initial(first)
+
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        if parameter.number is not None or quantities.measured(parameter) is not Quantity.SPEED:
+            return super().source(parameter)
+        moved, motor = self.speed_setpoint, self.motor
+        if moved is None:
+            return lambda: 0
+        own, its = parameter.type.raw_range, moved.type.raw_range
+        return lambda: clamp(nearest_raw(moved, motor.speed, its), own)
 
 
 class SimulatedCannordInverter(SimulatedDrive):

@@ -7,23 +7,441 @@ else. What the manual page leaves open is done as docs/protocol_canopen_pkw.md s
 configuration of the drive can change: one file describes both ends.
 """
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+import math
+import struct
+from typing import NamedTuple
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.parameters import Parameter, Storage
+from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
+from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen_pkw_registers import RegisterTable
+from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
+from drive_can_bridge.simulation.control import (
+    FAULTS, Machine, Operation, Report, Rule, State, StatusWord,
+)
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
-from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.registers import PlantFactory, Refused
-from drive_can_bridge.simulation.starter import TEST_TRIP
-from drive_can_bridge.simulation.starter_plant import is_starter, StarterPlant
+from drive_can_bridge.simulation.motor import MotorPlant
+from drive_can_bridge.simulation.quantities import clamp, mains_swing, plausible
+from drive_can_bridge.simulation.registers import (
+    Mechanics, Plant, PlantFactory, Refusal, Refused, Registers,
+)
 
+#: bits of control register 1
+RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
+RUN = RUN_FORWARD | RUN_REVERSE
+
+#: A; the largest full load current of the controller, and what the motor takes
+CONTROLLER_CURRENT = 27.0
+LOAD_CURRENT = 6.3
+INRUSH_CURRENT = 45.0
+#: s
+INRUSH_TIME_CONSTANT = 0.4
+START_TIME = 2.0
+#: the motor may carry this share of its full load current for ever
+SERVICE_FACTOR = 1.1
+#: thermal image in s, per s of trip class: six times the full load current trips after the class
+CLASS_FACTOR = -1.0 / math.log1p(-(SERVICE_FACTOR / 6.0) ** 2)
+#: % of the thermal capacity
+TRIP_LEVEL, ALARM_LEVEL, RESET_LEVEL = 100.0, 85.0, 75.0
+#: longest step of the thermal image, s
+STEP = 0.05
+
+#: trip codes
+THERMAL_OVERLOAD, TEST_TRIP = 4, 10
+
+
+#: after a trip the run bits have to go before they count again
+MACHINE = Machine((
+    Rule((State.FAULT,), RUN, 0, State.FAULT_RELEASED),
+    Rule(FAULTS, 0, 0, None),
+    Rule((State.SWITCH_ON_DISABLED,), RUN, 0, State.READY_TO_SWITCH_ON),
+    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),
+    Rule(None, RUN, RUN_FORWARD, State.OPERATION_ENABLED),
+    Rule(None, RUN, RUN_REVERSE, State.OPERATION_ENABLED),
+    Rule(None, 0, 0, State.READY_TO_SWITCH_ON),
+), reset=(RESET, RESET), power_on=(State.READY_TO_SWITCH_ON, 0))
+GENERAL_CONFIGURATION = 601
+TRIP_CLASS = 606
+FULL_LOAD_RATIO = 652
+NODE_ADDRESS = 696
+CONTROL_REGISTER_1 = 704
+CONTROL_REGISTER_2 = 705
+STATUS_1 = 455
+
+#: bit of the general configuration register: settings can be changed
+CONFIGURATION_MODE = 1 << 0
+#: bits of control register 2
+CLEAR_ALL, CLEAR_THERMAL_LEVEL, CLEAR_SETTINGS = 1 << 0, 1 << 2, 1 << 3
+
+#: registers that are written in configuration mode only
+SETTINGS = {*range(540, 700)} - {GENERAL_CONFIGURATION}
+#: what settings are in a new controller, by register: in configuration mode, as from the factory
+DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
+            682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
+#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; its
+#: commercial reference, two characters a register
+IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
+            81: 270, 96: 270, **dict(enumerate(struct.unpack('>6H', b'LTMR27CFM   '), 64))}
+#: rank in the serial number: the node-ID, so that two controllers differ
+SERIAL_RANK = 73
+#: settings that take only multiples of something, by register
+STEPS = {TRIP_CLASS: 5}
+
+MAINS_VOLTAGE = 400.0
+MAINS_FREQUENCY = 50.0
+POWER_FACTOR = 0.85
+NEVER = 9999
+
+Figure = Callable[[], float]
 DEVICE_NAME = b'simulated LTMR'
 JUNK = (0x5A5A, 0x5A5A)
+
+
+class Starter:
+    """
+    The motor behind the contactor: currents and thermal image.
+
+    Not a model of any real controller: an induction motor switched on directly, with an inrush
+    current, a load current and a thermal image that trips. Time is an argument.
+
+    :ivar thermal: % of the thermal capacity.
+    :ivar full_load_current: A.
+    :ivar time_constant: s, of the thermal image.
+    """
+
+    def __init__(self) -> None:
+        self.thermal = 0.0
+        self.settings(100.0, 5.0)
+        self._on_for: float | None = None
+
+    @property
+    def current(self) -> float:
+        """Mean current of the phases, in A."""
+        if self._on_for is None:
+            return 0.0
+        inrush = INRUSH_CURRENT - LOAD_CURRENT
+        return LOAD_CURRENT + inrush * math.exp(-self._on_for / INRUSH_TIME_CONSTANT)
+
+    @property
+    def ratio(self) -> float:
+        return self.current / self.full_load_current
+
+    @property
+    def starting(self) -> bool:
+        """The motor was switched on a moment ago."""
+        return self._on_for is not None and self._on_for < START_TIME
+
+    @property
+    def alarm(self) -> bool:
+        """The motor is close to a trip."""
+        return self.thermal >= ALARM_LEVEL
+
+    @property
+    def time_to_trip(self) -> float:
+        """Time in s until this current would trip; infinity: never."""
+        final = self._final_level
+        if final <= TRIP_LEVEL:
+            return math.inf
+        left = (final - self.thermal) / (final - TRIP_LEVEL)
+        return self.time_constant * math.log(max(left, 1.0))
+
+    @property
+    def time_to_reset(self) -> float:
+        """Time in s until a motor that is off has cooled down enough."""
+        return self.time_constant * math.log(max(self.thermal / RESET_LEVEL, 1.0))
+
+    def settings(self, full_load_percent: float, trip_class: float) -> None:
+        """Take over the full load current, in % of the largest one, and the trip class."""
+        self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
+        self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
+
+    def advance(self, duration: float, *, on: bool) -> bool:
+        """
+        Let time pass.
+
+        :param on: the contactor is closed.
+        :return: the thermal capacity is used up, which has opened it.
+        """
+        self._on_for = (self._on_for or 0.0) if on else None
+        steps = max(math.ceil(duration / STEP), 1)
+        for _ in range(min(steps, 10_000)):
+            step = duration / steps
+            if self._on_for is not None:
+                self._on_for += step
+            self.thermal += (self._final_level - self.thermal) * -math.expm1(
+                -step / self.time_constant)
+            if self._on_for is not None and self.thermal >= TRIP_LEVEL:
+                self._on_for = None
+                return True
+        return False
+
+    @property
+    def _final_level(self) -> float:
+        """Thermal level that the present current leads to."""
+        return TRIP_LEVEL * (self.ratio / SERVICE_FACTOR) ** 2
+
+
+class Cell(NamedTuple):
+    """One register: the parameter it belongs to, and the lowest bit of what it holds of it."""
+
+    parameter: Parameter
+    shift: int
+
+
+class RegisterTable:
+    """
+    Everything that can be addressed.
+
+    A value of 32 bits takes two registers, the order of its words is that of the configuration. A
+    refused access changes nothing and carries an SDO abort code.
+    """
+
+    def __init__(self, configuration: DriveConfiguration, registers: Registers) -> None:
+        self._registers = registers
+        self._word_order = configuration.options.word_order
+        self._cells: dict[Address, Cell] = {}
+        parameters = list(registers.parameters.values())
+        # what the profile says goes before what follows from the table of the vendor
+        for parameter in parameters:
+            if parameter.number is not None:
+                self._enter(parameter, Address(parameter.number))
+            if parameter.index is not None:
+                self._enter(parameter, Address(parameter.index, parameter.subindex or 0))
+        for parameter in parameters:
+            register = register_number(parameter)
+            place = None if register is None else object_of(register)
+            if register is not None:
+                self._enter(parameter, Address(register))
+            if place is not None and parameter.index is None:
+                self._enter(parameter, Address(*place))
+
+    def _enter(self, parameter: Parameter, address: Address) -> None:
+        shifts = range(0, parameter.type.bits, 16)
+        if (parameter.word_order or self._word_order) == 'high_first':
+            shifts = shifts[::-1]
+        for shift in shifts:
+            self._cells.setdefault(address, Cell(parameter, shift))
+            address = address.next
+
+    def read(self, address: Address, count: int) -> tuple[int, ...]:
+        """
+        Read one register or two adjacent ones.
+
+        :raises Refused: there is none, or it cannot be read.
+        """
+        cells = self._find(address, count)
+        for cell in cells:
+            if not cell.parameter.readable:
+                raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+        return tuple([self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells])
+
+    def write(self, address: Address, words: tuple[int, ...]) -> None:
+        """
+        Write one register or two adjacent ones, or none of them.
+
+        :raises Refused: there is none, it is read-only, or it does not take the value.
+        """
+        values: dict[str, int] = {}
+        wear: Counter[str] = Counter()
+        for cell, word in zip(self._find(address, len(words)), words, strict=True):
+            parameter = cell.parameter
+            value = values.get(parameter.name, self._value(parameter))
+            values[parameter.name] = value & ~(WORD_MAX << cell.shift) | word << cell.shift
+            wear[parameter.name] += parameter.storage is Storage.EEPROM
+        raws = {name: self._registers.parameters[name].raw_from_word(value)
+                for name, value in values.items()}
+        refusal = self._registers.refusal(raws)
+        if refusal is not None:
+            raise Refused(CODES[refusal])
+        for name, raw in raws.items():
+            self._registers.write(name, raw, wear=wear[name])
+
+    def highest_subindex(self, index: int) -> int | None:
+        return max((address.subindex for address in self._cells
+                    if address.subindex is not None and address.word == index), default=None)
+
+    def read_object(self, index: int, subindex: int) -> bytes:
+        """Read a register, or how many of them an index has."""
+        highest = self.highest_subindex(index)
+        if subindex == 0 and highest is not None:
+            return bytes((highest,))
+        return self.read(Address(index, subindex), 1)[0].to_bytes(2, 'little')
+
+    def write_object(self, index: int, subindex: int, data: bytes) -> None:
+        address = Address(index, subindex)
+        if address in self._cells:
+            checked_length(data, 2)
+        self.write(address, (int.from_bytes(data[:2], 'little'),))
+
+    def name_of(self, raw: Parameter) -> str | None:
+        """Return the name of the parameter at a register or object; None: there is none."""
+        address = Address(raw.index or 0, raw.subindex) if raw.number is None else (
+            Address(raw.number))
+        cell = self._cells.get(address)
+        return None if cell is None else cell.parameter.name
+
+    def _find(self, address: Address, count: int) -> list[Cell]:
+        addresses = (address,) if count == 1 else (address, address.next)
+        for each in addresses:
+            if each not in self._cells:
+                # no such number or index, or no such sub-index
+                known = (any(block.index == each.word for block in BLOCKS)
+                         or self.highest_subindex(each.word) is not None)
+                raise Refused(abort_codes.NO_SUCH_SUBINDEX if each.by_object and known
+                              else abort_codes.NO_SUCH_OBJECT)
+        return [self._cells[each] for each in addresses]
+
+    def _value(self, parameter: Parameter) -> int:
+        return parameter.word_from_raw(self._registers.raw(parameter.name))
+
+
+def register_number(parameter: Parameter) -> int | None:
+    """Return the register of a parameter, by its number or by its CANopen address."""
+    if parameter.number is not None or parameter.index is None:
+        return parameter.number
+    return register_of(parameter.index, parameter.subindex or 0)
+
+
+def is_starter(profile: Profile) -> bool:
+    """Tell whether a profile is that of an LTMR: its control word is register 704."""
+    control = profile.control
+    word = profile.parameters.get(control.parameter) if control else None
+    return word is not None and register_number(word) == CONTROL_REGISTER_1
+
+
+class StarterPlant(Plant):
+    """
+    A :class:`.Starter` behind registers. Its thermal image outlives a loss of power.
+
+    It is there so that the registers look alive, belong together and react to what is commanded.
+    Which register means what is partly recollection; docs/protocol_canopen_pkw.md says how far it
+    can be trusted.
+    """
+
+    def __init__(self, registers: Registers, configuration: DriveConfiguration,
+                 mechanics: Mechanics) -> None:
+        self.registers = registers
+        self.control = configuration.profile.control
+        self.operation = Operation(MACHINE)
+        self.starter = Starter()
+        self._node = configuration.station
+        # of several names for a register the first counts, as everywhere
+        self._by_register = {register_number(p): p.name
+                             for p in reversed(list(registers.parameters.values()))}
+        self._figures = self._all_figures()
+
+    def initial(self, parameter: Parameter) -> int:
+        known: dict[int, int] = {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}
+        return known.get(register_number(parameter) or 0, plausible(parameter))
+
+    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+        """Take settings with the motor off and in configuration mode only; no word otherwise."""
+        register = register_number(parameter) or 0
+        if raw % STEPS.get(register, 1):
+            return Refusal.OUT_OF_RANGE
+        configuring = self._content(GENERAL_CONFIGURATION) & CONFIGURATION_MODE
+        if register in SETTINGS and (self.operation.enabled or not configuring):
+            return Refusal.UNTOLD
+        return None
+
+    def written(self, name: str, before: int, raw: int) -> None:
+        if name == self._by_register[CONTROL_REGISTER_1]:
+            self.operation.word_written(raw)
+        elif name == self._by_register.get(CONTROL_REGISTER_2):
+            appeared = raw & ~before
+            if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
+                self.starter.thermal = 0.0
+                self.operation.end_cause()
+            if appeared & (CLEAR_ALL | CLEAR_SETTINGS):
+                for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
+                    if register in self._by_register:
+                        self.registers.reset(self._by_register[register])
+
+    def _content(self, register: int) -> int:
+        name = self._by_register.get(register)
+        return DEFAULTS[register] if name is None else self.registers.plain(name)
+
+    def advance(self, now: float) -> None:
+        starter, operation = self.starter, self.operation
+        starter.settings(self._content(FULL_LOAD_RATIO), self._content(TRIP_CLASS))
+        if starter.advance(operation.advance(now), on=operation.enabled):
+            operation.trip(starter.time_to_reset, THERMAL_OVERLOAD)
+
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        register = register_number(parameter)
+        if register == STATUS_1:
+            # the profile's own conditions are met in addition, whatever its bits are called
+            word = StatusWord(replace(parameter, bits=()), self.control)
+            return lambda: word.compose(Report(self.operation), self._status())
+        figure = self._figures.get(register)
+        if figure is None:
+            return None
+        ends, content = parameter.type.raw_range, figure
+        return lambda: clamp(math.floor(content() + 0.5), ends)
+
+    def _all_figures(self) -> dict[int | None, Figure]:
+        """Return what gives the contents of registers."""
+        starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
+        found: dict[int | None, Figure] = {
+            450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
+            451: code,
+            452: lambda: _bit_of(int(code())),
+            460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
+            461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
+            465: lambda: starter.thermal,
+            471: lambda: 1 if starter.current else 0,
+            472: lambda: 32.0 + 0.1 * starter.thermal,
+            474: lambda: 100.0 * MAINS_FREQUENCY,
+            475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
+            481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
+            511: lambda: min(starter.time_to_trip, NEVER),
+            NODE_ADDRESS: lambda: self._node,
+            # no trips and alarms of these groups, no inputs, nothing to ground
+            **dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0),
+            # outputs: one for each direction
+            **dict.fromkeys((458, 459), lambda: (
+                1 << bool(self.operation.word & RUN_REVERSE) if self.operation.enabled else 0)),
+        }
+        # active and reactive power, in 0.1 kW
+        for register, share in ((482, POWER_FACTOR), (483, math.sqrt(1.0 - POWER_FACTOR ** 2))):
+            found[register] = _scaled(math.sqrt(3.0) * MAINS_VOLTAGE * share / 100.0,
+                                      lambda: starter.current)
+        # the average and the three phases, in % of the full load current, in 0.01 A, in V
+        for place, share in enumerate((1.0, 1.01, 0.99, 1.0)):
+            found[466 + place] = _scaled(100.0 * share, lambda: starter.ratio)
+            found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
+        for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
+            found[476 + place] = _scaled(MAINS_VOLTAGE * share,
+                                         lambda: 1.0 + mains_swing(self.operation.now))
+        return found
+
+    def _status(self) -> int:
+        operation, ratio = self.operation, self.starter.ratio
+        faulted = operation.faulted
+        bits = (not faulted, operation.enabled, faulted, self.starter.alarm, faulted,
+                faulted and operation.reset_allowed, True, ratio > 0.1)
+        word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
+        return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
+
+
+def _scaled(factor: float, figure: Figure) -> Figure:
+    return lambda: factor * figure()
+
+
+def _bit_of(code: int) -> int:
+    """Return the bit of a trip code in its register; codes from 17 on stand in the next one."""
+    return 1 << code - 1 if 1 <= code <= 16 else 0
 
 
 class SimulatedPkwDrive(SimulatedDrive):

@@ -2,11 +2,11 @@
 """
 A simulated servo drive of CiA 402 on CANopen.
 
-Its objects are in :mod:`~.cia402_objects`, state machine and axis in :mod:`~.cia402_plant`; what
-it has because it is a node, in :mod:`~.canopen`. It begins as it leaves the factory, with the
-control word in RPDO1 and the status word in TPDO1; with ``mapping: verify`` or ``assume`` as
-configured, since somebody must have set it up. It watches a master's heartbeat (1016h) from the
-first one on, and where that is missing does what 6007h says.
+Its objects, state machine and axis are in :mod:`~.cia402_plant`; what it has because it is a
+node, in :mod:`~.canopen`. It begins as it leaves the factory, with the control word in RPDO1 and
+the status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody must
+have set it up. It watches a master's heartbeat (1016h) from the first one on, and where that is
+missing does what 6007h says.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,16 +18,14 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
-from drive_can_bridge.simulation.canopen import consumer
-from drive_can_bridge.simulation.canopen.dictionary import bytes_of, ObjectDictionary
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.pdos import Factory, Pdo, Pdos
-from drive_can_bridge.simulation.canopen.sdo import checked_length
-from drive_can_bridge.simulation.cia402_objects import own_parameters
-from drive_can_bridge.simulation.cia402_plant import Habits, ServoPlant
+from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
+from drive_can_bridge.simulation.cia402_plant import Habits, own_parameters, ServoPlant
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.registers import PlantFactory, Refused
 
+CONSUMER_HEARTBEATS = 0x1016
 DEVICE_NAME = b'simulated CiA 402 servo drive'
 #: servo drive (additional information 2) of profile 402
 DEVICE_TYPE = 0x00020192
@@ -37,6 +35,65 @@ NOT_STORED = 0x08000020
 WRONG_LENGTH = Emergency(0x8210, 0x11)
 #: bits of the error register by the first digit of a code: CiA 301
 _REGISTER_BITS = {1: 0x01, 2: 0x02, 3: 0x04, 4: 0x08, 8: 0x10}
+
+
+class HeartbeatConsumer:
+    """
+    Watches other nodes, each at a place of the list: node << 16 | ms.
+
+    :param places: how many there are.
+    """
+
+    def __init__(self, places: int) -> None:
+        self._watched = [0] * places
+        self._stored = list(self._watched)
+        self.begin()
+
+    def store(self) -> None:
+        """Keep the list without power."""
+        self._stored = list(self._watched)
+
+    def begin(self) -> None:
+        """Have what was stored, and have heard nobody."""
+        self._watched = list(self._stored)
+        self._heard = [math.inf] * len(self._watched)
+
+    def read(self, subindex: int) -> bytes:
+        if subindex == 0:
+            return bytes((len(self._watched),))
+        return self._watched[self._place(subindex)].to_bytes(4, 'little')
+
+    def write(self, subindex: int, data: bytes) -> None:
+        if subindex == 0:
+            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+        place = self._place(subindex)
+        self._watched[place] = int.from_bytes(checked_length(data, 4), 'little')
+        self._heard[place] = math.inf
+
+    def hear(self, node: int, now: float) -> None:
+        """Take a heartbeat."""
+        for place, watched in enumerate(self._watched):
+            if watched >> 16 & network.NODE_MAX == node and watched & 0xFFFF:
+                self._heard[place] = now
+
+    def next_timer(self) -> float:
+        """Return when the next heartbeat is missed."""
+        return min(map(self._due, range(len(self._watched))))
+
+    def missed(self, now: float) -> list[int]:
+        """Return the nodes that are missed now, each once."""
+        missed = [place for place in range(len(self._watched)) if self._due(place) <= now]
+        for place in missed:
+            self._heard[place] = math.inf
+        return [self._watched[place] >> 16 & network.NODE_MAX for place in missed]
+
+    def _due(self, place: int) -> float:
+        return self._heard[place] + (self._watched[place] & 0xFFFF) / 1000.0
+
+    def _place(self, subindex: int) -> int:
+        if subindex > len(self._watched):
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+        return subindex - 1
 
 
 class SimulatedServoDrive(SimulatedDrive):
@@ -55,7 +112,7 @@ class SimulatedServoDrive(SimulatedDrive):
         self.table = ObjectDictionary(self.registers)
         self.pdos = Pdos(self.configuration.station, self.table, self._factory())
         self.habits = Habits()
-        self._consumer = consumer.HeartbeatConsumer(CONSUMERS)
+        self._consumer = HeartbeatConsumer(CONSUMERS)
         self._node_state = NmtState.BOOT_UP
         self._wrong_length = False
         self.power_lost(forget=False)
@@ -212,7 +269,7 @@ class SimulatedServoDrive(SimulatedDrive):
         found = self.pdos.find(index)
         if found is not None:
             return self.pdos.read(*found, subindex)
-        if index == consumer.INDEX:
+        if index == CONSUMER_HEARTBEATS:
             return self._consumer.read(subindex)
         if index == STORE and subindex <= 1:
             return bytes((1,)).ljust(4 if subindex else 1, b'\0')
@@ -222,7 +279,7 @@ class SimulatedServoDrive(SimulatedDrive):
         found = self.pdos.find(index)
         if found is not None:
             self.pdos.write(*found, subindex, data)
-        elif index == consumer.INDEX:
+        elif index == CONSUMER_HEARTBEATS:
             self._consumer.write(subindex, data)
         elif index == STORE and subindex == 1:
             if checked_length(data, 4) != SAVE:

@@ -1,33 +1,36 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The inside of a simulated drive of CiA 402: its state machine, its modes, and the axis it moves.
+The inside of a simulated drive of CiA 402: objects, state machine, modes, and the axis it moves.
+
+What the profile lists keeps its name, type and limits; the other objects are there under their raw
+names (``x605a.00``). Types are those of EDS files of several makers, see docs/protocol_cia402.md.
 
 The axis is counted in revolutions, and what objects say of it in the units that the profile has
 for them; without one an increment is 1/10,000 of a revolution, and speeds are increments per s.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 import math
 import random
+from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.simulation import names, scales
-from drive_can_bridge.simulation.canopen.dictionary import Place
+from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.canopen.pdos import PdoHabits
-from drive_can_bridge.simulation.cia402_objects import own_parameters, STANDARD
+from drive_can_bridge.simulation.canopen.sdo import Place
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, State
 from drive_can_bridge.simulation.motor import (
-    FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, Travel,
+    COAST_TIME, FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, SINKING_SPEED, Travel,
+    WARNING_TEMPERATURE,
 )
-from drive_can_bridge.simulation.motor_plant import (
-    COAST_TIME, SINKING_SPEED, WARNING_TEMPERATURE,
-)
-from drive_can_bridge.simulation.plant import Mechanics, Refusal
-from drive_can_bridge.simulation.registers import Registers
+from drive_can_bridge.simulation.registers import Mechanics, Refusal, Registers
 
+_TYPES = {'u8': ParameterType.UINT8, 'i8': ParameterType.INT8, 'u16': ParameterType.UINT16,
+          'i16': ParameterType.INT16, 'u32': ParameterType.UINT32, 'i32': ParameterType.INT32}
 INCREMENTS = 10_000.0
 #: revolutions per second, and per second each second at full current
 RATED_SPEED, FASTEST = 50.0, 1000.0
@@ -53,6 +56,56 @@ _SPEEDS = (0x606B, 0x606C, 0x607F, 0x6081, 0x6099, 0x60FF)
 _ACCELERATIONS = (0x6083, 0x6084, 0x6085, 0x609A)
 _PER_SPEED = {'rpm': 1 / 60, 'rev/s': 1.0, 'rad/s': 0.5 / math.pi, 'deg/s': 1 / 360}
 _PER_WAY = {'rev': 1.0, 'rad': 0.5 / math.pi, 'deg': 1 / 360, '°': 1 / 360}
+
+
+class Standard(NamedTuple):
+    """An object of the standard: its type, whether it may be written, and what is in a new one."""
+
+    type: ParameterType
+    access: Access
+    initial: int = 0
+
+
+def _standard(text: str) -> dict[Place, Standard]:
+    """Read a table: index[.sub-index], type, access, and what is in it at first."""
+    found = {}
+    for line in text.split('\n'):
+        for row in filter(None, map(str.strip, line.split(';'))):
+            where, kind, access, *initial = row.split()
+            index, _, subindex = where.partition('.')
+            found[int(index, 16), int(subindex or '0', 16)] = Standard(
+                _TYPES[kind], Access(access), int(initial[0], 0) if initial else 0)
+    return found
+
+
+#: 605Ah 2: quick-stop ramp; 605Ch 1 and 605Dh 1: slow-down ramp; 605Bh 0: power off; 605Eh 2:
+#: quick-stop ramp; 6007h 1: a lost bus is a fault. 6065h: an increment is 1/10,000 revolution
+STANDARD = _standard("""
+    1002 u32 ro; 1005 u32 rw 0x80; 1006 u32 rw; 1019 u8 rw; 1029.1 u8 rw
+    6007 i16 rw 1; 603F u16 ro; 6040 u16 rw; 6041 u16 ro
+    6042 i16 rw; 6043 i16 ro; 6044 i16 ro; 6046.1 u32 rw; 6046.2 u32 rw 3000
+    6048.1 u32 rw 3000; 6048.2 u16 rw 1; 6049.1 u32 rw 3000; 6049.2 u16 rw 1
+    605A i16 rw 2; 605B i16 rw; 605C i16 rw 1; 605D i16 rw 1; 605E i16 rw 2
+    6060 i8 rw; 6061 i8 ro; 6062 i32 ro; 6064 i32 ro; 6065 u32 rw 20000
+    606B i32 ro; 606C i32 ro; 6071 i16 rw; 6072 u16 rw 2000; 6074 i16 ro; 6075 u32 rw 4000
+    6076 u32 rw 1270; 6077 i16 ro; 6078 i16 ro; 6079 u32 ro
+    607A i32 rw; 607C i32 rw; 607D.1 i32 rw -0x80000000; 607D.2 i32 rw 0x7FFFFFFF
+    607F u32 rw 500000; 6081 u32 rw 100000; 6083 u32 rw 500000; 6084 u32 rw 500000
+    6085 u32 rw 2500000; 6086 i16 rw; 6087 u32 rw 1000
+    6098 i8 rw 35; 6099.1 u32 rw 20000; 6099.2 u32 rw 5000; 609A u32 rw 500000
+    60C0 i16 rw; 60C1.1 i32 rw; 60C2.1 u8 rw 1; 60C2.2 i8 rw -3
+    60F4 i32 ro; 60FD u32 ro; 60FF i32 rw; 6502 u32 ro 0x3EF
+""")
+
+
+def own_parameters(configuration: DriveConfiguration) -> Mapping[str, Parameter]:
+    """Return the objects of the standard that a profile does not list, by their raw names."""
+    listed = {(each.index, each.subindex or 0)
+              for each in configuration.profile.parameters.values()}
+    return {name: Parameter(name=name, index=place[0], subindex=place[1], type=object_.type,
+                            access=object_.access, listed=False)
+            for place, object_ in STANDARD.items() if place not in listed
+            for name in (name_of_object(*place),)}
 
 
 @dataclass(frozen=True)
@@ -195,7 +248,8 @@ class ServoPlant:
         # nothing survives a loss of power but what was stored
         self.volatile: Collection[str] = set(registers.parameters)
         fault = configuration.profile.fault
-        self.trip_code = names.likely_fault(fault.codes) if fault and fault.codes else OVERCURRENT
+        self.trip_code = (quantities.likely_fault(fault.codes) if fault and fault.codes
+                          else OVERCURRENT)
         self.machine = DriveOperation(self.raw)
         self.operation: Operation = self.machine
         self.habits = Habits()
@@ -230,13 +284,13 @@ class ServoPlant:
     def initial(self, parameter: Parameter) -> int:
         standard = STANDARD.get(self._places.get(parameter.name, (0, 0)))
         if standard is None:
-            return scales.plausible(parameter)
+            return quantities.plausible(parameter)
         factor = _revolutions(parameter) * INCREMENTS
         raw = standard.initial
         if abs(raw) < 0x7FFFFFFF and factor != 1.0 and self._places[parameter.name][0] in (
                 *_POSITIONS, *_SPEEDS, *_ACCELERATIONS):
             raw = round(raw / factor)
-        return scales.clamp(raw, parameter.raw_limits)
+        return quantities.clamp(raw, parameter.raw_limits)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         place = self._places.get(parameter.name, (0, 0))
@@ -254,7 +308,7 @@ class ServoPlant:
             (0x6074, 0): self._torque,
             (0x6077, 0): self._torque,
             (0x6078, 0): lambda: 1000.0 * math.copysign(motor.current, motor.torque),
-            (0x6079, 0): lambda: 48_000 * (1.0 + scales.mains_swing(self.operation.now)),
+            (0x6079, 0): lambda: 48_000 * (1.0 + quantities.mains_swing(self.operation.now)),
             (0x60F4, 0): lambda: self._demand - self.shaft.position,
             (0x60FD, 0): self._inputs,
         }

@@ -11,7 +11,7 @@ Sans-IO, in the dialect of the bridge's sessions:
     for frame in drive.take_frames(): ...
 
 A family derives a class that knows its telegrams. The values are in its
-:class:`~.registers.Registers`, what moves is a :class:`~.plant.Plant`.
+:class:`~.registers.Registers`, what moves is a :class:`~.registers.Plant`.
 """
 
 from abc import ABC, abstractmethod
@@ -26,9 +26,8 @@ from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_fault
-from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.plant import Mechanics
-from drive_can_bridge.simulation.registers import PlantFactory, Registers
+from drive_can_bridge.simulation.motor import MotorPlant
+from drive_can_bridge.simulation.registers import Mechanics, PlantFactory, Registers
 
 #: the manual's least time between two EEPROM writes
 EEPROM_TIME = 0.020

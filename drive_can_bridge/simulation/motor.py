@@ -1,14 +1,35 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A motor that moves: speed follows its setpoint with a ramp, and what follows from that.
+A motor behind the registers of any profile, found by the names of the parameters.
+
+What no rule knows is plain memory; docs/simulation.md has the rules as a table.
+
+One setpoint moves the shaft: the first speed or position in the cyclic request, or else the first
+speed of the profile, or else the first position. Speeds and positions of the other kind are those
+of the shaft then. Any other pair of setpoint and actual value follows on its own, from 0 to its
+largest setpoint in a second.
+
+A position goes to its setpoint with finite speed and acceleration. Without torque it rolls to a
+standstill, or sinks under its load.
 
 Not a model of any real machine. It is there so that values look alive, have the right signs, and
 react to what is commanded. Time is an argument; all formulas are closed, so that it does not
 matter how often time passes.
 """
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 import math
+import random
+from typing import NamedTuple
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.simulation import quantities
+from drive_can_bridge.simulation.control import ENDS, machine_of, Operation, Report, StatusWord
+from drive_can_bridge.simulation.quantities import Quantity, RampParameter, RampUse
+from drive_can_bridge.simulation.registers import Mechanics, Refusal, Registers
 
 #: shares of the rated torque: at rated speed, at any speed, at one rated speed per second
 LOAD_TORQUE = 0.30
@@ -22,6 +43,18 @@ AMBIENT_TEMPERATURE = 25.0
 #: °C above ambient that rated current leads to in the end
 TEMPERATURE_RISE = 50.0
 TEMPERATURE_TIME_CONSTANT = 120.0
+#: s from 0 to the rated speed, where the profile has no ramp parameter
+RAMP_TIME = 1.0
+RAMP_TIME_MIN = 0.01
+QUICK_STOP_TIME = 0.2
+#: s from rated speed to standstill without torque
+COAST_TIME = 4.0
+#: share of the rated speed with which the full load sinks
+SINKING_SPEED = 0.1
+
+WARNING_TEMPERATURE = 80.0
+#: what a fault code shows while there is a fault
+FAULT_CODE = 7
 
 
 @dataclass(frozen=True)
@@ -141,3 +174,312 @@ class Motor:
                   + INERTIA_TORQUE * self.shaft.slope / self.rated_speed)
         self.torque = min(max(torque, -torque_max), torque_max)
         self.current = math.hypot(MAGNETISING_CURRENT, self.torque)
+
+
+class Bounds:
+    """
+    The limits of one motor.
+
+    A motor that lacks torque speeds up more slowly than its ramp says, does not get to its speed,
+    and brakes hardly faster than it runs down. Like all of the motor, that is no model of a real
+    one.
+
+    :param parameters: those that may limit it.
+    :param moved: the setpoint that moves it.
+    """
+
+    def __init__(self, registers: Registers, parameters: Mapping[str, Parameter],
+                 moved: Parameter | None) -> None:
+        self._registers = registers
+        self._found = {
+            parameter.name: (parameter, quantity)
+            for parameter, quantity in quantities.limits(parameters)
+            if parameter is not moved and (
+                moved and parameter.unit == moved.unit if quantity is Quantity.SPEED
+                else quantities.measures(parameter.unit, quantity))}
+
+    def initial(self, name: str, rated_speed: float) -> float | None:
+        """Return what a new drive has in a limit of which its profile says nothing."""
+        parameter, quantity = self._found.get(name, (None, Quantity.SPEED))
+        if parameter is None or parameter.neutral is not None or parameter.maximum is not None:
+            return None
+        return (rated_speed if quantity is Quantity.SPEED
+                else quantities.full(parameter.unit, quantity))
+
+    @property
+    def speed(self) -> float:
+        """The largest speed, in the unit of the setpoint."""
+        return min((self._value(parameter) for parameter, quantity in self._found.values()
+                    if quantity is Quantity.SPEED), default=math.inf)
+
+    @property
+    def torque(self) -> float:
+        """The largest torque, as a share of the rated one."""
+        return min((self._torque(parameter, quantity)
+                    for parameter, quantity in self._found.values()
+                    if quantity is not Quantity.SPEED), default=math.inf)
+
+    def _value(self, parameter: Parameter) -> float:
+        return max(self._registers.commanded(parameter.name), 0.0)
+
+    def _torque(self, parameter: Parameter, quantity: Quantity) -> float:
+        share = self._value(parameter) / quantities.full(parameter.unit, quantity)
+        if quantity is Quantity.CURRENT:    # a part of it makes no torque
+            return math.sqrt(max(share ** 2 - MAGNETISING_CURRENT ** 2, 0.0))
+        return share
+
+
+class Reach(NamedTuple):
+    """
+    What a motor can do with the torque that it may have, as shares of the rated speed.
+
+    :param speed: how fast it gets at most; 0: it does not turn.
+    :param rising: how much faster per s at most.
+    :param falling: how much slower.
+    """
+
+    speed: float
+    rising: float
+    falling: float
+
+    @classmethod
+    def of(cls, torque: float, load: float, coast: float) -> 'Reach':
+        """
+        Return that of a torque.
+
+        :param load: share of the rated torque that a weight takes.
+        :param coast: how much slower it gets per s without torque.
+        """
+        spare = max(torque - FRICTION_TORQUE - load, 0.0)
+        return cls(spare / LOAD_TORQUE, spare / INERTIA_TORQUE, torque / INERTIA_TORQUE + coast)
+
+    def rates(self, rates: Rates, rated: float) -> Rates:
+        """Return how fast a speed may change that is to change as fast as a ramp says."""
+        return Rates(min(rates.rising, self.rising * rated),
+                     min(rates.falling, self.falling * rated))
+
+
+class MotorPlant:
+    """
+    A motor, for profiles of all kinds.
+
+    :param operation: the operating state; None: that of the profile's control section.
+    :param movable: parameters that may move something; None: all.
+    :ivar speed_setpoint: what moves the shaft, or None: a position does, or nothing.
+    """
+
+    def __init__(self, registers: Registers, configuration: DriveConfiguration,
+                 mechanics: Mechanics, *, operation: Operation | None = None,
+                 movable: Mapping[str, Parameter] | None = None) -> None:
+        self.registers = registers
+        self.control = control = configuration.profile.control
+        self.operation = operation or Operation(machine_of(control))
+        self._mechanics = mechanics
+        self._noise = random.Random(configuration.name)
+        self._jitter = 0    # raw steps by which measured positions are off at the moment
+        self._control_name = control_name = control.parameter if control else ''
+        self._shown = {p.name for p in configuration.cyclic_response}
+        self._fault = fault = configuration.profile.fault
+        self._fault_code = float(FAULT_CODE)
+        if fault is not None and fault.codes:
+            raw = quantities.likely_fault(fault.codes)
+            self._fault_code = float(registers.parameters[fault.parameter].value_from_raw(raw))
+        parameters = registers.parameters if movable is None else movable
+        pairs = quantities.pairs(parameters, without=control_name)
+        self._setpoints = {pair.setpoint.name for pair in pairs}
+        self.volatile: Collection[str] = {*self._setpoints, control_name}
+        self._ramps = {ramp.parameter.name: ramp
+                       for ramp in quantities.ramp_parameters(parameters)}
+        self._rising, self._falling, self._quick_stop = (
+            next((ramp for ramp in reversed(self._ramps.values()) if ramp.use in uses), None)
+            for uses in ((RampUse.BOTH, RampUse.RISING), (RampUse.BOTH, RampUse.FALLING),
+                         (RampUse.QUICK_STOP,)))
+        # a setpoint whose actual value the profile lacks still moves the motor
+        mover, quantity = quantities.mover(pairs, configuration.cyclic_request, control_name)
+        by_speed = quantity is Quantity.SPEED
+        self.speed_setpoint = speed = mover if by_speed else None
+        other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
+        self._positioned = mover is not speed
+        self._bounds = Bounds(registers, parameters, mover)
+        self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
+        self._followers: dict[str, tuple[Parameter, Travel]] = {}
+        self._actuals: dict[str, Callable[[], float]] = {}
+        rated, turns, shaft = 1.0, 1.0, Travel()
+        if speed is not None:
+            rated = quantities.rated_speed(speed)
+            turns = quantities.revolutions_per_unit(speed, rated)
+        elif mover is not None:
+            self._travels[mover.name] = mover, shaft
+            rated, turns = quantities.travel_speed(mover), 1.0 / quantities.per_revolution(mover)
+        self.motor = Motor(rated, turns, mechanics.load, shaft)
+        for setpoint, actual in pairs:
+            kind = quantities.quantity_of(setpoint)
+            if actual is None or kind is other_kind and setpoint is not speed:
+                continue
+            if setpoint is speed:
+                self._actuals[actual.name] = partial(getattr, self.motor, 'speed')
+            elif kind is Quantity.POSITION:
+                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
+                self._actuals[actual.name] = partial(getattr, travel, 'position')
+            else:
+                _, follower = self._followers[setpoint.name] = setpoint, Travel()
+                self._actuals[actual.name] = partial(getattr, follower, 'speed')
+
+    def command(self, value: float) -> float:
+        """Return which speed the value of the speed setpoint stands for."""
+        return value
+
+    def initial(self, parameter: Parameter) -> int:
+        if self.control is not None and parameter.name == self._control_name:
+            return self.control.disable
+        if parameter.name in self._ramps:
+            value = self._initial_ramp(self._ramps[parameter.name])
+            return quantities.nearest_raw(parameter, value, parameter.raw_limits)
+        limit = self._bounds.initial(parameter.name, self.motor.rated_speed)
+        if limit is not None:
+            return quantities.nearest_raw(parameter, limit, parameter.raw_limits)
+        if parameter.name in self._setpoints and parameter.neutral is None:
+            return quantities.clamp(0, parameter.raw_limits)
+        return quantities.plausible(parameter)
+
+    def source(self, parameter: Parameter) -> Callable[[], int] | None:
+        ends, nearest = parameter.type.raw_range, quantities.nearest_raw
+        actual = self._actuals.get(parameter.name)
+        quantity = quantities.measured(parameter)
+        if self._fault is not None and parameter.name == self._fault.parameter:
+            quantity = Quantity.FAULT_CODE
+        elif quantity is None and parameter.name in self._shown:
+            quantity = quantities.BY_UNIT.get(parameter.unit)
+        if quantity is Quantity.POSITION:
+            where = actual or (lambda: quantities.position_value(parameter, self.motor.position))
+            return lambda: quantities.clamp(nearest(parameter, where(), ends) + self._jitter, ends)
+        word = StatusWord(parameter, self.control)
+        if actual is None and word:
+            return lambda: word.compose(self._report(), self.registers.plain(parameter.name))
+        measure = actual or (quantity and self._measure(parameter, quantity))
+        return (lambda: nearest(parameter, measure(), ends)) if measure else None
+
+    def _measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
+        """Return what a quantity of the motor amounts to in the parameter's unit."""
+        motor, setpoint = self.motor, self.speed_setpoint
+        if quantity is Quantity.SPEED:
+            if setpoint is not None and parameter.unit == setpoint.unit:
+                return lambda: motor.speed
+            return lambda: quantities.speed_value(parameter, motor.speed * motor.revolutions,
+                                              motor.share_of_rated_speed)
+        if quantity is Quantity.TEMPERATURE:
+            return lambda: quantities.temperature_value(parameter, motor.temperature)
+        if quantity is Quantity.FAULT_CODE:
+            return lambda: self.operation.fault_code(self._fault_code)
+        full = quantities.rating(parameter, quantity)
+        shares: dict[Quantity, Callable[[], float]] = {
+            Quantity.TORQUE: lambda: motor.torque,
+            Quantity.POWER: lambda: motor.torque * motor.share_of_rated_speed,
+            Quantity.LOAD: lambda: abs(motor.torque),
+            Quantity.CURRENT: lambda: motor.current,
+            Quantity.VOLTAGE: lambda: (
+                1.0 - 0.02 * motor.current + quantities.mains_swing(self.operation.now)),
+        }
+        share = shares[quantity]
+        if quantity is Quantity.VOLTAGE and quantities.words_of(parameter) & {'motor', 'output'}:
+            share = lambda: 0.7 * abs(motor.share_of_rated_speed)  # noqa: E731
+        return lambda: full * share()
+
+    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+        return None
+
+    def written(self, name: str, before: int, raw: int) -> None:
+        if name == self._control_name:
+            self.operation.word_written(raw)
+
+    @property
+    def target(self) -> float:
+        """The speed that is commanded."""
+        if self.speed_setpoint is None:
+            return 0.0
+        fastest = self._bounds.speed
+        value = self.command(self.registers.commanded(self.speed_setpoint.name))
+        return min(max(value, -fastest), fastest)
+
+    def advance(self, now: float) -> None:
+        operation = self.operation
+        duration = operation.advance(now)
+        energised = operation.powered and operation.enabled
+        load, noise = self._mechanics.load, self._mechanics.noise
+        if duration > 0.0 and noise:
+            self._jitter = self._noise.randint(-noise, noise)
+        motor, rated = self.motor, self.motor.rated_speed
+        torque = self._bounds.torque
+        reach = Reach.of(torque, load, 1.0 / COAST_TIME)
+        driven = energised and not operation.stopping and reach.speed > 0.0
+        falling = self._rate(self._falling, rated / RAMP_TIME)
+        rates = reach.rates(Rates(self._rate(self._rising, rated / RAMP_TIME), falling), rated)
+        held = not energised and self._mechanics.brake
+        # where to, and how fast, as shares of the rated speed, while nothing is commanded
+        drift = -SINKING_SPEED * load
+        if held or energised and torque >= load:
+            drift = 0.0
+        stop = 1.0 / COAST_TIME
+        if energised:
+            stop = min(reach.falling, self._rate(
+                self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated)
+        for name, (setpoint, follower) in self._followers.items():
+            rate = quantities.rated_speed(setpoint) / RAMP_TIME
+            target = self.registers.commanded(name) if driven else 0.0
+            follower.run(duration, target, Rates(rate, rate))
+        for name, (setpoint, travel) in self._travels.items():
+            limit = quantities.travel_speed(setpoint)
+            if held:
+                travel.speed = 0.0
+            if driven:
+                travel.go(duration, self.registers.commanded(name),
+                          limit * min(reach.speed, 1.0),
+                          limit * rates.rising / rated)
+            else:
+                travel.run(duration, drift * limit, Rates(stop * limit, stop * limit))
+        if not self._positioned:
+            if held:
+                motor.shaft.speed = 0.0
+            if duration > 0.0:
+                fastest = reach.speed * rated
+                motor.shaft.run(
+                    duration,
+                    min(max(self.target, -fastest), fastest) if driven else drift * rated,
+                    rates if driven else Rates(stop * rated, stop * rated))
+        motor.advance(duration, energised=energised, torque_max=min(torque, TORQUE_MAX))
+        if operation.state in ENDS and motor.speed == 0.0:
+            operation.standstill()
+            motor.advance(0.0, energised=operation.enabled)
+
+    def power_off(self) -> None:
+        """Stand still; the position is kept, as by an absolute encoder."""
+        self.motor.shaft.speed = self.motor.shaft.slope = 0.0
+        for _, travel in (*self._followers.values(), *self._travels.values()):
+            travel.speed = 0.0
+
+    def power_on(self) -> None:
+        """Stay where the axis is until a setpoint comes."""
+        for name, (_, travel) in self._travels.items():
+            self.registers.put(name, travel.position)
+
+    def _report(self) -> Report:
+        motor, operation = self.motor, self.operation
+        return Report(operation, warning=motor.temperature > WARNING_TEMPERATURE,
+                      speed=motor.speed,
+                      setpoint_reached=operation.enabled and motor.speed == self.target)
+
+    def _initial_ramp(self, ramp: RampParameter) -> float:
+        """Return what a new drive has in a ramp parameter."""
+        seconds = QUICK_STOP_TIME if ramp.use is RampUse.QUICK_STOP else RAMP_TIME
+        if not ramp.is_time:
+            return self.motor.rated_speed / seconds
+        return seconds * 1000.0 if ramp.parameter.unit == 'ms' else seconds
+
+    def _rate(self, ramp: RampParameter | None, default: float) -> float:
+        """Return what a ramp parameter says, per s."""
+        if ramp is None:
+            return default
+        rated, value = self.motor.rated_speed, self.registers.commanded(ramp.parameter.name)
+        if not ramp.is_time:
+            return min(max(value, rated / 1000.0), rated / RAMP_TIME_MIN)
+        return rated / max(value / 1000.0 if ramp.parameter.unit == 'ms' else value, RAMP_TIME_MIN)

@@ -21,17 +21,50 @@ from typing import Any
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.parameters import Value
+from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
+from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
+from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
-from drive_can_bridge.simulation.drives import make_drives
 from drive_can_bridge.simulation.faults import Fault
-from drive_can_bridge.simulation.plant import Mechanics
 from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Say, ShowFrame
-from drive_can_bridge.simulation.registers import PlantFactory
+from drive_can_bridge.simulation.registers import Mechanics, PlantFactory
 from drive_can_bridge.transport.port import open_port
 
+#: a new protocol family adds one row
+SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
+    'cannord': SimulatedCannordInverter,
+    'canopen_pkw': SimulatedPkwDrive,
+    'cia402': SimulatedServoDrive,
+    'datamodel_extended': SimulatedDataModelDrive,
+    'datamodel_standard': SimulatedDataModelDrive,
+}
 #: s that the arrival of a frame may be noticed late. Two writes 20 ms apart on the wire must not
 #: seem closer because the thread that plays the bus slept over the first.
 ARRIVAL_JITTER = 0.002
+
+
+def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPROM_TIME,
+                mechanics: Mapping[str, Mechanics] | None = None,
+                plants: Mapping[str, PlantFactory] | None = None) -> dict[str, SimulatedDrive]:
+    """
+    Make every drive of a configuration.
+
+    :param mechanics: what motors carry, by the name of the drive.
+    :param plants: what moves instead of what the family chooses, by the name of the drive.
+    :raises ConfigurationError: a plant that a drive cannot do with.
+    """
+    drives = {
+        name: SIMULATED_DRIVES[drive.protocol](
+            drive, eeprom_time=eeprom_time, mechanics=(mechanics or {}).get(name),
+            plant=(plants or {}).get(name))
+        for name, drive in configuration.drives.items()}
+    for drive in drives.values():
+        drive.neighbours = [
+            route for other in drives.values()
+            if other is not drive and other.configuration.bus == drive.configuration.bus
+            for route in other.routes]
+    return drives
 
 
 def _read(name: str) -> Any:

@@ -23,7 +23,7 @@ from rich.live import Live
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.source import Source
+from drive_can_bridge.monitor.snapshot import Source
 from drive_can_bridge.monitor.summary import in_order
 from drive_can_bridge.view.page import Choice, closely, Key, keys_in, page, Setting
 

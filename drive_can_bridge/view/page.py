@@ -1,13 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A whole page, as large as the terminal: header, what was chosen, and the keys that mean something.
+A whole page, as large as the terminal: header, all drives or one in detail, the keys.
 
 Every part is told how many lines it may have. Drives come first; then what is not well, the buses,
 and as much of the log as there is room for.
-
-What the user has chosen to see, and what keys change about it.
-
-One drive in detail.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +18,8 @@ from rich.text import Text
 
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, Times
-from drive_can_bridge.monitor.summary import hints, in_order, silence, Tone, tone_of
-from drive_can_bridge.view.overview import advice_lines, bus_lines, drives_table
+from drive_can_bridge.monitor.summary import in_order, silence, tone_of
+from drive_can_bridge.view.parts import advice_lines, bus_lines, drives_table
 from drive_can_bridge.view.parts import (
     clock, DIM, flow, lamps, Lines, log_lines, milliseconds, section, state, TONE_STYLES,
     ValueColumns, wrapped,
@@ -35,8 +31,6 @@ class Page(Enum):
 
     DRIVES = 'drives'
     DRIVE = 'drive'
-    LOG = 'log'
-    HELP = 'help'
 
 
 class Key(Enum):
@@ -44,12 +38,8 @@ class Key(Enum):
 
     UP = 'up'
     DOWN = 'down'
-    NEXT_PAGE = 'next page'
-    PREVIOUS_PAGE = 'previous page'
     OPEN = 'open'
     BACK = 'back'
-    LOG = 'log'
-    HELP = 'help'
     QUIT = 'quit'
 
 
@@ -57,22 +47,16 @@ class Key(Enum):
 _SEQUENCES = {
     '\x1b[A': Key.UP, '\x1bOA': Key.UP, 'k': Key.UP, '\x1b[Z': Key.UP,
     '\x1b[B': Key.DOWN, '\x1bOB': Key.DOWN, 'j': Key.DOWN, '\t': Key.DOWN,
-    '\x1b[6~': Key.NEXT_PAGE, ' ': Key.NEXT_PAGE, '\x1b[5~': Key.PREVIOUS_PAGE,
-    'b': Key.PREVIOUS_PAGE, '\r': Key.OPEN, '\n': Key.OPEN, '\x1b[C': Key.OPEN,
-    '\x1bOC': Key.OPEN, '\x1b': Key.BACK, '\x7f': Key.BACK, '\x08': Key.BACK,
-    '\x1b[D': Key.BACK, '\x1bOD': Key.BACK, 'l': Key.LOG, '?': Key.HELP,
-    'h': Key.HELP, 'q': Key.QUIT, 'Q': Key.QUIT,
+    '\r': Key.OPEN, '\n': Key.OPEN, '\x1b[C': Key.OPEN, '\x1bOC': Key.OPEN,
+    '\x1b': Key.BACK, '\x7f': Key.BACK, '\x08': Key.BACK, '\x1b[D': Key.BACK,
+    '\x1bOD': Key.BACK, 'q': Key.QUIT, 'Q': Key.QUIT,
 }
 _LONGEST = max(map(len, _SEQUENCES))
 
 #: the last line: what may be pressed here
 HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
-    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('l', 'log'),
-                  ('?', 'help'), ('q', 'quit')),
-    Page.DRIVE: (('↑↓', 'drive'), ('l', 'log'), ('esc', 'back'),
-                 ('?', 'help'), ('q', 'quit')),
-    Page.LOG: (('space', 'older'), ('b', 'newer'), ('esc', 'back'), ('?', 'help'), ('q', 'quit')),
-    Page.HELP: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
+    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('q', 'quit')),
+    Page.DRIVE: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
 }
 
 
@@ -105,12 +89,10 @@ class Choice:
     What the user has chosen.
 
     :param drive: full name of the drive that is marked, or shown; None before there is any.
-    :param screen: number of the screen of a long page, from 0.
     """
 
     page: Page = Page.DRIVES
     drive: str | None = None
-    screen: int = 0
 
     def among(self, drives: Sequence[str]) -> 'Choice':
         """Return the same for these drives: one that has gone cannot be chosen."""
@@ -125,18 +107,8 @@ class Choice:
                 return self.among(drives)
             step = 1 if key is Key.DOWN else -1
             place = (drives.index(self.drive) + step) % len(drives)
-            return replace(self, drive=drives[place], screen=0)
-        if key is Key.NEXT_PAGE:
-            return replace(self, screen=self.screen + 1)
-        if key is Key.PREVIOUS_PAGE:
-            return replace(self, screen=max(0, self.screen - 1))
-        if key is Key.BACK:
-            return replace(self, page=Page.DRIVES, screen=0)
-        page = _PAGES.get(key)
-        return self if page is None else replace(self, page=page, screen=0)
-
-
-_PAGES = {Key.OPEN: Page.DRIVE, Key.LOG: Page.LOG, Key.HELP: Page.HELP}
+            return replace(self, drive=drives[place])
+        return replace(self, page=Page.DRIVE if key is Key.OPEN else Page.DRIVES)
 
 
 _TREND_MAX = 60
@@ -300,11 +272,7 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
     for text in silence(snapshot, clock):
         frame.lines(wrapped(text, width, 'bold white on red'))
     drive = snapshot.drive(choice.drive or '')
-    if choice.page is Page.HELP:
-        _help(frame, drive, setting)
-    elif choice.page is Page.LOG:
-        _log(frame, snapshot, choice)
-    elif drive is None:
+    if drive is None:
         _nobody(frame, snapshot, setting)
     elif choice.page is Page.DRIVE:
         _drive(frame, snapshot, drive)
@@ -428,29 +396,3 @@ def _drive(frame: _Frame, snapshot: Snapshot, drive: DriveSnapshot) -> None:
     told = [line for line in snapshot.log if line.text.startswith(
         f'{drive.name.rpartition("/")[2]}: ')]
     frame.fill('log of this drive', lambda lines: log_lines(told, frame.inner, lines))
-
-
-def _log(frame: _Frame, snapshot: Snapshot, choice: Choice) -> None:
-    def body(lines: int) -> Lines:
-        everything = log_lines(snapshot.log, frame.inner, len(snapshot.log) * 8 + lines)
-        screen = min(choice.screen, max(0, len(everything) - 1) // lines)
-        end = len(everything) - screen * lines
-        return everything[max(0, end - lines):end]
-    frame.fill('log, the newest below', body)
-
-
-def _help(frame: _Frame, drive: DriveSnapshot | None, setting: Setting) -> None:
-    legend = flow([Text('● ', style=TONE_STYLES[tone]).append(tone.value, style='not bold')
-                   for tone in Tone], frame.inner, 3)
-    frame.add('colours', legend, len(legend))
-    told: Lines = []
-    for command, meaning in hints(drive, setting.environment):
-        told.append(Text(f'# {meaning}', style=DIM))
-        told += wrapped(command, frame.inner, 'bold')
-    frame.add('from another terminal', told, len(told))
-    meanings = [
-        ('↑ ↓ j k', 'mark another drive'), ('⏎ →', 'the marked drive in detail'),
-        ('l', 'the log'), ('space b', 'further, and back'), ('esc ←', 'back'), ('q', 'quit')]
-    keys = [Text(f'{key:10}', style='bold').append(meaning, style='not bold')
-            for key, meaning in meanings]
-    frame.add('keys', keys, len(keys))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 
 from drive_can_bridge.backup.document import Backup
-from drive_can_bridge.backup.plan import names_to_read, plan_restore
+from drive_can_bridge.backup.restore import names_to_read, plan_restore
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.directory import ParameterDirectory

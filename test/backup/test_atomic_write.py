@@ -9,7 +9,7 @@ import resource
 
 import pytest
 
-from drive_can_bridge.cli.atomic_write import differs, write_atomically
+from drive_can_bridge.cli.output import differs, write_atomically
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 import waiting
 
 from drive_can_bridge.backup.document import read_backup
-from drive_can_bridge.backup.plan import (
+from drive_can_bridge.backup.restore import (
     LeftAlone, names_to_read, plan_restore, problems_in, RestorePlan, strangers,
 )
 from drive_can_bridge.backup.restore import Restorer, RestoreResult

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from drive_can_bridge.cli import completion as completion_script
-from drive_can_bridge.cli.arguments import above_zero, bitrate, of_drive, PARAMS_FILE, whole
+from drive_can_bridge.cli.command import above_zero, bitrate, of_drive, PARAMS_FILE, whole
 from drive_can_bridge.cli.command import WrongUsage
 from drive_can_bridge.cli.main import EXAMPLES, main, SUBCOMMANDS, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration

@@ -8,8 +8,7 @@ from typing import Any
 from configuration_builders import changed, PROFILE
 import pytest
 
-from drive_can_bridge.configuration.declare import tree_from_overrides
-from drive_can_bridge.configuration.load import configuration_from_overrides
+from drive_can_bridge.configuration.load import configuration_from_overrides, tree_from_overrides
 from drive_can_bridge.core.errors import ConfigurationError
 
 

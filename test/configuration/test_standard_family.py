@@ -8,7 +8,7 @@ import re
 from configuration_builders import changed, FILE, load, problems, PROFILE, warnings
 import pytest
 
-from drive_can_bridge.configuration.bus_check import bus_shares
+from drive_can_bridge.configuration.checks import bus_shares
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType

@@ -11,7 +11,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import columns, History, Rate
-from drive_can_bridge.monitor.summary import documents, hints
+from drive_can_bridge.monitor.summary import documents
 from drive_can_bridge.monitor.values import ParameterInfo, SamplingPlan
 
 # -- values ---------------------------------------------------------------------------------------
@@ -134,18 +134,6 @@ def test_what_is_looked_at_closely_counts_at_once() -> None:
     assert '/b' in plan.choose(rates, ['/b'], 0.1)
     assert plan.choose({}, ['/b'], 0.2) == set()
 
-
-# -- hints ----------------------------------------------------------------------------------------
-
-def test_hints_are_commands_for_this_drive() -> None:
-    lift = seen(three_drives()).drive('/lift')
-    commands = [command for command, _ in hints(lift, 'export ROS_DOMAIN_ID=7')]
-    assert commands == [
-        'export ROS_DOMAIN_ID=7', 'ros2 topic echo /lift/response',
-        'drive_can enable /lift',
-        "ros2 topic pub -r 10 /lift/command/speed_setpoint std_msgs/msg/Float64 '{data: 0.0}'",
-        'ros2 param list /lift', 'ros2 param get /lift ramp_time', 'ros2 topic echo /diagnostics']
-    assert [command for command, _ in hints(None, '')] == ['ros2 topic echo /diagnostics']
 
 
 def test_documents_have_numbers_for_programs() -> None:

@@ -73,8 +73,7 @@ def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.Monk
 @pytest.mark.parametrize(('typed', 'keys'), [
     ('q', [Key.QUIT]), ('\x1b[A\x1b[B', [Key.UP, Key.DOWN]), ('\x1bOBjk', [
         Key.DOWN, Key.DOWN, Key.UP]), ('\r', [Key.OPEN]), ('\x1b', [Key.BACK]),
-    ('\x1b[6~ b', [Key.NEXT_PAGE, Key.NEXT_PAGE, Key.PREVIOUS_PAGE]), ('x\x00ü', []),
-    ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~l', [Key.LOG]), ('\x1b\x1b', [
+    ('x\x00ü', []), ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~\r', [Key.OPEN]), ('\x1b\x1b', [
         Key.BACK, Key.BACK]), ('', [])])
 def test_keys_are_found_in_what_is_typed(typed: str, keys: list[Key]) -> None:
     assert keys_in(typed) == keys
@@ -88,10 +87,7 @@ def test_keys_change_what_is_chosen() -> None:
     assert choice.drive == '/c'
     choice = choice.press(Key.OPEN, drives)
     assert (choice.page, closely(choice)) == (Page.DRIVE, '/c')
-    choice = choice.press(Key.LOG, drives).press(Key.NEXT_PAGE, drives)
-    assert (choice.page, choice.screen, closely(choice)) == (Page.LOG, 1, None)
     choice = choice.press(Key.BACK, drives)
     assert (choice.page, closely(choice)) == (Page.DRIVES, None)
     assert choice.among(['/a']).drive == '/a'
     assert choice.among([]).drive is None
-    assert Choice().press(Key.PREVIOUS_PAGE, drives) == Choice()

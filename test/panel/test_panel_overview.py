@@ -56,7 +56,7 @@ def texts(page: Any, kind: str) -> list[str]:
 
 
 def overview(snapshot: Snapshot, role: Role = Role.OPERATOR) -> Any:
-    from drive_can_bridge.panel.overview import Overview
+    from drive_can_bridge.panel.pages import Overview
     made = Overview(role, 'ROS domain 7')
     made.show(snapshot)
     return made

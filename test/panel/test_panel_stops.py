@@ -16,7 +16,7 @@ from waiting import wait_for
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot
-from drive_can_bridge.monitor.source import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import Outcome, Stop
 
 pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")

@@ -26,7 +26,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.bridge_node import BridgeNode
 from drive_can_bridge.ros.threads import ExecutorThread
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
 _COUNTER = itertools.count(1)

@@ -13,7 +13,7 @@ import rclpy
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.monitor.source import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.operations import Operations, PARAMETER_TIMEOUT
 

@@ -22,7 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import clock
 import yaml
 
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 AXES = {'shoulder': 1, 'elbow': 2, 'wrist': 3}

@@ -13,7 +13,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 
 NODE = 5
 #: 1.2345 revolutions of 10,000 increments: where a new axis stands

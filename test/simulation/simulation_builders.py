@@ -13,7 +13,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 
 RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
 RAM, EEPROM = Storage.RAM, Storage.EEPROM

@@ -11,7 +11,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import Travel
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 
 # 0.1 degrees a step; at most 1000 degrees a second, reached in a second
 SETPOINT = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg', minimum=-1000.0,

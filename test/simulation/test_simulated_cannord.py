@@ -16,7 +16,7 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
-from drive_can_bridge.simulation.drives import make_drives
+from drive_can_bridge.simulation.simulation import make_drives
 
 READY, RUN, ACKNOWLEDGE = '7E040000', '7F040000', 'FE040000'
 # status words at rest, low byte first

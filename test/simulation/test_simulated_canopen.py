@@ -14,11 +14,11 @@ import pytest
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.simulation.canopen.dictionary import ObjectDictionary
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
+from drive_can_bridge.simulation.canopen.sdo import ObjectDictionary
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, State
 from drive_can_bridge.simulation.drive import SimulatedDrive
-from drive_can_bridge.simulation.motor_plant import MotorPlant
+from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.registers import PlantFactory
 
 OFF, READY, ON, ENABLED, STOPPING = (

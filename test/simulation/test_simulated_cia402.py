@@ -10,7 +10,7 @@ import pytest
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
-from drive_can_bridge.simulation.motor_plant import MotorPlant
+from drive_can_bridge.simulation.motor import MotorPlant
 
 # -- objects --------------------------------------------------------------------------------------
 

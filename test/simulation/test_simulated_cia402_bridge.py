@@ -22,7 +22,7 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
-from drive_can_bridge.simulation.plant import Mechanics
+from drive_can_bridge.simulation.registers import Mechanics
 
 FRAME_TIME = 0.0002
 STANDS = BEGINNING / 10_000

@@ -24,7 +24,7 @@ from drive_can_bridge.core.errors import LocalProtocolError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.drives import make_drives
+from drive_can_bridge.simulation.simulation import make_drives
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
     encoding='utf-8'))['vectors']

@@ -11,8 +11,8 @@ from simulation_builders import (
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.simulation.drives import make_drives, SIMULATED_DRIVES
 from drive_can_bridge.simulation.faults import Fault, FaultKind, parse_fault
+from drive_can_bridge.simulation.simulation import make_drives, SIMULATED_DRIVES
 
 POLL = '003FFFF0#0000000000000000'
 ANSWER = '103FFFF0#000000C80003A5A5'

@@ -8,16 +8,16 @@ from typing import Any
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
-    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, motor, parameter, RAM, RO,
-    SPEED_SETPOINT, STATUS_WORD, WO,
+    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, motor, parameter, RAM, RO, SPEED_SETPOINT,
+    STATUS_WORD, WO,
 )
 
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
-from drive_can_bridge.simulation import names, scales
+from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Rates, Travel
-from drive_can_bridge.simulation.names import Quantity, RampUse
+from drive_can_bridge.simulation.quantities import Quantity, RampUse
 
 RATES = Rates(rising=10.0, falling=20.0)
 
@@ -113,8 +113,8 @@ class TestNames:
         ('rated_current', None), ('speed_limit', None), ('firmware_version', None),
     ])
     def test_measured(self, name: str, quantity: Quantity | None) -> None:
-        assert names.measured(parameter(name, 1, access=RO)) is quantity
-        assert names.measured(parameter(name, 1)) is None
+        assert quantities.measured(parameter(name, 1, access=RO)) is quantity
+        assert quantities.measured(parameter(name, 1)) is None
 
     @pytest.mark.parametrize(('setpoint', 'actual'), [
         ('speed_setpoint', 'actual_speed'), ('setpoint_speed', 'actual_speed'),
@@ -124,9 +124,9 @@ class TestNames:
     ])
     def test_pairs(self, setpoint: str, actual: str) -> None:
         table = {p.name: p for p in (parameter(setpoint, 1), parameter(actual, 2, access=RO))}
-        pair, = names.pairs(table)
+        pair, = quantities.pairs(table)
         assert (pair.setpoint.name, pair.actual.name) == (setpoint, actual)
-        assert names.pairs(table, without=setpoint) == []
+        assert quantities.pairs(table, without=setpoint) == []
 
     @pytest.mark.parametrize(('name', 'unit', 'is_time', 'use'), [
         ('ramp_time', 's', True, RampUse.BOTH),
@@ -138,12 +138,12 @@ class TestNames:
     ])
     def test_ramps(self, name: str, unit: str, is_time: bool, use: RampUse) -> None:
         made = parameter(name, 1, unit=unit)
-        assert names.ramp_parameters({name: made}) == [(made, is_time, use)]
+        assert quantities.ramp_parameters({name: made}) == [(made, is_time, use)]
 
     def test_what_is_no_ramp(self) -> None:
         for made in (parameter('ramp_time', 1, access=RO), parameter('ramp_limit', 1),
                      parameter('stop_mode', 1)):
-            assert names.ramp_parameters({made.name: made}) == []
+            assert quantities.ramp_parameters({made.name: made}) == []
 
 
 class TestPlant:
@@ -185,11 +185,11 @@ class TestPlant:
 
     def test_position_wraps_where_the_parameter_ends(self) -> None:
         wrapped = parameter('position', 1, type=INT16, access=RO)
-        assert scales.position_value(wrapped, 7.0) == 7 * 4096
-        assert scales.position_value(wrapped, 9.0) == 9 * 4096 - 65536
+        assert quantities.position_value(wrapped, 7.0) == 7 * 4096
+        assert quantities.position_value(wrapped, 9.0) == 9 * 4096 - 65536
         limited = parameter('position', 1, type=INT16, unit='deg', minimum=0.0, maximum=359.0)
-        assert scales.position_value(limited, 1.25) == 90.0
-        assert scales.position_value(limited, -0.25) == 270.0
+        assert quantities.position_value(limited, 1.25) == 90.0
+        assert quantities.position_value(limited, -0.25) == 270.0
 
     def test_values_never_leave_their_type(self) -> None:
         small = parameter('actual_torque', 3, scale=0.0001, unit='Nm', type=INT16, access=RO)

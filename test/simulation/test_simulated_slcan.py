@@ -18,8 +18,7 @@ from waiting import wait_for
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
 from drive_can_bridge.simulation.simulation import Simulation
-from drive_can_bridge.simulation.slcan import SlcanAdapter
-from drive_can_bridge.simulation.terminal import BACKLOG, SlcanTerminal
+from drive_can_bridge.simulation.terminal import BACKLOG, SlcanAdapter, SlcanTerminal
 
 
 def opened() -> SlcanAdapter:

@@ -15,17 +15,16 @@ from simulation_builders import bridge, configuration, frame, INT16, parameter, 
 from waiting import wait_for
 from world import World
 
+from drive_can_bridge.cli.simulate import Console, LineReader
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusMisconfigured, BusUnavailable, ConfigurationError, TransportError, ValueRefused,
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.simulation.console import Console, LineReader
-from drive_can_bridge.simulation.drives import make_drives
-from drive_can_bridge.simulation.motor_plant import MotorPlant
-from drive_can_bridge.simulation.plant import Refusal
-from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.simulation.motor import MotorPlant
+from drive_can_bridge.simulation.registers import Refusal
+from drive_can_bridge.simulation.simulation import make_drives, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint
 

@@ -25,8 +25,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Finding
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.drive import SimulatedDrive
-from drive_can_bridge.simulation.drives import SIMULATED_DRIVES
-from drive_can_bridge.simulation.simulation import Simulation
+from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES, Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
 Device = Callable[[Frame], list[Frame]]

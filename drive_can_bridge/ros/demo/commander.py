@@ -26,7 +26,7 @@ from drive_can_bridge.monitor.snapshot import read_status, Report
 from drive_can_bridge.ros.middleware import RCLError
 from drive_can_bridge.ros.monitor.client import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
-from drive_can_bridge.simulation.names import quantity_of
+from drive_can_bridge.simulation.quantities import quantity_of
 
 NODE_NAME = '_demo_commander'
 #: s between two commands to a drive

@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, Trigger
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import is_ros_name
-from drive_can_bridge.monitor.source import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import HasHandle, NodeCalls, Service
 from drive_can_bridge.ros.messages import drive_value, parameter_message
 

@@ -15,8 +15,9 @@ from typing import NamedTuple
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import abort_codes
-from drive_can_bridge.simulation.canopen.dictionary import bytes_of, ObjectDictionary, TOO_HIGH
-from drive_can_bridge.simulation.canopen.sdo import checked_length
+from drive_can_bridge.simulation.canopen.sdo import (
+    bytes_of, checked_length, ObjectDictionary, TOO_HIGH,
+)
 from drive_can_bridge.simulation.registers import Refused
 
 COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
