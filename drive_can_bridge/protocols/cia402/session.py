@@ -123,8 +123,7 @@ class Cia402Session(Session):
                 drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
             roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
-        self._node = Node(drive.station, nmt_start=False,
-                          heartbeat_timeout=options.heartbeat_timeout)
+        self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._courier = SdoCourier(drive.station, self.outbox, self.retry)
         self._channel: SdoChannel = Channel(self._courier)
         self.users = Users(self, SdoAccess(self._channel, self.retry))
@@ -400,7 +399,7 @@ class Cia402Session(Session):
         exchange.wait_out(now)
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
-        change = self._node.receive_heartbeat(state, now, active=False)
+        change = self._node.receive_heartbeat(state, now)
         if self.stage is not Stage.RUNNING:
             return
         if change is Change.RESTARTED:

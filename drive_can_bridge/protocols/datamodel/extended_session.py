@@ -75,14 +75,7 @@ class ExtendedSession(Session):
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
-        self._side = AcyclicSide(
-            self,
-            encode_read=lambda number, count: extended.encode_read_request(
-                station, number, count),
-            encode_write=lambda number, words: extended.encode_write(station, number, words),
-            decode=lambda frame, step: extended.decode_answer(
-                frame, station, None if step is None else step.key, strict=strict),
-            together=extended.SLOTS, stop_ended=self._stop_ended)
+        self._side = AcyclicSide(self, extended.AcyclicCodec(station, strict))
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
         self._codec = CyclicCodec(
@@ -235,7 +228,7 @@ class ExtendedSession(Session):
             self.duty.channel(CYCLE, Happened.MISROUTED)
         elif again and not exchange.cycling:    # its last cycles have reached what they were for
             self.duty.happened(
-                Happened.ANSWERED if exchange.book.stop_shown else Happened.SILENT)
+                Happened.ANSWERED if self._answers.book.stop_shown else Happened.SILENT)
         do = self.duty.happened(Happened.MAPS_DIFFER)
         self.lose(sentences.mapping_differs(text), now)
         # a request map that is right still takes neutral cycles, unless it is to be rewritten
@@ -305,11 +298,11 @@ class ExtendedSession(Session):
             self._exchange.timer.stop()
             if self._side.control_slot is not None and not self._answers.book.missed_in_row:
                 self._side.stop.look(now)
-            self._stop_ended()
+            self.stop_ended()
         elif self._differs:
             self._exchange.stop()
 
-    def _stop_ended(self) -> None:
+    def stop_ended(self) -> None:
         if (self.stage is Stage.STOPPING and not self._side.stop.running
                 and (self._exchange.cycles_left == 0 or not self._exchange.cycling)):
             self._exchange.doubt_the_end()
