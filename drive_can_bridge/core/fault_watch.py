@@ -66,7 +66,7 @@ class FaultWatch:
         self._place = sample.index(table.parameter) if table.parameter in sample else None
         name, self._mask = table.bit or ('', 0)
         self._bit_place = sample.index(name) if name in sample else None
-        self.shows = self._wanted = False
+        self.shows = False
         self._request: ReadRequest | None = None
 
     def look(self, events: Iterable[Event]) -> None:
@@ -105,14 +105,12 @@ class FaultWatch:
             return
         if not self.shows:
             self.shows = True
-            self._wanted = self._place is not None
-            if not self._wanted:
+            if self._place is None:
                 self._request = ReadRequest((self._parameter,))
                 self._session.users.submit(self._request, now)
-        if self._wanted and self._place is not None and self._place < len(raws):
+        if not self.text and self._place is not None and self._place < len(raws):
             raw = raws[self._place]
             if raw or raw in self._names:   # some drives say what it is a moment later
-                self._wanted = False
                 self._known(raw)
 
     def _known(self, raw: int) -> None:
@@ -130,7 +128,7 @@ class FaultWatch:
 
     def _gone(self) -> None:
         if self.shows:
-            self.shows = self._wanted = False
+            self.shows = False
             self.text, self.unread = '', NOTHING
             if self._session.control is not None:
                 self._session.control.fault_text = ''

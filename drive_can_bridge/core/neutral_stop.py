@@ -6,6 +6,7 @@ From the request on nothing but neutral is handed out, and commands arm nothing,
 has answered an exchange that carried all of it, or has not in time.
 """
 
+from dataclasses import dataclass
 import math
 from typing import Protocol
 
@@ -30,48 +31,60 @@ class Commanded(Protocol):
         """Have all setpoints sent at once, neutral as they are."""
 
 
+@dataclass(frozen=True)
+class Wait:
+    """
+    A stop that is waited for.
+
+    :ivar requests: who waits; others join the first.
+    :ivar lacking: names of what has not left since.
+    """
+
+    deadline: float
+    requests: list[ControlRequest]
+    lacking: set[str]
+
+
 class NeutralStop:
     """Those that wait until one drive has everything neutral; nobody does most of the time."""
 
     def __init__(self, session: Commanded) -> None:
         self._session = session
-        self._requests: list[ControlRequest] = []
-        self._deadline = math.inf
-        self._lacking: set[str] = set()     # what has not left since
-        self._left = False                  # everything has
+        self._wait: Wait | None = None
 
     @property
     def pending(self) -> bool:
         """Somebody waits."""
-        return bool(self._requests)
+        return self._wait is not None
 
     def request(self, request: ControlRequest, now: float) -> None:
         """Go neutral; answered by exactly one ``ControlCompleted``."""
         session = self._session
+        if self._wait is not None:
+            self._wait.requests.append(request)
+            return
         names = {setpoint.parameter.name for setpoint in session.setpoints.items
                  if not setpoint.parameter.limit}
-        self._requests.append(request)
+        self._wait = Wait(now + session.configuration.control_timeout, [request], names)
         if not names:
             self._end(True, sentences.nothing_commanded())
-        elif len(self._requests) == 1:      # others join the first
-            self._deadline = now + session.configuration.control_timeout
-            self._lacking, self._left = names, False
+        else:
             session.gate.hold(True)
             session.hand_out_neutral(now)
 
     def left(self, name: str) -> None:
         """Record that one setpoint has left, neutral as it is."""
-        if self._requests:
-            self._lacking.discard(name)
-            self._left = not self._lacking
+        if self._wait is not None:
+            self._wait.lacking.discard(name)
 
     def all_left(self) -> None:
         """Record that all of them have left together."""
-        self._left = self.pending
+        if self._wait is not None:
+            self._wait.lacking.clear()
 
     def answered(self) -> None:
         """Record an answer that shows that what has left last has arrived."""
-        if self._left:
+        if self._wait is not None and not self._wait.lacking:
             self._end(True, sentences.neutral_without_control())
 
     def refused(self, why: Sentence) -> None:
@@ -80,22 +93,21 @@ class NeutralStop:
 
     def fail(self, reason: Sentence) -> None:
         """Answer those that wait: there is no stop to be waited for any more."""
-        if self._requests:
-            self._end(False, reason)
+        self._end(False, reason)
 
     def handle_timer(self, now: float) -> None:
         """Wait no longer than a control service may take."""
-        if now >= self._deadline:
+        if now >= self.next_timer():
             self.refused(sentences.neutral_unanswered(
                 self._session.configuration.control_timeout))
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` has something to do."""
-        return self._deadline
+        return math.inf if self._wait is None else self._wait.deadline
 
     def _end(self, success: bool, message: Sentence) -> None:
-        requests, self._requests = self._requests, []
-        self._deadline, self._left = math.inf, False
-        for request in requests:
-            self._session.report.note(ControlCompleted(request, success, message))
-        self._session.gate.hold(False)
+        wait, self._wait = self._wait, None
+        if wait is not None:
+            for request in wait.requests:
+                self._session.report.note(ControlCompleted(request, success, message))
+            self._session.gate.hold(False)

@@ -90,16 +90,18 @@ class AcyclicOutput:
     :param count: of what is written on change.
     :param slot: of the control word among that; None: it is asked for by :meth:`word_due` only.
     :param refresh: s after which what has not changed is written again; 0: never.
+    :param lasting: indices of those that are not, for all that.
     :ivar word: the control word that was written last; None: nobody knows, or it was refused.
     :ivar again_at: when it is to be written again in any case.
     """
 
     def __init__(self, control: ControlMachine | None, policy: Policy, count: int, *,
-                 slot: int | None = None, refresh: float = 0.0) -> None:
+                 slot: int | None = None, refresh: float = 0.0,
+                 lasting: Container[int] = ()) -> None:
         self._control = control
         self._policy = policy
         self._slot = slot
-        self._refresh = refresh
+        self._refresh = [0.0 if index in lasting else refresh for index in range(count)]
         self._setpoints = frozenset(range(count)) - {slot}
         self._written: list[int | None] = [None] * count
         self._written_at = [-math.inf] * count
@@ -135,10 +137,17 @@ class AcyclicOutput:
         if hold:
             self._due = [index for index in self._due if index not in hold]
         for index, raw in enumerate(raws):
-            if index not in self._due and index not in hold and (
-                    raw != self._written[index]
-                    or 0.0 < self._refresh <= now - self._written_at[index] + TOLERANCE):
+            if index not in self._due and index not in hold and self.wants(index, raw, now):
                 self._due.append(index)
+
+    def wants(self, index: int, raw: int, now: float) -> bool:
+        """Tell whether the drive does not have what it shall have, or not lately."""
+        return (raw != self._written[index]
+                or 0.0 < self._refresh[index] <= now - self._written_at[index] + TOLERANCE)
+
+    def told(self, index: int) -> int | None:
+        """Return what the drive has, or has been sent; None: nobody knows."""
+        return self._written[index]
 
     def order_word(self, *, first: bool) -> None:
         """Let the control word go before all others, if it is due, or behind them."""

@@ -42,9 +42,13 @@ class Life:
         self._script, self._due, self._next = script, math.inf, None
         self._go_on(script, None, now)
 
+    def end(self) -> None:
+        """End it where it stands; nobody is told what it has asked for."""
+        self._script, self._due, self._next = None, math.inf, None
+
     def stop(self) -> None:
         """End it where it stands. The channel was cleared."""
-        self._script, self._due, self._next = None, math.inf, None
+        self.end()
         self._asking = False
 
     def next_timer(self) -> float:

@@ -7,47 +7,54 @@ offline; one with a read that nobody answered is missed. One with a read that th
 neither: there is no complete sample.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 import math
-from typing import Generic
+from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Lane
-from drive_can_bridge.protocols.courier import ReplyT, StepT
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: of a round, in the order of samples; None: of what was refused
 Raws = Sequence[int | None]
 
 
-class PolledExchange(Generic[StepT, ReplyT]):
+class Polled(Protocol):
+    """What a family says about its rounds; the session itself."""
+
+    @property
+    def present(self) -> bool:
+        """A drive is there, should it answer."""
+
+    def read_round(self) -> Generator[Any, Any, Raws | None]:
+        """Read everything; return None when a read was not answered."""
+
+    def round_found(self, now: float) -> None:
+        """Handle a drive that was offline and has answered a round."""
+
+    def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
+        """
+        Take a round before it becomes a sample.
+
+        :param found: the drive was found by it.
+        """
+
+
+class PolledExchange:
     """
     The rounds of one drive.
 
-    :param read: makes the procedure of a round; it returns None when a read was not answered.
-    :param found: called when a drive that was offline has answered a round.
-    :param answered: (raws, now, was it found just now): called before these become a sample.
-    :param missed: (why the drive counts as lost, '' if it does not yet; now).
-    :param present: tells whether a drive is there at all that answers.
     :ivar timer: when the next round is due.
     :ivar reading: a round is under way.
     :ivar received_at: when the last answer was received.
     """
 
-    def __init__(self, session: Session, channel: Channel[StepT, ReplyT],
-                 read: Callable[[], Generator[StepT, ReplyT, Raws | None]], *,
-                 found: Callable[[float], None],
-                 answered: Callable[[Raws, float, bool], None],
-                 missed: Callable[[Sentence, float], None],
-                 present: Callable[[], bool] = lambda: True) -> None:
-        self._session = session
+    def __init__(self, session: Session, rounds: Polled, channel: Channel[Any, Any]) -> None:
+        self._session, self._rounds = session, rounds
         self._channel = channel
-        self._read = read
-        self._found, self._answered, self._missed = found, answered, missed
-        self._present = present
         self._book = ExchangeBook(session.configuration, session.statistics)
         self._void = False  # this round began before the process stood still
         self.timer = self._book.timer
@@ -63,7 +70,7 @@ class PolledExchange(Generic[StepT, ReplyT]):
         """Begin a round; none is under way."""
         self._book.begin(now)
         self.reading, self._void = True, False
-        self._channel.run(self._read(), self._ended, now)
+        self._channel.run(self._rounds.read_round(), self._ended, now)
 
     def wait(self, now: float, patience: float) -> None:
         """Let a period pass: the round under way has not ended, and has so many s for it."""
@@ -100,11 +107,11 @@ class PolledExchange(Generic[StepT, ReplyT]):
         self.forget()
         fresh = not session.online
         if fresh:
-            if not self._present():
+            if not self._rounds.present:
                 return
             session.gate.measured(raws)     # before anything is written
-            self._found(now)
-        self._answered(raws, now, fresh)
+            self._rounds.round_found(now)
+        self._rounds.round_answered(raws, now, found=fresh)
         session.gate.measured(raws)
         sample = tuple(raw for raw in raws if raw is not None)
         if len(sample) == len(raws):
@@ -112,5 +119,5 @@ class PolledExchange(Generic[StepT, ReplyT]):
             session.report.note(ProcessDataReceived(sample, self.received_at))
 
     def _miss(self, now: float) -> None:
-        limit = self._session.configuration.missed_limit
-        self._missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)
+        session, limit = self._session, self._session.configuration.missed_limit
+        session.exchange_missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)

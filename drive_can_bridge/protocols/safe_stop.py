@@ -8,6 +8,7 @@ its status: what it was told is not what it does.
 """
 
 from collections.abc import Callable, Generator
+from functools import partial
 import math
 from typing import Generic, NamedTuple, Union
 
@@ -38,6 +39,15 @@ class StopWrite(NamedTuple):
     is_word: bool = False
 
 
+class _Kind(NamedTuple):
+    """What a stop is about, as it was when it began; ``whole``: all that can be told is in it."""
+
+    owed: bool
+    insists: bool
+    again: bool
+    whole: bool
+
+
 class SafeStop(Generic[StepT, ReplyT]):
     """
     The acyclic stop of one drive.
@@ -62,9 +72,6 @@ class SafeStop(Generic[StepT, ReplyT]):
         self._ended = ended
         self._word = word or control_word(
             session.configuration, controlled=session.control is not None)
-        self._owed = False          # there was something to be stopped when it began
-        self._insisting = self._again = False
-        self._whole = False         # all that the drive can be told is in it
 
     @property
     def answer_time(self) -> float:
@@ -101,10 +108,9 @@ class SafeStop(Generic[StepT, ReplyT]):
         """
         session = self._session
         self.running = True
-        self._owed, self._insisting = session.owed and not again, insist
-        self._again = again
-        self._whole = setpoints and not session.gate.mute
-        self._channel.run(self._then_look(procedure), self._done, now, Lane.STOP)
+        kind = _Kind(session.owed and not again, insist, again,
+                     setpoints and not session.gate.mute)
+        self._channel.run(self._then_look(procedure), partial(self._done, kind), now, Lane.STOP)
 
     def look(self, now: float) -> None:
         """Read the status at the end of a stop by other means, if it does not come by itself."""
@@ -135,21 +141,21 @@ class SafeStop(Generic[StepT, ReplyT]):
         self.running = False
         self._ended()
 
-    def _done(self, failed: list[Sentence]) -> None:
+    def _done(self, kind: _Kind, failed: list[Sentence]) -> None:
         session, self.running = self._session, False
-        if self._again:
+        if kind.again:
             self.again_at = self._channel.now
         if not failed:
-            if self._whole:
+            if kind.whole:
                 session.duty.happened(Happened.STOPPED)
             else:
                 session.duty.channel(CONTROL_WORD, Happened.STOP_LEFT)
                 if not session.active:  # in its end, to be disabled is enough
                     session.duty.happened(Happened.ANSWERED)
-            if self._again and not session.owed:
+            if kind.again and not session.owed:
                 session.report.note(Noted(sentences.stopped_again()))
-        elif self._owed or self._insisting:
-            session.report.warn(sentences.stop_failed(failed), may_run=self._owed)
+        elif kind.owed or kind.insists:
+            session.report.warn(sentences.stop_failed(failed), may_run=kind.owed)
             if not session.active:      # which ends with it: there is no more to be said
                 session.duty.happened(Happened.SAID)
         self._ended()

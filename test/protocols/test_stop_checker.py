@@ -70,7 +70,7 @@ DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
     (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
     (ExchangeBook, 'heard', _heard, 'CANnord', (('late', 0.4), ('silent', 0.0), ('end', 0.0))),
-    (SafeStop, '_done', lambda self, failed: DONE(self, []), '11 bit, no word',
+    (SafeStop, '_done', lambda self, kind, failed: DONE(self, kind, []), '11 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
     (ControlMachine, 'withdraw', _nothing, 'CANnord', (('silent', 0.9), ('well', 0.9))),
     (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),

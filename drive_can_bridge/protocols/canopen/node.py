@@ -9,26 +9,23 @@ after it was started, because nobody will ever say so.
 =============================== ==================================================================
 heard                           PDOs
 =============================== ==================================================================
-nothing                         allowed; after our first *start* only when a moment has passed
+nothing                         allowed; after our *start* only when a moment has passed
 boot-up, no heartbeats known    allowed again after the same moment
 boot-up, or heartbeat that says none until a heartbeat says operational; but if heartbeats cease
 stopped or pre-operational      (for 1 s, or three of their intervals), nothing is known any more
 heartbeat: operational          allowed
 =============================== ==================================================================
 
-NMT *start* goes out when the bridge starts, after a boot-up frame, when a heartbeat says that the
-node is not operational, and once a second while the drive is offline; never more than ten times a
-second, however often the node restarts: after a boot-up frame it is put off then, not left out.
+Who starts a node, and when, the sessions decide.
 """
 
 from enum import Enum
 import math
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 
 #: s that a node is given to become operational
 START_PAUSE = 0.05
@@ -49,6 +46,7 @@ class Change(Enum):
     NONE = 'nothing new'
     RESTARTED = 'boot-up'
     NOT_OPERATIONAL = 'heartbeat: not operational'
+    STILL_NOT = 'heartbeat: not operational, as before'
     OPERATIONAL = 'heartbeat: operational'
     HEARTBEAT_LOST = 'heartbeats ceased'
 
@@ -57,93 +55,63 @@ class Node:
     """
     One node, watched.
 
-    :param nmt_start: send NMT *start*; False: that is somebody else's business.
     :param heartbeat_timeout: s without heartbeat until it counts as lost; 0: never.
     :ivar state: what the node last said of itself, or None.
     :ivar emergency: what it last said of its errors; None: nothing, or no error any more.
     :ivar free_at: when PDOs may be sent.
     :ivar heartbeat_lost: a heartbeat is overdue.
-    :ivar heard_heartbeat: there was a heartbeat, or a boot-up frame, since ``begin``.
     """
 
-    def __init__(self, number: int, *, nmt_start: bool, heartbeat_timeout: float) -> None:
+    def __init__(self, number: int, *, heartbeat_timeout: float) -> None:
         self.number = number
         self.heartbeat_timeout = heartbeat_timeout
-        self._nmt_start = nmt_start
-        self._frames: list[Frame] = []
         self.forget()
 
     def forget(self) -> None:
-        """Know nothing and send nothing."""
+        """Know nothing."""
         self.state: NmtState | None = None
         self.emergency: Emergency | None = None
         self.free_at = math.inf
         self.heartbeat_lost = False
-        self.heard_heartbeat = False
-        self._beating = False           # there was a heartbeat, not only a boot-up frame
-        self._heartbeat_at = -math.inf
-        self._interval = 0.0
-        self._blocked_until = -math.inf     # a heartbeat is believed until then
-        self._started_at = -math.inf
-        self._start_due = math.inf
-        self._frames.clear()
+        self._heartbeat_at = -math.inf          # or the boot-up frame
+        self._interval: float | None = None     # None: there was no heartbeat yet
+        self._blocked_until = -math.inf         # a heartbeat is believed until then
 
     def begin(self, now: float) -> None:
         """Begin to use the node; what was heard of it before still counts."""
-        self._start(now)
-        if self._blocked(now):
-            self.free_at = self._blocked_until
-        else:
-            self.free_at = now + START_PAUSE if self._nmt_start else now
+        self.free_at = self._blocked_until if self._blocked(now) else now
         self._heartbeat_at = max(self._heartbeat_at, now)   # none was due while nobody listened
 
-    def offline(self, now: float) -> None:
-        """Record that the drive is offline: it is started once a second."""
-        if self._nmt_start and self._start_due == math.inf:
-            self._start_due = max(now, self._started_at + START_PERIOD)
-
-    def online(self) -> None:
-        """Record that the drive is online: it needs no more starting."""
-        self._start_due = math.inf
-
-    def stop(self) -> None:
-        """Send nothing any more, but go on listening."""
-        self._start_due = math.inf
-        self._frames.clear()
+    def started(self, at: float) -> None:
+        """Record when the node is started: unless its heartbeats know better, it is free then."""
+        if not self._blocked(at):
+            self.free_at = at + START_PAUSE
 
     # -- input ------------------------------------------------------------------------------------
 
-    def receive_heartbeat(self, state: NmtState, now: float, active: bool) -> Change:
-        """
-        Take a boot-up frame or heartbeat.
-
-        :param active: the bridge uses the node: it may be sent something.
-        """
-        was_blocked = self._blocked(now)
-        interval = now - self._heartbeat_at
-        if self._beating and state is not NmtState.BOOT_UP and interval <= INTERVAL_MAX:
-            self._interval = interval
-        self._heartbeat_at = now
-        self.heard_heartbeat = True
+    def receive_heartbeat(self, state: NmtState, now: float) -> Change:
+        """Take a boot-up frame or heartbeat."""
+        was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
+        self._heartbeat_at = now
         if state is NmtState.BOOT_UP:
             self.state = NmtState.PRE_OPERATIONAL
             self.emergency = None
-            started_at = self._start_soon(now) if active else now
-            self.free_at = started_at + START_PAUSE
-            if self._beating:
+            self.free_at = now + START_PAUSE
+            if self._interval is not None:
                 self.free_at = self._blocked_until = now + self._belief
             return Change.RESTARTED
-        self._beating = True
+        if self._interval is None:
+            self._interval = 0.0
+        elif interval <= INTERVAL_MAX:
+            self._interval = interval
         self.state = state
         if state is NmtState.OPERATIONAL:
             waited, self.free_at = now < self.free_at, min(self.free_at, now)
             self._blocked_until = -math.inf
             return Change.OPERATIONAL if waited or recovered else Change.NONE
         self.free_at = self._blocked_until = now + self._belief
-        if active and now >= self._started_at + START_SPACING:
-            self._start(now)
-        return Change.NONE if was_blocked else Change.NOT_OPERATIONAL
+        return Change.STILL_NOT if was_blocked else Change.NOT_OPERATIONAL
 
     def receive_emergency(self, emergency: Emergency) -> Sentence:
         """
@@ -161,21 +129,16 @@ class Node:
 
     def handle_timer(self, now: float) -> Change:
         """Do what is due."""
-        if now >= self._start_due:
-            self._start(now)
-        if now >= self._heartbeat_due:
+        if now >= self.next_timer():
             self.heartbeat_lost = True
             return Change.HEARTBEAT_LOST
         return Change.NONE
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` wants to be called."""
-        return min(self._start_due, self._heartbeat_due)
-
-    def take_frames(self) -> list[Frame]:
-        """Return the frames to be sent."""
-        frames, self._frames = self._frames, []
-        return frames
+        if self.state is None or self.heartbeat_lost or self.heartbeat_timeout <= 0.0:
+            return math.inf
+        return self._heartbeat_at + self.heartbeat_timeout
 
     # -- state ------------------------------------------------------------------------------------
 
@@ -194,7 +157,7 @@ class Node:
     @property
     def missing(self) -> Sentence:
         """What the node should say, but does not; '' if nothing."""
-        if self.heartbeat_timeout <= 0.0 or self.heard_heartbeat:
+        if self.heartbeat_timeout <= 0.0 or self.state is not None:
             return NOTHING
         return sentences.heartbeat_missing()
 
@@ -211,27 +174,4 @@ class Node:
 
     @property
     def _belief(self) -> float:
-        return max(BELIEF_TIME, BELIEF_INTERVALS * self._interval)
-
-    @property
-    def _heartbeat_due(self) -> float:
-        if not self.heard_heartbeat or self.heartbeat_lost or self.heartbeat_timeout <= 0.0:
-            return math.inf
-        return self._heartbeat_at + self.heartbeat_timeout
-
-    def _start_soon(self, now: float) -> float:
-        """Send *start* now, or when enough time has passed since the last one; return when."""
-        due = self._started_at + START_SPACING
-        if now < due:
-            self._start_due = min(self._start_due, due)
-            return due
-        self._start(now)
-        return now
-
-    def _start(self, now: float) -> None:
-        if not self._nmt_start:
-            return
-        self._frames.append(network.encode_nmt(NmtCommand.START, self.number))
-        self._started_at = now
-        if self._start_due != math.inf:
-            self._start_due = now + START_PERIOD
+        return max(BELIEF_TIME, BELIEF_INTERVALS * (self._interval or 0.0))

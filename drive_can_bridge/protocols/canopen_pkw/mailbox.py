@@ -37,6 +37,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import Courier
+from drive_can_bridge.protocols.placement import SentWrites
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -128,14 +129,14 @@ class MailboxCourier(Courier[Step, Reply]):
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
     :param retry: how long and how often the device is asked.
-    :param wrote: takes every write that left.
+    :param sent: keeps the books of what left.
     """
 
     def __init__(self, send: Callable[[Message, Left], None], *, order: str, retry: RetryPolicy,
-                 wrote: Callable[[Write], None] = lambda _: None) -> None:
+                 sent: SentWrites[Span] | None = None) -> None:
         super().__init__(retry)
         self._send = send
-        self._wrote = wrote
+        self._sent = sent
         self._order = order
         self._synchronised = False
         self._toggle = False            # of the last request
@@ -144,7 +145,6 @@ class MailboxCourier(Courier[Step, Reply]):
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
         self._late = False                      # at first
-        self._patience = 0.0                    # s that an answer has if it did at once
 
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
@@ -222,7 +222,8 @@ class MailboxCourier(Courier[Step, Reply]):
             return
         if sent:
             if self._late:
-                self.deadline = self._until = max(self._until, now + 0.5 * self._patience)
+                more = 0.5 * self._patience(self.step)
+                self.deadline = self._until = max(self._until, now + more)
             return
         self._refused_at = now
         if isinstance(self.step, Write) and self.step.blind:
@@ -230,9 +231,13 @@ class MailboxCourier(Courier[Step, Reply]):
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
 
+    def _patience(self, step: Step | None) -> float:
+        """Return how many s the answer to a step has."""
+        return self.retry.timeout if step is None or step.timeout is None else step.timeout
+
     def _write_left(self, write: Write, sent: bool, now: float) -> None:
-        if sent:
-            self._wrote(write)
+        if sent and self._sent is not None:
+            self._sent.note(write.span, write.words)
         self._left(sent, now)
 
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:
@@ -250,15 +255,13 @@ class MailboxCourier(Courier[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        timeout = self.retry.timeout if step.timeout is None else step.timeout
         left = self._left
         if isinstance(step, Read):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
             left = partial(self._write_left, step)
-        self._patience = timeout
-        self.deadline = self._until = now + timeout
+        self.deadline = self._until = now + self._patience(step)
         self._send(self._request, left)
 
 

@@ -5,7 +5,7 @@ Rounds of reads: what they ask for, and what the answers say.
 The status word counts from the moment it was read, before the round is complete.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.process_image import status_word
@@ -18,6 +18,7 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     MailboxChannel, Read, Refused, Reply, Silence, Step,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.polled_exchange import Raws
 
 
@@ -25,23 +26,23 @@ class Rounds:
     """
     The rounds of one drive.
 
-    :param write: writes setpoints; between two reads: commands do not wait for slow rounds.
-    :ivar status_known: the status was read just now, or there is none to be read.
+    :param writers: write setpoints between two reads: commands do not wait for slow rounds.
+    :ivar blank: there is no status to be read.
     :ivar gap: what the last one asked for in vain, though others were answered, in words.
     :ivar refusals: the names of what the drive refuses, and why, by what was read.
     """
 
     def __init__(self, session: Session, channel: MailboxChannel,
-                 write: Callable[[float], None]) -> None:
+                 writers: Writers) -> None:
         drive = self._drive = session.configuration
         self._session = session
         self._channel = channel
-        self._write = write
+        self._writers = writers
         self._placement = Placement.of(drive)
         self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
         status = status_word(drive)
         self._status = None if status is None else (status, self._placement.span(status))
-        self.status_known = status is None
+        self.blank = status is None
         self.gap = NOTHING
         self.refusals: dict[Span, Sentence] = {}
         self._words: dict[Address, int] = {}    # those of refused registers are missing
@@ -61,7 +62,7 @@ class Rounds:
         while pending:
             span = pending.pop(0)
             if self._words and self._session.online:
-                self._write(self._channel.now)
+                self._writers.write_setpoints(self._channel.now)
             reply = yield Read(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):
                 self.gap = NOTHING if not self._words else sentences.one_read_unanswered(
@@ -78,7 +79,7 @@ class Rounds:
         return [self._placement.raw_among(parameter, span, self._words)
                 for parameter, span in zip(self._drive.cyclic_response, self._spans)]
 
-    def ended(self, raws: Raws, now: float, found: bool) -> None:
+    def ended(self, now: float, *, found: bool) -> None:
         """Take the status of a drive that was found by this round."""
         if found:
             self._take_status(self._words)
@@ -87,13 +88,12 @@ class Rounds:
             self._session.control_changed(now)
 
     def _take_status(self, words: dict[Address, int]) -> None:
-        now, control = self._channel.now, self._session.control
+        now, gate = self._channel.now, self._session.gate
         raw = self._status_among(words)
-        if raw is not None and control is not None:
-            self.status_known = True
-            self._session.gate.status(raw, now)
-        self._session.control_changed(now)
-        self.status_known = self._status is None
+        if raw is not None:
+            gate.status(raw, now)
+        gate.follow()
+        self._writers.write_control(now, known=self.blank or raw is not None)
 
     def _status_among(self, words: dict[Address, int]) -> int | None:
         return None if self._status is None else self._placement.raw_among(*self._status, words)

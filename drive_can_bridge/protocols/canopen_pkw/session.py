@@ -16,6 +16,12 @@ Whatever the reason: the control word goes back to ``disable``, setpoints go neu
 re-arming. A drive that was told to run is told to stand still at once, whatever is known of the
 node: what is only silent may still be listening.
 
+How it is looked for is one script (:meth:`PkwSession._life`), begun anew at the start, when the
+bus is back, after a stall, when the node has started anew or says that it takes no PDOs, when the
+drive is lost; it ends when the drive is found. NMT *start* goes out when the bridge starts, after
+a boot-up frame, when a heartbeat says that the node is not operational, and once a second; never
+more than ten times a second, however often the node asks for it: then it is put off, not left out.
+
 Setpoints and the control word are written while the drive is online: when they change, and
 setpoints again after ``refresh_interval``.
 """
@@ -25,26 +31,33 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.events import ForeignMasterSeen
+from drive_can_bridge.core.events import ForeignMasterSeen, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
-from drive_can_bridge.protocols.canopen.supervision import Supervision
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen.node import (
+    Change, Node, START_PERIOD, START_SPACING,
+)
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.mailbox import MailboxChannel, MailboxCourier
+from drive_can_bridge.protocols.canopen_pkw.mailbox import (
+    MailboxChannel, MailboxCourier, Procedure,
+)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polled_exchange import PolledExchange
-
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 
 class PkwSession(Session):
@@ -60,21 +73,17 @@ class PkwSession(Session):
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
         self._layout = Layout(options.layout)
-        self._supervision = Supervision(self)
-        self._node = self._supervision.node
-        sent = SentWrites(self.sent, placement)
+        self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
+        self._started_at = -math.inf    # by NMT, the last time
         self._channel = MailboxChannel(MailboxCourier(
             self._send, order=options.abort_code_order, retry=self.retry,
-            wrote=lambda write: sent.note(write.span, write.words)))
-        self._writers = Writers(self, self._channel, self.stop_ended)
-        self._rounds = Rounds(self, self._channel, self._writers.write_setpoints)
-        self._exchange = PolledExchange(
-            self, self._channel, self._rounds.read, found=self._found,
-            answered=self._rounds.ended, missed=self._missed,
-            present=lambda: not self._node.heartbeat_lost)
+            sent=SentWrites(self.sent, placement)))
+        self._writers = Writers(self, self._channel)
+        self._rounds = Rounds(self, self._channel, self._writers)
+        self._exchange = PolledExchange(self, self, self._channel)
         self.users = Users(
-            self, procedures.RegisterAccess(self._channel, self.retry, placement),
-            blocked=self._supervision.refusal, control_refusal=self._writers.control_refusal)
+            self, procedures.RegisterAccess(self._channel, self.retry, placement))
+        self._course = Life(self._channel)
         self.look_after(channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -85,7 +94,7 @@ class PkwSession(Session):
             owes or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
-        self._supervision.stop()
+        self._course.stop()
         self._exchange.stop()
         self._channel.drop(now)
         self._writers.stop(now)
@@ -103,28 +112,40 @@ class PkwSession(Session):
         self.report.advice = sentences.looked_for()
         self._forget_exchange()
         self._rounds.start_over()
-        self._supervision.begin(now)
+        self._node.begin(now)
+        self._look_for_it(now, now)
+        self._begin_rounds(now)
         self._stop_if_owed(now)
 
     def fall_silent(self) -> None:
-        self._supervision.stop()
+        self._course.stop()
         self._channel.clear()
         self._exchange.stop()
         self._rounds.refusals.clear()
 
     # -- online and offline -----------------------------------------------------------------------
 
-    def _found(self, now: float) -> None:
-        self._node.online()
+    def read_round(self) -> Procedure:
+        return self._rounds.read()
+
+    def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
+        self._rounds.ended(now, found=found)
+
+    @property
+    def present(self) -> bool:
+        return not self._node.heartbeat_lost
+
+    def round_found(self, now: float) -> None:
+        self._course.end()
         self.be_online()
         self._writers.forget()
         self.control_changed(now)
         self._writers.write_setpoints(now)
 
-    def _missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if reason and self.online:
             gap = self._rounds.gap
-            self._supervision.silent(sentences.lost_because(reason, gap) if gap else reason, now)
+            self._silent(sentences.lost_because(reason, gap) if gap else reason, now)
         elif reason and not self._node.heartbeat_lost:
             self.report.advice = self._rounds.gap or sentences.rounds_unanswered()
 
@@ -142,25 +163,93 @@ class PkwSession(Session):
 
     # -- the node ---------------------------------------------------------------------------------
 
-    def node_free(self, free_at: float, now: float, *, anew: bool) -> None:
+    def _life(self, now: float, start_at: float) -> Script:
+        """
+        Have the node take PDOs, until the drive is found.
+
+        :param start_at: when it is started next.
+        """
+        start = network.encode_nmt(NmtCommand.START, self._node.number)
+        while self.configuration.options.nmt_start:
+            if now < start_at:
+                now = yield start_at
+            self.outbox.put(start)
+            self._started_at, start_at = now, now + START_PERIOD
+
+    def _look_for_it(self, now: float, start_at: float, *, anew: bool = True) -> None:
+        """
+        Begin the life anew.
+
+        :param anew: the node is started because it needs that: a moment later it takes PDOs.
+        """
+        if anew and self.configuration.options.nmt_start:
+            self._node.started(start_at)
+        self._course.start(self._life(now, start_at), now)
+
+    def _begin_rounds(self, now: float) -> None:
+        """Send nothing before the node takes PDOs but what stops its drive; then look for it."""
+        free_at = self._node.free_at
         self._channel.hold(free_at)
-        if anew:
-            self._exchange.timer.start(max(now, free_at))
+        self._exchange.timer.start(max(now, free_at))
         self._channel.advance(now)
 
-    def node_silent(self, now: float) -> None:
-        self._writers.stop(now)
+    def _take_heartbeat(self, state: NmtState, now: float) -> None:
+        change = self._node.receive_heartbeat(state, now)
+        if self.stage is not Stage.RUNNING or change is Change.NONE:
+            return
+        if change is Change.OPERATIONAL:
+            self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
+        else:       # before a stop: the node hears that only when it was started
+            self._look_for_it(now, max(now, self._started_at + START_SPACING))
+        if change is Change.RESTARTED:
+            self.report.note(Noted(sentences.booted()))
+            reason = sentences.device_restarted()
+            self._close(reason, sentences.no_answer_because(reason), now)
+            self.report.advice = sentences.restarted_waiting()
+        elif change is Change.NOT_OPERATIONAL:
+            reason = self._node.refusal(now)
+            self._close(reason, sentences.drive_offline_because(reason), now)
+        self._begin_rounds(now)
 
-    def node_closed(self, now: float) -> None:
+    def _close(self, reason: Sentence, failure: Sentence, now: float) -> None:
+        """Handle a node that takes no PDOs: none that was sent is answered any more."""
+        self.lose(reason, now)
+        self.users.fail_all(failure)
         # a stop takes its course: however often a node starts anew, they do not pile up
         if self._channel.is_idle(Lane.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
 
+    def _silent(self, reason: Sentence, now: float) -> None:
+        """Handle a drive that does not answer, or whose heartbeats have ceased."""
+        was_online = self.online
+        self.lose(reason, now)
+        if was_online:
+            self._writers.stop(now)     # it may be listening
+            self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
+
+    def request_refusal(self, now: float) -> Sentence:
+        """Say why nothing can be asked by PDOs for a while; '' if it can."""
+        text = self._node.refusal(now) if self.stage is Stage.RUNNING else NOTHING
+        return sentences.drive_offline_because(text) if text else NOTHING
+
+    def _node_says(self, identifier: int, data: bytes, now: float) -> bool:
+        """Take a frame; tell whether it was the node's heartbeat or emergency message."""
+        base = identifier - self._node.number
+        if base == network.HEARTBEAT_BASE:
+            self._take_heartbeat(network.decode_heartbeat(data), now)
+        elif base == network.EMERGENCY_BASE:
+            text = self._node.receive_emergency(network.decode_emergency(data))
+            if text:
+                self.report.note(Noted(text, warning=self._node.emergency is not None))
+        else:
+            return False
+        return True
+
     def _stop_if_owed(self, now: float) -> None:
         """Have a drive stand still of which nobody knows whether it listens."""
         if self.duty.happened(Happened.STARTED) is Do.STOP:
-            self.node_silent(now)
+            self._writers.stop(now)
 
     def _end_futile_stop(self, now: float) -> None:
         """End a stop that was for safety only, of a node that takes no PDOs any more."""
@@ -174,7 +263,7 @@ class PkwSession(Session):
 
     def see_to_control_word(self, now: float) -> None:
         if self.online:
-            self._writers.write_control(now, known=self._rounds.status_known)
+            self._writers.write_control(now, known=self._rounds.blank)
 
     # -- frames -----------------------------------------------------------------------------------
 
@@ -200,7 +289,7 @@ class PkwSession(Session):
                 if not self._channel.receive(message, now):
                     self.report.unasked(sentences.unasked_pkw(str(message)),
                                         self._channel.late(now - age), now)
-            elif self._supervision.receive(identifier, data, now):
+            elif self._node_says(identifier, data, now):
                 self._end_futile_stop(now)
                 self._writers.again.heard(now, hurry=True)
             elif identifier == options.request_cob_id:
@@ -212,8 +301,10 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        self._supervision.handle_timer(now)
         if self.stage is Stage.RUNNING:
+            self._course.handle_timer(now)
+            if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+                self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
             if self.control is not None and now >= self.control.next_timer():
                 self.control.handle_timer(now)
                 self.control_changed(now)
@@ -239,9 +330,13 @@ class PkwSession(Session):
         soonest = self._channel.next_timer()
         if self.stage is not Stage.RUNNING:
             return soonest
-        soonest = min(soonest, self._round_due, self._supervision.next_timer(),
-                      self.setpoints.expires_at, self.neutral_stop.next_timer())
+        soonest = min(soonest, self._round_due, self._course.next_timer(),
+                      self._node.next_timer(), self.setpoints.expires_at,
+                      self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        return self._writers.control_refusal(action, refusal)
 
     # -- state ------------------------------------------------------------------------------------
 

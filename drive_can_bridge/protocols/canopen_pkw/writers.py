@@ -2,24 +2,35 @@
 """
 What a device is told: setpoints and control word while it is online, and the stop of both.
 
-Both are written when they change, setpoints also again after a while. Neutral setpoints follow the
-word that stops a drive at once, and so does everything in the stop, whatever is known of the node.
-One that takes back a command is repeated soon while nobody answers where there is no such word.
+Both are written when they change, and again after a while what is in ``cyclic_request``. When they
+are due, :mod:`..acyclic_output` knows; whether the drive got them, its answers say.
+
+*Setpoints.* Neutral ones follow the word that stops a drive at once, and so does everything in the
+stop, whatever is known of the node. One that takes back a command is repeated soon while nobody
+answers where there is no such word.
+
+*Control word.* A word that stops the drive may be executed twice: when its answer is missing, it
+is written again soon, before anything else, and with every round from then on. Any other word is
+read back first, and written again only if it is not there. Where it cannot be read back it is not
+repeated, and the control machine gives up by itself. A word that the drive refuses ends what the
+user wanted, with the reason that the drive gives. A refused ``disable`` is tried again and again:
+a device under local control, say, takes it as soon as it is back under remote control.
 """
 
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.holding import Setpoint
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.process_image import status_word
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.process_image import control_word, status_word
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.control_writer import ControlWriter
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
@@ -32,35 +43,37 @@ from drive_can_bridge.protocols.stop_again import StopAgain
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0
 STOP_TIME_SILENT = 0.4
+#: s until a ``disable`` that was refused is written again
+RETRY_AFTER = 0.25
 
 
 class Writers:
     """
     What writes to one drive.
 
-    :param stop_ended: called when a stop has run its course.
-    :ivar control: writes the control word; None: there is none.
     :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
-    def __init__(self, session: Session, channel: MailboxChannel,
-                 stop_ended: Callable[[], None]) -> None:
+    def __init__(self, session: Session, channel: MailboxChannel) -> None:
         drive = session.configuration
         self._session = session
         self._channel = channel
         self._placement = Placement.of(drive)
         self._setpoints = session.setpoints
-        self._output = AcyclicOutput(session.control, Acknowledged(), len(session.setpoints.items),
-                                     refresh=drive.options.refresh_interval)
-        self.control = None if session.control is None else ControlWriter(
-            session, session.control, channel, self._output)
+        word = self._word = control_word(drive, controlled=session.control is not None)
+        self._slot = len(session.setpoints.items)       # of the word, behind them
+        self._output = AcyclicOutput(
+            session.control, Acknowledged(), self._slot + 1, slot=self._slot,
+            refresh=drive.options.refresh_interval,
+            lasting=() if word in drive.cyclic_request else (self._slot,))
+        self._word_refusal = NOTHING            # why the drive does not take it
         self._failures: dict[str, str] = {}     # of setpoints, by name
         self._warned: dict[str, str] = {}
         self._silences = Counter[int]()         # in a row, by index
         self._made_room = False                 # for setpoints, in this round
         self._patience = STOP_PATIENCE          # s until a stop is written again
         self._stop: SafeStop[Step, Reply] = SafeStop(
-            session, channel, stop_ended, status_word(drive), self._read_status)
+            session, channel, session.stop_ended, status_word(drive), self._read_status)
         self.again = StopAgain(
             session, channel, self._stop, lambda now: self.stop(now, again=True))
 
@@ -70,8 +83,7 @@ class Writers:
         self._failures.clear()
         self._warned.clear()
         self._silences.clear()
-        if self.control is not None:
-            self.control.forget()
+        self._word_refusal = NOTHING
 
     def cancel(self) -> None:
         """Leave alone what is under way, but for a stop."""
@@ -84,11 +96,12 @@ class Writers:
         """
         Write a control word that has changed.
 
-        :param known: the status was read just now, or there is none.
+        :param known: the status was read just now, or there is none. A word that may start the
+            drive is repeated only then: one that was off, unseen, must not start by that.
         """
-        waits = self._output.holds_word()
-        if self.control is not None and not waits:
-            self.control.update(now, known=known)
+        control, word, waits = self._session.control, self._word, self._output.holds_word()
+        if control is not None and word is not None and not waits:
+            self._update_word(word, control, now, known=known)
         if waits or self._setpoints.changed and not self._setpoints.enabled:
             self.write_setpoints(now)
 
@@ -186,7 +199,7 @@ class Writers:
         for left in range(STOP_ATTEMPTS - 1, -1, -1):
             self.expire(self._channel.now)
             raw, begun_at = setpoint.raw, self._channel.now
-            alone = self.control is None and self._stops(index, setpoint)
+            alone = self._word is None and self._stops(index, setpoint)
             self._output.written(index, raw, begun_at)
             write = Write.of(
                 self._placement, setpoint.parameter, raw, blind=alone,
@@ -199,7 +212,7 @@ class Writers:
             # what had less time than a slow device may take was no silence
             self._silences[index] += reply.sent and (
                 self._channel.now >= begun_at + timeout - TOLERANCE)
-            if self.control is not None or not self._stops(index, setpoint):
+            if self._word is not None or not self._stops(index, setpoint):
                 break
         return raw, reply
 
@@ -224,6 +237,103 @@ class Writers:
         else:
             return
         session.control_changed(now)
+
+    # -- the control word -------------------------------------------------------------------------
+
+    def _update_word(self, parameter: Parameter, control: ControlMachine, now: float, *,
+                     known: bool) -> None:
+        """Write the word if the drive does not have it, or not lately; see write_control."""
+        word, output = control.word, self._output
+        if not output.wants(self._slot, word, now) and not output.word_due(now):
+            return
+        repeated = output.told(self._slot) == word or control.operating
+        if repeated and not known and word != control.table.disable:
+            return
+        if control.stopping and word != output.word:    # once for each stop
+            self._channel.make_room(now)
+        if self._channel.is_idle(Lane.CONTROL):
+            self._channel.run(
+                self._write_word(parameter, control), lambda _: None, now, Lane.CONTROL)
+
+    def _write_word(self, parameter: Parameter, control: ControlMachine,
+                    ) -> Generator[Step, Reply, None]:
+        """Write the newest word, until it is answered or silence says to wait a while."""
+        output, unanswered = self._output, 0
+        while not output.holds_word():
+            word, stopping = control.word, control.stopping
+            if word == output.word and output.told(self._slot) is None and not stopping:
+                there = yield from self._read_back(parameter, word)
+                if there is None:
+                    return
+                if there:
+                    output.written(self._slot, word, self._channel.now)
+                    self._word_arrived(word)
+                    if word == control.word:
+                        return
+                    continue
+                word, stopping = control.word, control.stopping
+            # the last has the time that any request has: a slow device is no silent one
+            again = stopping and unanswered < STOP_ATTEMPTS - 1
+            timeout = min(STOP_PATIENCE, self._session.retry.timeout) if again else None
+            output.written(self._slot, word, self._channel.now)
+            reply = yield from tell(
+                self._session.duty, CONTROL_WORD,
+                Write.of(self._placement, parameter, word, blind=stopping, timeout=timeout),
+                runs=word != control.table.disable)
+            if isinstance(reply, Silence):
+                unanswered += stopping
+                output.failed(self._slot)
+                if not reply.sent:      # as if it had not been begun
+                    output.word_refused(word, self._channel.now)
+                if word == control.word and not again:
+                    if stopping:
+                        self._tell_silence(parameter, word)
+                    return
+                continue
+            if isinstance(reply, Refused):
+                self._take_refusal(parameter, control, word, reply.text)
+            else:
+                self._word_refusal = NOTHING
+                self._word_arrived(word)
+            if word == control.word:
+                return
+
+    def _read_back(self, parameter: Parameter, word: int,
+                   ) -> Generator[Step, Reply, bool | None]:
+        """Tell whether the drive has a word that was not answered; None: nobody knows."""
+        if not parameter.readable:
+            return None
+        span = self._placement.span(parameter)
+        reply = yield Read(span.address, span.count, attempts=1)
+        if not isinstance(reply, Answered):
+            return None
+        found = self._placement.raw(parameter, reply.words)
+        return parameter.word_from_raw(found) == parameter.word_from_raw(word)
+
+    def _word_arrived(self, word: int) -> None:
+        """Record that the drive has a word."""
+        if self._output.word_left(self._channel.now, word):
+            self._session.control_changed(self._channel.now)
+
+    def _take_refusal(self, parameter: Parameter, control: ControlMachine, word: int,
+                      reason: Sentence) -> None:
+        now = self._channel.now
+        text = sentences.write_refused(f'{parameter.name} {word:04X}h', reason)
+        if text != self._word_refusal:
+            self._session.report.warn(sentences.write_failed(text))
+        self._word_refusal = text
+        if word == control.table.disable:
+            self._output.again_at = now + RETRY_AFTER
+        control.word_refused(word, reason, now)
+        self._session.control_changed(now)
+
+    def _tell_silence(self, parameter: Parameter, word: int) -> None:
+        """Say that a word that stops the drive is not acknowledged, once until one is."""
+        text = sentences.write_unanswered(f'{parameter.name} {word:04X}h')
+        if text != self._word_refusal:
+            self._session.report.warn(
+                sentences.write_failed(text), may_run=self._session.owed)
+        self._word_refusal = text
 
     # -- stopping ---------------------------------------------------------------------------------
 
@@ -274,6 +384,6 @@ class Writers:
     def warnings(self) -> list[Sentence]:
         """Say what the drive refuses, and what to do."""
         texts = [sentences.setpoint_not_taken(text) for text in self._failures.values()]
-        if self.control is not None and self.control.refusal:
-            texts.append(sentences.word_not_taken(self.control.refusal))
+        if self._word_refusal:
+            texts.append(sentences.word_not_taken(self._word_refusal))
         return texts

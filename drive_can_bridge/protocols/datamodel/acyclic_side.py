@@ -5,10 +5,9 @@ The acyclic side of a DataModel drive, whatever its identifiers look like.
 Requests of users, a control or status word without a slot in cyclic telegrams, stops by number.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
 import math
-from typing import Union
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
@@ -24,13 +23,13 @@ from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.acyclic_control import AcyclicControl
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, ParameterCourier, Read, Reply, Step, Words, Write,
+    AcyclicChannel, AcyclicCodec, ParameterCourier, Read, Reply, Step, Words, Write,
 )
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
+from drive_can_bridge.protocols.datamodel.setpoint_writer import ControlByNumber
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.safe_stop import (
     SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite,
@@ -42,11 +41,7 @@ class AcyclicSide:
     """
     The acyclic side of one session.
 
-    :param encode_read: (number, count) -> frame.
-    :param encode_write: (number, words) -> frame.
-    :param decode: makes words of an answer, given the read that waits for one.
-    :param together: parameters that fit one write frame.
-    :param stop_ended: called when a stop by acyclic writes has run its course.
+    :param codec: of the frames.
     :param quarantine: given where the exchange itself goes through the channel.
     :ivar channel: everything acyclic goes through it, by the ``courier``.
     :ivar numbers: where the parameters of the drive stand.
@@ -59,23 +54,19 @@ class AcyclicSide:
     :ivar again: tells a drive to stop again that is offline and shows up.
     """
 
-    def __init__(self, session: Session, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame],
-                 decode: Callable[[Frame, Union[Read, None]], Words], together: int,
-                 stop_ended: Callable[[], None], quarantine: float | None = None) -> None:
+    def __init__(self, session: Session, codec: AcyclicCodec, *,
+                 quarantine: float | None = None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.numbers = Numbers(drive)
         self._session = session
-        self._decode = decode
-        sent = SentWrites(session.sent, self.numbers)
+        self._decode = codec.decode
         self.courier = ParameterCourier(
-            encode_read=encode_read, encode_write=encode_write, send=session.outbox.put,
-            wrote=lambda write: sent.note(write.chunk, write.words), retry=session.retry,
-            eeprom_gap=options.eeprom_write_gap, quarantine=quarantine)
+            codec, send=session.outbox.put, sent=SentWrites(session.sent, self.numbers),
+            retry=session.retry, eeprom_gap=options.eeprom_write_gap, quarantine=quarantine)
         self.channel: AcyclicChannel = Channel(self.courier)
         session.users = Users(session, procedures.ParameterAccess(
             self.channel, session.retry, self.numbers, verify=drive.verify_writes,
-            together=together))
+            together=codec.together))
         word = control_word(drive, controlled=session.control is not None)
         status = status_word(drive)
         self.control_slot = _slot(drive.cyclic_request, word)
@@ -91,11 +82,11 @@ class AcyclicSide:
             len(drive.cyclic_request) if polled else 0, slot=self.control_slot if polled else None,
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
-            AcyclicControl(session, session.control, self.channel, self.courier, self.numbers,
-                           self.output, word=word, status=status))
+            ControlByNumber(session, session.control, self.channel, self.courier, self.numbers,
+                            self.output, word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
-            session, self.channel, stop_ended, at_end, self._read_status)
+            session, self.channel, session.stop_ended, at_end, self._read_status)
         self.shows_up = False
         self.again = StopAgain(
             session, self.channel, self.stop, lambda now: self.begin_stop(now, again=True),
@@ -115,7 +106,8 @@ class AcyclicSide:
         """Take an answer: to the outstanding read, or to nothing."""
         session, self.shows_up = self._session, True
         try:
-            words = self._decode(frame, self.courier.outstanding)
+            asked = self.courier.outstanding
+            words = self._decode(frame, None if asked is None else asked.key)
         except Unasked as error:
             late = self.channel.late(now, partial(self._answers, frame))
             session.report.unasked(sentences.malformed(str(error)), late, now)
@@ -131,7 +123,7 @@ class AcyclicSide:
         if not isinstance(step, Read):
             return False
         try:
-            self._decode(frame, step)
+            self._decode(frame, step.key)
         except (RemoteProtocolError, Unasked):
             return False
         return True

@@ -26,13 +26,14 @@ from collections import deque
 from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 import math
-from typing import Any, Union
+from typing import Any, Protocol, Union
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.courier import ANYTHING, Courier
+from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polling import Chunk
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
@@ -88,16 +89,37 @@ Send = Callable[[Frame, Union[Left, None]], None]
 SENT: Words = ()
 
 
+class AcyclicCodec(Protocol):
+    """The acyclic frames of one drive, whatever its identifiers look like."""
+
+    #: parameters that fit one write
+    together: int
+
+    def encode_read(self, number: int, count: int) -> Frame:
+        """Encode a read of consecutive parameters."""
+
+    def encode_write(self, number: int, words: Words) -> Frame:
+        """Encode a write of as many as fit."""
+
+    def decode(self, frame: Frame, asked: tuple[int, int] | None) -> Words:
+        """
+        Make words of an answer.
+
+        :param asked: number and count of the read that waits for one; None: none does.
+        :raises RemoteProtocolError: malformed.
+        :raises Unasked: it answers something else.
+        """
+
+
 class ParameterCourier(Courier[Step, Reply]):
     """
     Sends reads and writes, paced.
 
-    :param encode_read: (number, count) -> frame.
-    :param encode_write: (number, words) -> frame.
+    :param codec: of the frames.
     :param send: takes frames that are to leave now, and who is told whether they did.
     :param retry: how long and how often the drive is asked.
     :param eeprom_gap: s after an EEPROM write.
-    :param wrote: takes every write that left.
+    :param sent: keeps the books of what left.
     :param quarantine: given where answers do not say what they answer, and the exchange itself
         goes through the channel: s of silence after a read that nobody answered, or an answer that
         nobody asked for. Writes that go first do not wait for the answer of a read then.
@@ -107,18 +129,15 @@ class ParameterCourier(Courier[Step, Reply]):
 
     silent = None
 
-    def __init__(self, *, encode_read: Callable[[int, int], Frame],
-                 encode_write: Callable[[int, Words], Frame], send: Send, retry: RetryPolicy,
-                 eeprom_gap: float, wrote: Callable[[Write], None] = lambda _: None,
-                 quarantine: float | None = None) -> None:
+    def __init__(self, codec: AcyclicCodec, *, send: Send, retry: RetryPolicy, eeprom_gap: float,
+                 sent: SentWrites[Chunk] | None = None, quarantine: float | None = None) -> None:
         super().__init__(retry)
         self.asked_at = self.wrote_at = -math.inf
         self.free_at = -math.inf
         self.anonymous = quarantine is not None
-        self._encode_read = encode_read
-        self._encode_write = encode_write
+        self._codec = codec
         self._emit = send
-        self._wrote = wrote
+        self._sent = sent
         self._eeprom_gap = eeprom_gap
         self._quarantine = quarantine
         self._eeprom_free_at = -math.inf
@@ -139,7 +158,7 @@ class ParameterCourier(Courier[Step, Reply]):
 
     def begin(self, step: Step, now: float) -> None:
         if isinstance(step, Read):
-            self._emit(self._encode_read(step.number, step.count), None)
+            self._emit(self._codec.encode_read(step.number, step.count), None)
             self.asked_at = now
             self.expect(step, now + (
                 self.retry.timeout if step.timeout is None else step.timeout))
@@ -196,10 +215,10 @@ class ParameterCourier(Courier[Step, Reply]):
         def left(sent: bool, then: float) -> None:
             if write.eeprom:    # the pause begins when the frame is on its way
                 self._eeprom_free_at = max(self._eeprom_free_at, then + self._eeprom_gap)
-            if sent:
-                self._wrote(write)
+            if sent and self._sent is not None:
+                self._sent.note(write.chunk, write.words)
             told(sent, then)
-        self._emit(self._encode_write(write.number, write.words), left)
+        self._emit(self._codec.encode_write(write.number, write.words), left)
 
     def write_first(self, write: Write, left: Left, now: float) -> None:
         """

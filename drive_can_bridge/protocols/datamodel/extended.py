@@ -242,3 +242,28 @@ def _acyclic_identifier(station: int, number: int, count: int) -> int:
 def _check_station(station: int) -> None:
     if not 0 <= station <= STATION_MAX:
         raise LocalProtocolError(f'station {station} does not fit 7 bits: 0 to {STATION_MAX}')
+
+
+class AcyclicCodec:
+    """
+    The acyclic frames of one station.
+
+    :param strict: as for :func:`decode`.
+    """
+
+    together = SLOTS
+
+    def __init__(self, station: int, strict: bool) -> None:
+        self.station, self.strict = station, strict
+
+    def encode_read(self, number: int, count: int) -> Frame:
+        """Encode a read of consecutive parameters."""
+        return encode_read_request(self.station, number, count)
+
+    def encode_write(self, number: int, words: Sequence[int]) -> Frame:
+        """Encode a write of up to four consecutive parameters."""
+        return encode_write(self.station, number, words)
+
+    def decode(self, frame: Frame, asked: tuple[int, int] | None) -> tuple[int, ...]:
+        """Decode an answer; see :func:`decode_answer`."""
+        return decode_answer(frame, self.station, asked, strict=self.strict)

@@ -1,40 +1,149 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a polled DataModel drive is told: setpoints, and a control word among them, as they change.
+What a DataModel drive is told by acyclic frames, one parameter each, which nobody acknowledges.
 
-One parameter a frame, which nobody acknowledges. They do not wait for answers: they go out while a
-read is under way, or in quarantine, with the values that they have then.
+*By number* (:class:`ControlByNumber`): a control word without a slot in cyclic telegrams. It is
+written when it changes, before everything else that waits; one that stops the drive waits for
+nothing at all. A status word without a slot is read twice a second, twenty times while a request
+is under way, and whenever the word has left.
+
+*In slots* (:class:`SetpointWriter`): what is in ``cyclic_request`` of a polled drive, as it
+changes. It does not wait for answers: it goes out while a read is under way, or in quarantine,
+with the value that it has then.
+
+What is due, and when a word is written again, says :mod:`..acyclic_output`.
 """
 
 import math
 
-from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.stop_duty import Happened
-from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide
-from drive_can_bridge.protocols.datamodel.channel import Reply, Step, Write
+from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.session import Session, Stage
+from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
+from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
+from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.datamodel.channel import (
+    ParameterCourier, Procedure, Reply, Step, Write,
+)
+from drive_can_bridge.protocols.datamodel.numbers import Numbers
+from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 
-Rounds = PolledExchange[Step, Reply]
+#: s between two looks at the status word, while a request is under way and otherwise
+STATUS_PERIOD_PENDING = 0.05
+STATUS_PERIOD = 0.5
+#: s until a word that the bus refused is written again
+REFUSED_PAUSE = 0.02
+
+
+class ControlByNumber:
+    """
+    Control and status word of a drive, as far as they have no slot.
+
+    :param word: parameter of the control word; None: it has one.
+    :param status: parameter of the status word; None: it has one, or there is none.
+    """
+
+    def __init__(self, session: Session, control: ControlMachine, channel: Channel[Step, Reply],
+                 courier: ParameterCourier, numbers: Numbers, output: AcyclicOutput, *,
+                 word: Parameter | None, status: Parameter | None) -> None:
+        self._session = session
+        self._control = control
+        self._channel = channel
+        self._courier = courier
+        self._word = word
+        self._status = status
+        self._numbers = numbers
+        self._output = output
+        self._watch = Life(channel)
+
+    def begin(self, now: float) -> None:
+        """Handle a drive that was found: it gets its word, and its status is looked at."""
+        self._output.forget_word()
+        self._look(now)
+
+    def end(self) -> None:
+        """Leave the status of a lost drive alone."""
+        self._watch.end()
+        if self._word is not None:
+            self._output.again_at = math.inf
+
+    def stop(self) -> None:
+        """Plan nothing any more. The channel was cleared."""
+        self.end()
+        self._watch.stop()
+
+    def update(self, now: float) -> None:
+        """Write the control word if it changed, or if the drive takes no notice of it."""
+        control, output = self._control, self._output
+        word, runs = control.word, not control.at_rest
+        if self._word is None or word == output.word and not output.word_due(now):
+            return
+        output.word_begun(word)
+        write = self._courier.write_now if control.stopping else self._courier.write_first
+        write(self._numbers.write(self._word, word),
+              lambda sent, then: self._left(word, sent, then, runs=runs), now)
+
+    def next_timer(self) -> float:
+        """Return when the status is to be looked at, or a word to be written again."""
+        look_at = self._watch.next_timer()
+        return look_at if self._word is None else min(look_at, self._output.next_timer())
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        self._watch.handle_timer(now)
+        if self._word is not None and self._output.handle_timer(now):
+            self._session.see_to_control_word(now)
+
+    def _left(self, word: int, sent: bool, now: float, *, runs: bool) -> None:
+        session, online = self._session, self._session.online
+        if not sent:
+            self._output.word_refused(word, now + REFUSED_PAUSE)
+            return
+        session.duty.channel(CONTROL_WORD, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
+        # of a drive that is lost, others see to the stop
+        self._output.word_left(now, word, again=online)
+        if online and session.stage is Stage.RUNNING:
+            self._look(now)
+        session.control_changed(now)
+
+    def _look(self, now: float) -> None:
+        """Read the status from now on; what was asked before does not count."""
+        if self._status is not None:
+            self._watch.start(self._look_at(self._status, now), now)
+
+    def _look_at(self, status: Parameter, now: float) -> Script:
+        while True:
+            yield now
+            raw = yield self._read(status)
+            now = self._channel.now
+            self._session.gate.status(raw, now)
+            self._session.control_changed(now)
+            now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
+
+    def _read(self, status: Parameter) -> Procedure:
+        words = yield self._numbers.read(status)
+        return None if words is None else status.raw_from_word(words[0])
 
 
 class SetpointWriter:
     """
-    Writes what is in ``cyclic_request`` of one drive.
+    Writes what is in ``cyclic_request`` of one polled drive.
 
+    :param slot: of the control word in there; None: it has none.
     :ivar word_written_at: when the control word left last.
     """
 
-    def __init__(self, session: Session, side: AcyclicSide, exchange: Rounds) -> None:
-        drive = session.configuration
+    def __init__(self, session: Session, exchange: PolledExchange, courier: ParameterCourier,
+                 numbers: Numbers, output: AcyclicOutput, *, slot: int | None) -> None:
         self.word_written_at = -math.inf
         self._session = session
         self._exchange = exchange
-        self._side = side
-        self._courier = side.courier
-        self._numbers = side.numbers
-        self._slot = side.control_slot
-        self._parameters = drive.cyclic_request
-        self._output = side.output
+        self._courier = courier
+        self._numbers = numbers
+        self._slot = slot
+        self._parameters = session.configuration.cyclic_request
+        self._output = output
 
     def stop(self) -> None:
         """Plan nothing any more: nothing is known of the drive."""

@@ -135,3 +135,30 @@ def decode_read_response(frame: Frame, count: int, *, strict: bool = False) -> t
     if strict and length != PAYLOAD:
         raise RemoteProtocolError(f'{frame}: {length} data bytes instead of {PAYLOAD}')
     return _WORDS[count].unpack_from(frame.data)
+
+
+class AcyclicCodec:
+    """
+    The frames of one station.
+
+    :param request: identifier of what it is asked.
+    :param strict: as for :func:`decode_read_response`.
+    """
+
+    together = 1
+
+    def __init__(self, request: int, strict: bool) -> None:
+        self.request, self.strict = request, strict
+
+    def encode_read(self, number: int, count: int) -> Frame:
+        """Encode a read of consecutive parameters."""
+        return encode_read_request(self.request, number, count)
+
+    def encode_write(self, number: int, words: Sequence[int]) -> Frame:
+        """Encode a write of one parameter."""
+        word, = words
+        return encode_write(self.request, number, word)
+
+    def decode(self, frame: Frame, asked: tuple[int, int] | None) -> tuple[int, ...]:
+        """Decode an answer, which does not say what it answers."""
+        return decode_read_response(frame, asked[1] if asked else 0, strict=self.strict)

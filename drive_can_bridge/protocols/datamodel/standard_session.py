@@ -19,6 +19,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
+from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
@@ -29,6 +30,8 @@ from drive_can_bridge.protocols.polling import TOLERANCE
 class StandardSession(Session):
     """Rounds of reads, setpoints on change, and the acyclic frames between them."""
 
+    present = True
+
     def __init__(self, drive: DriveConfiguration) -> None:
         table, options = drive.profile.control, drive.options
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
@@ -37,24 +40,18 @@ class StandardSession(Session):
         request = standard.identifier(options.request_id_base, drive.station)
         strict: bool = options.length_policy == 'strict'
         self._side = AcyclicSide(
-            self,
-            encode_read=lambda number, count: standard.encode_read_request(
-                request, number, count),
-            encode_write=lambda number, words: standard.encode_write(request, number, *words),
-            decode=lambda frame, step: standard.decode_read_response(
-                frame, step.count if step else 0, strict=strict),
-            together=1, stop_ended=self.stop_ended, quarantine=options.quarantine)
+            self, standard.AcyclicCodec(request, strict), quarantine=options.quarantine)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
         self._round = StandardRound(drive, self._side.courier, self._status_slot)
-        self._exchange = PolledExchange(
-            self, self._channel, self._round.read, found=self._found, answered=self._answered,
-            missed=self._missed)
+        self._exchange = PolledExchange(self, self, self._channel)
         self._timer = self._exchange.timer
-        self._writer = SetpointWriter(self, self._side, self._exchange)
+        self._writer = SetpointWriter(
+            self, self._exchange, self._side.courier, self._side.numbers, self._side.output,
+            slot=self._side.control_slot)
         self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
 
@@ -151,13 +148,16 @@ class StandardSession(Session):
 
     # -- rounds -----------------------------------------------------------------------------------
 
-    def _found(self, now: float) -> None:
+    def read_round(self) -> Procedure:
+        return self._round.read()
+
+    def round_found(self, now: float) -> None:
         self.be_online()
         self._writer.stop()
         self._writer.look(now)
         self._side.found(now)
 
-    def _answered(self, raws: Raws, now: float, found: bool) -> None:
+    def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
         courier = self._side.courier
         if not found and courier.asked_at > courier.wrote_at:
             self.neutral_stop.answered()
@@ -174,7 +174,7 @@ class StandardSession(Session):
         if known and self._side.control_slot is not None:
             self._writer.write_word(now, known=True)
 
-    def _missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if not self.online:
             self.report.advice = self._round.gap or sentences.reads_unanswered()
         elif reason:

@@ -362,6 +362,30 @@ def test_enabling_stuck_on_the_way_fails_when_the_device_restarts() -> None:
 # -- the word among the cyclic requests -----------------------------------------------------------
 
 
+def test_enable_that_is_acknowledged_is_not_repeated_although_nothing_starts() -> None:
+    """What has arrived needs no repetition: started anew by one, a drive would surprise people."""
+    talk = ready()
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    settle(talk, '485#C002002A00000000', 10.076, '41000000')
+    assert rounds(talk, 10.08, 12.07, '41000000') == [], 'ready, say a hundred rounds'
+    assert talk.control_outcomes() == []
+    (at, text), = rounds(talk, 12.07, 12.2, '41000000')
+    assert (round(at, 3), text[:10] + text[12:]) == (12.075, '505#C0020000000000'), 'disable'
+    (action, success, _), = talk.control_outcomes()
+    assert (action, success) == ('enable', False)
+
+
+def test_enable_is_refreshed_only_with_a_status_that_was_read_just_now() -> None:
+    """A drive that was off for a moment, unseen, must not start by a repetition."""
+    talk = ready(request=(WORD,), refresh_interval=0.05, parameter_timeout=0.06)
+    assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
+    assert talk.hears('485#C002002A00000000', 10.076) == []
+    assert talk.until(10.135) == [(10.09, READ_1)], 'no answer; and the refresh is due'
+    assert talk.until(10.1501) == [(10.15, IDLE)], 'before the word'
+    assert talk.hears(IDLE_ANSWER, 10.151) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.152) == [ENABLE_1], 'it is there, and has not started'
+
+
 def test_word_among_the_cyclic_requests_is_refreshed() -> None:
     talk = ready(request=(WORD,), refresh_interval=0.05)
     assert talk.session.setpoints.items == ()

@@ -53,6 +53,85 @@ def test_nothing_but_nmt_before_the_node_is_operational() -> None:
     assert talk.session.facts()['nmt_state'] == 'operational'
 
 
+def test_start_once_a_second_until_the_drive_is_found() -> None:
+    talk = started(parameter_timeout=0.5)
+    assert [at for at, text in talk.until(13.5) if text == START] == [11.0, 12.0, 13.0]
+    talk.events()
+    text = IDLE
+    while text != READ_1:   # whatever is under way
+        (_, text), = talk.until(talk.session.next_timer())
+        if text == IDLE:
+            text, = talk.hears(IDLE_ANSWER, 13.75)
+    talk.hears(ANSWER_1, 13.76)
+    assert talk.session.online
+    sent = [text for _, text in talk.until(14.25)]
+    assert sent and START not in sent, 'it needs none, and its reads are not yet missed'
+
+
+def test_drive_that_is_lost_is_started_at_once_and_then_once_a_second() -> None:
+    talk = online(parameter_timeout=0.02, missed_limit=1)
+    assert [at for at, text in talk.until(11.5) if text == START] == [11.0], 'a second after that'
+    talk = online(parameter_timeout=0.02, missed_limit=1)
+    for tick in range(60):      # 10.07, 10.09, ...: it answers for longer than a second
+        (at, text), = talk.until(10.0701 + 0.02 * tick)
+        talk.hears(ANSWER_1 if text == READ_1 else ANSWER_0, at + 0.001)
+    assert talk.session.online
+    starts = [at for at, text in talk.until(13.5) if text == START]
+    assert starts == [pytest.approx(11.29), pytest.approx(12.29), pytest.approx(13.29)]
+
+
+def test_start_is_put_off_once_however_often_a_node_starts_anew() -> None:
+    talk = started()
+    assert talk.hears(BOOT_UP, 10.04) == []
+    assert talk.hears(BOOT_UP, 10.09) == []
+    assert talk.until(10.1499) == [(10.1, START)]
+    assert talk.until(10.1501) == [(10.15, IDLE)]
+    assert talk.hears(BOOT_UP, 10.3) == [START]
+
+
+def test_node_that_stays_closed_is_started_no_more_than_ten_times_a_second() -> None:
+    talk = online()
+    assert talk.hears(PRE_OPERATIONAL, 10.2) == [START]
+    for beat in range(1, 9):
+        assert talk.hears(PRE_OPERATIONAL, 10.2 + 0.01 * beat) == []
+    assert talk.until(10.3999) == [(10.3, START)]
+    refused = says('drive_offline_because', reason=says('node_state', state='pre-operational'))
+    talk.submits(read(FLC), 10.35)
+    assert talk.outcomes() == [[refused]]
+    assert [text for _, text in talk.until(11.2799)] == [], 'believed for 1 s'
+    assert talk.until(11.2801) == [(11.28, IDLE)], 'heartbeats have ceased: nobody knows'
+
+
+def test_node_that_is_operational_is_not_started_soon() -> None:
+    talk = started()
+    assert talk.hears(BOOT_UP, 10.02) == []
+    assert talk.hears(OPERATIONAL, 10.03) == []
+    assert talk.at(10.03) == [IDLE]
+    assert [at for at, text in talk.until(10.9) if text == START] == []
+
+
+def test_node_is_only_listened_to_once_its_drive_was_stopped() -> None:
+    talk = online(heartbeat_timeout=0.5)
+    talk.deactivate(10.06)
+    talk.until(11.0)
+    for text in (BOOT_UP, PRE_OPERATIONAL, TRIP):
+        assert talk.hears(text, 12.0) == []
+    assert talk.until(20.0) == []
+    assert talk.session.facts()['nmt_state'] == 'pre-operational'
+    assert talk.session.facts()['emergency'].startswith('2310h')
+
+
+def test_frames_of_other_nodes_and_malformed_ones() -> None:
+    talk = online()
+    for text in ('706#05', '086#1023030000000000'):
+        assert talk.hears(text, 10.06) == []
+    assert talk.session.facts() == {'nmt_state': 'unknown', 'emergency': 'none'}
+    assert talk.session.statistics.rejected == 0
+    talk.hears('705#', 10.061)
+    talk.hears('085#05', 10.062)
+    assert talk.session.statistics.rejected == 2
+
+
 def test_no_nmt_at_all() -> None:
     talk = online(nmt_start=False, parameter_timeout=0.1)
     sent = [text for _, text in talk.until(15.0)]

@@ -18,6 +18,21 @@ def nobody(sent: bool, now: float) -> None:
     """Be told of a frame that left, and do nothing."""
 
 
+class Texts:
+    """Frames that say whether they ask or write."""
+
+    together = 4
+
+    def encode_read(self, number: int, count: int) -> Frame:
+        return Frame(number, b'?' * count, True)
+
+    def encode_write(self, number: int, words: Words) -> Frame:
+        return Frame(number, bytes(words), True)
+
+    def decode(self, frame: Frame, asked: tuple[int, int] | None) -> Words:
+        raise NotImplementedError
+
+
 class Line:
     """A channel whose frames are texts, and the results of its procedures."""
 
@@ -25,9 +40,7 @@ class Line:
                  quarantine: float | None = None) -> None:
         self.outbox = Outbox()
         self.courier = ParameterCourier(
-            encode_read=lambda number, count: Frame(number, b'?' * count, True),
-            encode_write=lambda number, words: Frame(number, bytes(words), True),
-            send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
+            Texts(), send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
             quarantine=quarantine)
         self.channel = Channel(self.courier)
         self.results: list[object] = []

@@ -13,7 +13,7 @@ from extended_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -580,6 +580,33 @@ def test_no_status_is_read_of_a_lost_drive() -> None:
     talk.until(10.5)                              # no answers: offline, but cycled on
     assert not talk.session.online
     assert ASK_STATUS not in [text for _, text in talk.until(12.0)]
+
+
+def test_no_status_is_read_behind_the_disable_of_a_lost_drive() -> None:
+    talk = apart()
+    looks(talk, 10.6, '0001')
+    talk.asks(ControlAction.ENABLE, 10.601)
+    looks(talk, 10.8, '0003')
+    sent = [text for _, text in talk.until(11.0)]
+    assert not talk.session.online
+    assert DISABLE in sent
+    assert ASK_STATUS not in [text for _, text in talk.until(14.0)]
+
+
+def test_no_status_is_looked_at_behind_a_word_that_leaves_when_the_end_has_begun() -> None:
+    talk = apart()
+    looks(talk, 10.6, '0001')
+    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.601)
+    assert ENABLE in map(str, talk.session.take_frames())
+    talk.session.deactivate(10.602)
+    talk.session.frames_left(10.603)
+    sent = talk.sent() + [
+        text for _, text in talk.served(11.0, lambda text: {
+            NEUTRAL: ANSWER, ASK_WORD: '10200341#0000000000000000',
+            ASK_STATUS: '10200D31#0001000000000000'}.get(text))]
+    assert DISABLE in sent
+    assert sent.count(ASK_STATUS) == 1, 'the last look'
+    assert talk.session.stopped
 
 
 def test_status_that_arrives_after_the_loss_is_not_believed() -> None:
