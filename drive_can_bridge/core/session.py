@@ -34,7 +34,7 @@ from typing import Any, Protocol
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_gate import CommandGate
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlRequest
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
@@ -45,6 +45,7 @@ from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
@@ -363,6 +364,18 @@ class Session(ABC):
         for part in self._parts:
             part.stop()
 
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        """
+        Handle an exchange that was not answered, unless the drive is being stopped.
+
+        :param reason: why the drive counts as lost; '' if it does not yet.
+        """
+        if reason:
+            self.lose(reason, now)
+
+    def exchange_ended(self) -> None:  # noqa: B027  optional
+        """Forget what belongs to an exchange that has ended, answered or not."""
+
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
         """Record that the drive is lost."""
 
@@ -375,6 +388,27 @@ class Session(ABC):
 
     def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
         """Have all setpoints sent at once, neutral as they are: a drive without a control word."""
+
+    def request_control(self, request: ControlRequest, now: float) -> None:
+        """Take what is asked of the drive by its control word."""
+        if self.control is not None:
+            self.control.request(request, now)
+            self.control_changed(now)
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        """
+        Say why a control action cannot be asked for; '' if it can.
+
+        :param refusal: what is usually said.
+        """
+        return refusal
+
+    def request_refusal(self, now: float) -> Sentence:
+        """Say what of the drive itself forbids requests for parameters; '' if nothing."""
+        return NOTHING
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:  # noqa: B027
+        """Record a request for parameters that was served, and answered."""
 
     def home(self, request: ControlRequest, now: float) -> None:
         """Have the axis look for its reference; answered by exactly one ``ControlCompleted``."""

@@ -2,8 +2,8 @@
 """
 What users want of one drive: commands, requests, control; and why they cannot have it.
 
-A command is judged at once. A request is answered by an event: refused at once, or when it has
-been served (:class:`RequestDesk`), or when the control machine says so.
+A command is judged at once. A request is answered by exactly one event: refused at once, or when
+it has been served, or when the control machine says so.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,6 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 
-
 #: requests of one drive that may wait behind the one being served
 WAITING_REQUESTS_MAX = 64
 
@@ -41,68 +40,6 @@ class RequestServer(Protocol):
 
     def cancel(self) -> None:
         """Forget all of them; nobody is told."""
-
-
-class RequestDesk:
-    """
-    Takes requests, has them served, and sees that each is answered exactly once.
-
-    :param emit: takes the answers.
-    :param refusal: (now) -> why none are taken; '' if they are.
-    :param answered: called after an answer, unless the request failed with all others.
-    """
-
-    def __init__(self, server: RequestServer, statistics: DriveStatistics,
-                 emit: Callable[[RequestCompleted], None], *, refusal: Callable[[float], Sentence],
-                 answered: Callable[[Request, Outcomes], None]) -> None:
-        self._server = server
-        self._statistics = statistics
-        self._emit = emit
-        self._refusal = refusal
-        self._answered = answered
-        self._open: list[Request] = []
-
-    @property
-    def waiting(self) -> int:
-        """How many requests wait behind the one being served."""
-        return self._server.waiting
-
-    def submit(self, request: Request, now: float) -> None:
-        """Take a request; it is answered by exactly one ``RequestCompleted``."""
-        refusal = self._refusal(now)
-        if not refusal and self.waiting >= WAITING_REQUESTS_MAX:
-            refusal = sentences.busy()
-        if refusal:
-            self._refuse(request, refusal)
-        elif not len(request):
-            self._complete(request, ())
-        else:
-            self._open.append(request)
-            self._server.serve(request, lambda outcomes: self._done(request, outcomes), now)
-
-    def fail_all(self, reason: Sentence) -> None:
-        """Forget what is under way, and answer it."""
-        self._server.cancel()
-        requests, self._open = self._open, []
-        for request in requests:
-            self._refuse(request, reason)
-
-    def _done(self, request: Request, outcomes: Outcomes) -> None:
-        self._open.remove(request)
-        self._complete(request, outcomes)
-        self._answered(request, outcomes)
-
-    def _refuse(self, request: Request, reason: Sentence) -> None:
-        """Answer a request with the same failure for every name."""
-        self._complete(request, (Failure(reason),) * len(request))
-
-    def _complete(self, request: Request, outcomes: Outcomes) -> None:
-        for outcome in outcomes:
-            if isinstance(outcome, Failure):
-                self._statistics.requests_failed += 1
-            else:
-                self._statistics.requests_ok += 1
-        self._emit(RequestCompleted(request, outcomes))
 
 
 class Conversation(Protocol):
@@ -129,8 +66,17 @@ class Conversation(Protocol):
     def home(self, request: ControlRequest, now: float) -> None:
         """Have the axis look for its reference."""
 
-    def control_changed(self, now: float) -> None:
-        """React to a control word that may have changed."""
+    def request_control(self, request: ControlRequest, now: float) -> None:
+        """Take what is asked of the drive by its control word."""
+
+    def request_refusal(self, now: float) -> Sentence:
+        """Say what of the drive itself forbids requests for parameters."""
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        """Record a request that was served, and answered."""
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        """Say why a control action cannot be asked for, where something else is usually said."""
 
 
 class Users:
@@ -138,26 +84,12 @@ class Users:
     The users' side of one session.
 
     :param server: serves requests for parameters.
-    :param blocked: (now) -> what of the drive itself forbids these; '' if nothing.
-    :param control_refusal: (action, refusal) -> what is said instead of the usual refusal of a
-        control action, '' meaning that it is not refused.
-    :param answered: called after the answer of a request that was served.
-    :param control: takes what is asked of the drive by its control word; None: its own machine.
     """
 
-    def __init__(self, session: Conversation, server: RequestServer, *,
-                 blocked: Callable[[float], Sentence] = lambda now: NOTHING,
-                 control_refusal: Callable[[ControlAction, Sentence], Sentence] = (
-                     lambda action, refusal: refusal),
-                 answered: Callable[[Request, Outcomes], None] = lambda request, outcomes: None,
-                 control: Callable[[ControlRequest, float], None] | None = None) -> None:
+    def __init__(self, session: Conversation, server: RequestServer) -> None:
         self._session = session
-        self._control = control
-        self._blocked = blocked
-        self._judge = control_refusal
-        self._desk = RequestDesk(
-            server, session.statistics, self._completed, refusal=self._refusal,
-            answered=answered)
+        self._server = server
+        self._open: list[Request] = []      # being served
 
     # -- commands ---------------------------------------------------------------------------------
 
@@ -187,7 +119,7 @@ class Users:
         It is answered by exactly one ``RequestCompleted``, or ``ControlCompleted``.
         """
         if not isinstance(request, ControlRequest):
-            self._desk.submit(request, now)
+            self._request(request, now)
             return
         session = self._session
         refusal = self.control_refusal(request.action)
@@ -200,34 +132,54 @@ class Users:
         if session.control is None:
             session.neutral_stop.request(request, now)
             return
-        if self._control is not None:
-            self._control(request, now)
-            return
-        session.control.request(request, now)
-        session.control_changed(now)
+        session.request_control(request, now)
 
     @property
     def waiting(self) -> int:
         """How many requests for parameters wait behind the one being served."""
-        return self._desk.waiting
+        return self._server.waiting
 
     def fail_all(self, reason: Sentence) -> None:
         """Forget the requests for parameters that are under way, and answer them."""
-        self._desk.fail_all(reason)
+        self._server.cancel()
+        requests = self._open.copy()
+        self._open.clear()
+        for request in requests:
+            self._refuse(request, reason)
 
-    def _completed(self, event: RequestCompleted) -> None:
-        session = self._session
+    def _request(self, request: Request, now: float) -> None:
+        refusal = self._session.request_refusal(now) or self._absence
+        if not refusal and self.waiting >= WAITING_REQUESTS_MAX:
+            refusal = sentences.busy()
+        if refusal:
+            self._refuse(request, refusal)
+        elif not len(request):
+            self._complete(request, ())
+        else:
+            self._open.append(request)
+            self._server.serve(request, lambda outcomes: self._served(request, outcomes), now)
+
+    def _served(self, request: Request, outcomes: Outcomes) -> None:
+        self._open.remove(request)
+        self._complete(request, outcomes)
+        self._session.request_answered(request, outcomes)
+
+    def _refuse(self, request: Request, reason: Sentence) -> None:
+        """Answer a request with the same failure for every name."""
+        self._complete(request, (Failure(reason),) * len(request))
+
+    def _complete(self, request: Request, outcomes: Outcomes) -> None:
+        session, event = self._session, RequestCompleted(request, outcomes)
+        failed = sum(isinstance(outcome, Failure) for outcome in outcomes)
+        session.statistics.requests_failed += failed
+        session.statistics.requests_ok += len(outcomes) - failed
         if session.fault_watch is not None and session.fault_watch.take(event):
             return
-        if session.serving and event.outcomes:
-            session.online = any(map(is_answer, event.outcomes))
+        if session.serving and outcomes:
+            session.online = any(map(is_answer, outcomes))
         session.report.note(event)
 
     # -- refusals ---------------------------------------------------------------------------------
-
-    def _refusal(self, now: float) -> Sentence:
-        """Say why requests for parameters are not taken now; '' if they are."""
-        return self._blocked(now) or self._absence
 
     @property
     def _absence(self) -> Sentence:
@@ -249,7 +201,7 @@ class Users:
         else:
             refusal = (
                 session.setpoints.untold_text if action is ControlAction.ENABLE else NOTHING)
-        return self._judge(action, refusal)
+        return session.control_refusal(action, refusal)
 
     def write_refusal(self, parameter: Parameter) -> Sentence:
         """Say why users may not write this parameter now; '' if they may."""

@@ -6,7 +6,6 @@ An answer that does not come in time is missed, and after ``missed_limit`` of th
 drive is lost. What it answers to cycles of before shows nothing (:mod:`.exchange_book`).
 """
 
-from collections.abc import Callable
 import math
 
 from drive_can_bridge.core import sentences
@@ -23,43 +22,38 @@ class Answers:
 
     :param silence: what is said of a drive that does not answer.
     :param advice: what to look at then.
-    :param missed: (why the drive counts as lost, '' if it does not yet; now): what becomes of a
-        cycle that was not answered, unless the drive is being stopped; None: it is lost.
-    :param settled: called when an exchange ends, answered or not.
     :param in_turn: not each cycle asks this drive: the one that asks it settles the one before.
     :param timer: says when cycles are due, where others are in step; None: one of its own.
     :ivar session: of the drive.
     :ivar book: counts the cycles, and the answers.
+    :ivar due: when the answer counts as missed; infinity: with the next cycle, or there is none.
     :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
     """
 
     def __init__(self, session: Session, *, silence: str, advice: str = '',
-                 missed: Callable[[Sentence, float], None] | None = None,
-                 settled: Callable[[], None] | None = None, in_turn: bool = False,
-                 timer: CycleTimer | None = None) -> None:
+                 in_turn: bool = False, timer: CycleTimer | None = None) -> None:
         self.session = session
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
         self.heeded = True
-        self._silence, self._advice = silence, advice
-        self._missed = missed or self._lose
-        self._settled = settled
-        self._in_turn = in_turn
-        self._answer_due = math.inf
+        self._silent = sentences.silent(silence, advice)
+        self.in_turn = in_turn
+        self.due = math.inf
+        self._silence = silence
 
     def next_timer(self) -> float:
         """Return when an answer counts as missed; infinity: with the next cycle."""
-        return self._answer_due
+        return self.due
 
     def handle_timer(self, now: float) -> None:
         """Settle what is due."""
-        if now >= self._answer_due:
+        if now >= self.due:
             self.settle(now)
 
     def stop(self) -> None:
         """Expect no answer; one on its way is no surprise, though."""
         self.forget()
         self.book.expect_nothing()
-        self._answer_due = math.inf
+        self.due = math.inf
 
     def expect(self, now: float, until: float, *, runs: bool) -> None:
         """
@@ -69,7 +63,7 @@ class Answers:
         :param runs: it holds anything but neutral and ``disable``.
         """
         self.book.asked(now, runs=runs)
-        self._answer_due = until
+        self.due = until
 
     def expects(self, what: str, now: float, received_at: float) -> bool:
         """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
@@ -101,7 +95,7 @@ class Answers:
         """
         book = self.book
         return book.awaiting or book.outstanding and (
-            self._in_turn or self.session.stage is Stage.STOPPING)
+            self.in_turn or self.session.stage is Stage.STOPPING)
 
     def _heed(self) -> None:
         """Record that the drive has shown to have heard what it was told last, if it has."""
@@ -112,22 +106,27 @@ class Answers:
 
     def settle(self, now: float) -> None:
         """End an exchange: what has not arrived by now does not count for it any more."""
-        self._answer_due = math.inf
-        if self._settled is not None:
-            self._settled()
+        self.due = math.inf
         book, session = self.book, self.session
+        session.exchange_ended()
         if book.awaiting:
             too_many = book.missed()
             if session.stage is not Stage.STOPPING:
                 limit = session.configuration.missed_limit
-                self._missed(sentences.silent_for_cycles(self._silence, limit) if too_many else
-                             NOTHING, now)
+                session.exchange_missed(
+                    sentences.silent_for_cycles(self._silence, limit) if too_many else NOTHING,
+                    now)
 
     def forget(self) -> None:
         """Count anew what is missed."""
         self.book.missed_in_row = 0
 
-    def _lose(self, reason: Sentence, now: float) -> None:
+    def lose(self, reason: Sentence, now: float) -> None:
+        """
+        Lose a drive that has not answered often enough, and go on with cycles.
+
+        :param reason: '' if it does not count as lost yet.
+        """
         if reason:
             self.forget()
             session = self.session
@@ -135,4 +134,4 @@ class Answers:
                 session.lose(reason, now)
             elif session.duty.happened(Happened.UNANSWERED) is Do.STOP_BY_NUMBER:
                 session.report.warn(sentences.stop_not_answered(), may_run=True)
-            session.report.advice = sentences.silent(self._silence, self._advice)
+            session.report.advice = self._silent

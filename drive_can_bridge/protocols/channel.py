@@ -112,16 +112,16 @@ class Lane(Enum):
 class _Queue(Generic[StepT, ReplyT]):
     """The procedures of one lane, and the step that the first of them wants done."""
 
-    __slots__ = ('_attempts', '_running', 'attempts_left', 'lane', 'repeated', 'step', 'waiting')
+    __slots__ = ('_courier', '_running', 'attempts_left', 'lane', 'repeated', 'step', 'waiting')
 
-    def __init__(self, lane: Lane, attempts: Callable[[StepT], int]) -> None:
+    def __init__(self, lane: Lane, courier: Courier[StepT, ReplyT]) -> None:
         self.lane = lane
         self.waiting: deque[tuple[Generator[StepT, ReplyT, Any], Done]] = deque()
         self.step: StepT | None = None
         self.attempts_left = 0
         self.repeated = False  # nobody answered the attempt before
         self._running: tuple[Generator[StepT, ReplyT, Any], Done] | None = None
-        self._attempts = attempts
+        self._courier = courier
 
     def fetch(self) -> StepT | None:
         """Return the step to be done next, beginning procedures as needed."""
@@ -143,7 +143,7 @@ class _Queue(Generic[StepT, ReplyT]):
             done(stop.value)
         else:
             self.step = step
-            self.attempts_left = self._attempts(step)
+            self.attempts_left = self._courier.attempts(step)
 
     @property
     def idle(self) -> bool:
@@ -172,7 +172,7 @@ class Channel(Generic[StepT, ReplyT]):
         self._courier = courier
         courier.wake = self.wake
         self._queues: dict[Lane, _Queue[StepT, ReplyT]] = {
-            lane: _Queue(lane, courier.attempts) for lane in Lane}
+            lane: _Queue(lane, courier) for lane in Lane}
         stop, control, setpoints, own, users = self._queues.values()
         self._stop = stop
         self._orders = (control, setpoints, own, users), (control, setpoints, users, own)

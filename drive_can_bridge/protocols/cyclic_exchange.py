@@ -13,15 +13,14 @@ here stands what every such session has to see to, and what is not answered in :
   them, until one is answered.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from enum import Enum
 from functools import partial
 import math
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CYCLE, Happened
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cycle_timer import CycleTimer
@@ -38,49 +37,90 @@ EXPIRY_SPACING = 0.05
 TelegramT = TypeVar('TelegramT')
 
 
-class CyclicExchange(Answers, Generic[TelegramT]):
-    """
-    The cycles that tell one drive, or several at once, and the answers of the first of them.
+class Teller(Protocol[TelegramT]):
+    """What a family says about its cycles: its session, or that of several."""
 
-    :param encode: makes a telegram of the raw integers of all setpoints, with the control word
-        among them if it has its slot.
-    :param send: (telegram, now): hands out its frames (:meth:`put`), and says from whom an answer
-        is expected (:meth:`expect_answer`).
+    def encode_cycle(self, raws: list[int]) -> TelegramT:
+        """
+        Make a telegram.
+
+        :param raws: of all setpoints, with the control word among them if it has its slot.
+        """
+
+    def send_cycle(self, telegram: TelegramT, now: float) -> None:
+        """Hand out its frames, and say from whom an answer is expected."""
+
+    def last_cycle_left(self, now: float) -> None:
+        """Handle the last cycle before silence; that of a stop was answered or waited for."""
+
+
+class Cycle(NamedTuple, Generic[TelegramT]):
+    """
+    What cycles hold until something changes.
+
+    :ivar word: the control word, if there is one.
+    :ivar runs: it is anything but neutral and ``disable``.
+    """
+
+    telegram: TelegramT
+    word: int | None
+    runs: bool
+
+
+class Ending(Enum):
+    """How far a stop has come."""
+
+    LAST = 'its last cycles'
+    WAITING = 'they have left, and an answer is waited for'
+    MORE = 'more than a drive gets that answers'
+    WAITING_LONGER = 'those have left as well'
+
+
+class CyclicExchange(Generic[TelegramT]):
+    """
+    The cycles that tell one drive, or several at once.
+
+    :param answers: of that drive, or of the one whose session has the setpoints.
     :param slot: of the control word; None: it is not sent cyclically.
-    :param ended: (now): called when the last cycle before silence has left, and that of a stop was
-        answered or waited for; None: that ends the stop.
-    :param silence: this and what follows are those of :class:`.Answers`.
     :ivar audience: whom a whole cycle tells: the answers of this drive, and of others.
     :ivar timer: when the next cycle is due.
-    :ivar word: the control word of the last cycle.
     :ivar cycles_left: still to be sent before silence; -1: no end is planned.
     :ivar again: this cycle follows one of which the bus has not taken everything.
-    :ivar insisting: the last cycles are more than a drive gets that answers.
-    :ivar runs: the last cycle holds anything but neutral and ``disable``.
     """
 
-    def __init__(self, session: Session, encode: Callable[[list[int]], TelegramT],
-                 send: Callable[[TelegramT, float], None], *, slot: int | None, silence: str,
-                 advice: str = '', missed: Callable[[Sentence, float], None] | None = None,
-                 ended: Callable[[float], None] | None = None,
-                 settled: Callable[[], None] | None = None, in_turn: bool = False,
-                 timer: CycleTimer | None = None) -> None:
-        super().__init__(session, silence=silence, advice=advice, missed=missed, settled=settled,
-                         in_turn=in_turn, timer=timer)
-        self.audience: list[Answers] = [self]
-        self.timer: CycleTimer = self.book.timer
-        self.word: int | None = None
+    def __init__(self, answers: Answers, teller: Teller[TelegramT], *,
+                 slot: int | None) -> None:
+        self.audience = [answers]
+        self.timer: CycleTimer = answers.book.timer
         self.cycles_left = -1
-        self.again = self.insisting = self.runs = False
-        self._encode, self._send = encode, send
+        self.again = False
+        self._answers, self._session, self._teller = answers, answers.session, teller
         self._slot = slot
-        self._ended = ended or self._end_stop
-        self._telegram: TelegramT | None = None
+        self._cycle: Cycle[TelegramT] | None = None
         self._raws: list[int] | None = None     # in it, until it has left
         self._frames_out = 0                    # of which nobody has said what became of them
         self._whole = True                      # the bus has taken all others of this cycle
-        self._stopping = False                  # the last cycles are those of a stop
-        self._waiting = False                   # they have left, and an answer is waited for
+        self._ending: Ending | None = None      # cycles go on, or run out for no stop
+
+    @property
+    def word(self) -> int | None:
+        """The control word of the last cycle."""
+        return None if self._cycle is None else self._cycle.word
+
+    @property
+    def runs(self) -> bool:
+        """The last cycle holds anything but neutral and ``disable``."""
+        return self._cycle is not None and self._cycle.runs
+
+    @property
+    def insisting(self) -> bool:
+        """The last cycles are more than a drive gets that answers."""
+        return self._ending in (Ending.MORE, Ending.WAITING_LONGER)
+
+    @property
+    def _waiting(self) -> bool:
+        """The last cycles have left, and an answer is waited for."""
+        return self._ending in (Ending.WAITING, Ending.WAITING_LONGER)
 
     @property
     def cycling(self) -> bool:
@@ -96,37 +136,36 @@ class CyclicExchange(Answers, Generic[TelegramT]):
 
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` has something to do."""
-        due, expires_at = self.timer.due, self.session.setpoints.expires_at
+        due, expires_at = self.timer.due, self._session.setpoints.expires_at
         if expires_at < due:
             due = expires_at
-        return due if due < self._answer_due else self._answer_due
+        answer_due = self._answers.due
+        return due if due < answer_due else answer_due
 
     def handle_timer(self, now: float) -> None:
         """Do what is due once a period. The fast path of the timer."""
-        if now < self.timer.due:
-            if now >= self._answer_due:
-                self.settle(now)
-            if self.session.gate.expire(now) and self.session.setpoints.changed:
+        session, answers, timer = self._session, self._answers, self.timer
+        if now < timer.due:
+            answers.handle_timer(now)
+            if session.gate.expire(now) and session.setpoints.changed:
                 # a drive has that long for its answer
-                self.timer.no_later(max(now, self.timer.began_at + EXPIRY_SPACING))
+                timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
             return
-        if self._waiting and not self._insist(now):
+        if self._ending and self._waiting and not self._insist(now):
             return
-        if not self._in_turn or now >= self._answer_due:
-            self.settle(now)
-        if self.timer.due == math.inf:  # what was missed has ended the cycles
+        if not answers.in_turn or now >= answers.due:
+            answers.settle(now)
+        if timer.due == math.inf:   # what was missed has ended the cycles
             return
-        session = self.session
         session.gate.expire(now)
-        control = session.control
-        telegram = self._telegram
-        if (session.setpoints.changed or telegram is None
-                or control is not None and control.word != self.word):
-            telegram = self._telegram = self._make()
-        self.book.begin(now, self.timer.stop_spacing if self.cycles_left >= 0 else None)
+        control, cycle = session.control, self._cycle
+        if (session.setpoints.changed or cycle is None
+                or control is not None and control.word != cycle.word):
+            cycle = self._cycle = self._make()
+        answers.book.begin(now, timer.stop_spacing if self.cycles_left >= 0 else None)
         self._frames_out = 0
         self.again, self._whole = not self._whole, True
-        self._send(telegram, now)
+        self._teller.send_cycle(cycle.telegram, now)
 
     def start(self, now: float, *, in_turn: bool = False) -> None:
         """
@@ -135,8 +174,8 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         :param in_turn: it waits for the turn of this drive, if it has one.
         """
         self._plan(-1)
-        self.forget()
-        period, phase = self.session.configuration.period, self.session.phase
+        self._answers.forget()
+        period, phase = self._session.configuration.period, self._session.phase
         first = max(now, self.timer.began_at + period)
         if in_turn and phase is not None:
             first += (phase - first) % period
@@ -146,7 +185,7 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         """Send nothing more, and expect no answer; one on its way is no surprise, though."""
         self._plan(-1)
         self.timer.stop()
-        super().stop()
+        self._answers.stop()
 
     def hurry(self, now: float, *, setpoints: bool) -> None:
         """
@@ -154,15 +193,15 @@ class CyclicExchange(Answers, Generic[TelegramT]):
 
         :param setpoints: it does so, too, where only they have changed.
         """
-        control = self.session.control
-        if control is not None and control.stopping and not self._stopping and (
+        control = self._session.control
+        if control is not None and control.stopping and not self._ending and (
                 self._slot is not None and control.word != self.word
-                or setpoints and self.session.setpoints.changed):
+                or setpoints and self._session.setpoints.changed):
             self.timer.hurry(now)
 
     def hand_out_neutral(self, now: float) -> None:
         """Bring the next cycle forward: only its answer shows that the drive was told to stop."""
-        self.book.doubt()
+        self._answers.book.doubt()
         self.timer.hurry(now)
 
     # -- sending ----------------------------------------------------------------------------------
@@ -174,7 +213,7 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         :param to: whose drives it may start, where that is not only this one.
         """
         self._frames_out += 1
-        self.session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
+        self._session.outbox.put(frame, partial(self._left, to) if to else self._alone_left)
 
     def expect_answer(self, now: float, until: float = math.inf) -> None:
         """
@@ -182,7 +221,7 @@ class CyclicExchange(Answers, Generic[TelegramT]):
 
         :param until: when the answer counts as missed; infinity: with the next cycle.
         """
-        self.expect(now, until, runs=self.runs)
+        self._answers.expect(now, until, runs=self.runs)
 
     def await_frame(self) -> Left:
         """Count a frame to the cycle that somebody else hands out, and tells what became of."""
@@ -190,21 +229,20 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         return self._alone_left
 
     def _alone_left(self, sent: bool, now: float) -> None:
-        self._left((self,), sent, now)
+        self._left((self._answers,), sent, now)
 
-    def _make(self) -> TelegramT:
-        session = self.session
+    def _make(self) -> Cycle[TelegramT]:
+        session, word = self._session, None
         raws = [setpoint.raw for setpoint in session.setpoints.items]
-        self.runs = not session.setpoints.at_rest
-        control = session.control
+        runs, control = not session.setpoints.at_rest, session.control
         if control is not None:
-            self.word = control.word
+            word = control.word
             if self._slot is not None:
-                raws.insert(self._slot, self.word)
-                self.runs = self.runs or not control.at_rest
+                raws.insert(self._slot, word)
+                runs = runs or not control.at_rest
         session.setpoints.changed = False
         self._raws = raws
-        return self._encode(raws)
+        return Cycle(self._teller.encode_cycle(raws), word, runs)
 
     def _left(self, to: Iterable[Answers], sent: bool, now: float) -> None:
         """
@@ -213,17 +251,18 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         One that may start somebody counts even alone; otherwise a cycle counts only when the bus
         has taken every frame of it.
         """
-        session = self.session
+        session, cycle = self._session, self._cycle
+        runs = cycle is not None and cycle.runs
         self._frames_out -= 1
         if not sent:
             self._whole = False
-        elif self.runs:
+        elif runs:
             for each in to:
                 each.book.doubt()   # also of those who are not asked by it
                 each.session.duty.channel(CYCLE, Happened.RUN_LEFT)
         if self._frames_out or not self._whole:
             return
-        if not self.runs:
+        if not runs:
             for each in self.audience:
                 each.session.duty.channel(CYCLE, Happened.STOP_LEFT)
             session.neutral_stop.all_left()
@@ -258,8 +297,8 @@ class CyclicExchange(Answers, Generic[TelegramT]):
             self.timer.no_later(soon)
         else:   # those of a stop before this one have left, what goes by writes is under way
             self.run_out(soon)
-        self._stopping = True
-        self.book.doubt()       # one of these is to be answered
+        self._ending = Ending.LAST
+        self._answers.book.doubt()      # one of these is to be answered
         self.timer.hurry(now)
 
     def run_out(self, first: float) -> None:
@@ -268,40 +307,38 @@ class CyclicExchange(Answers, Generic[TelegramT]):
         self.timer.start(first)
 
     def _plan(self, cycles_left: int) -> None:
-        self.cycles_left = cycles_left
-        self._stopping = self._waiting = self.insisting = False
+        self.cycles_left, self._ending = cycles_left, None
 
     def _last_left(self, now: float) -> None:
         """Come to an end, at once or when somebody has answered."""
-        self._waiting = self._stopping and self._unheard
-        if self._waiting:
+        if self._ending and self._unheard:
+            self._ending = Ending.WAITING_LONGER if self.insisting else Ending.WAITING
             self.timer.start(now + LAST_ANSWER)
         else:
-            self._ended(now)
+            self._teller.last_cycle_left(now)
 
     def _insist(self, now: float) -> bool:
         """Begin with more cycles for who has not shown to have heard one; False: that is all."""
         if self.insisting or not self._unheard:
             self._end(now)
             return False
-        self._waiting, self.insisting = False, True
-        self.cycles_left = MORE_CYCLES
-        if self.session.configuration.period <= LAST_ANSWER:   # late answers have come by now
+        self._ending, self.cycles_left = Ending.MORE, MORE_CYCLES
+        if self._session.configuration.period <= LAST_ANSWER:   # late answers have come by now
             for each in self.audience:
                 each.book.forget_asked()
         return True
 
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""
-        if (self._waiting or self.insisting) and not self._unheard:
+        if self._ending and self._ending is not Ending.LAST and not self._unheard:
             self._end(now)
 
     def _end(self, now: float) -> None:
-        self._waiting = self.insisting = False
-        self.cycles_left = 0
-        self._ended(now)
+        self._ending, self.cycles_left = Ending.LAST, 0
+        self._teller.last_cycle_left(now)
 
-    def _end_stop(self, now: float) -> None:
+    def end_stop(self) -> None:
+        """End the stop of all: nothing more is sent."""
         self.doubt_the_end()
         for each in self.audience:
             if not each.session.stopped:

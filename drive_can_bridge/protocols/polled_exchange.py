@@ -7,10 +7,9 @@ offline; one with a read that nobody answered is missed. One with a read that th
 neither: there is no complete sample.
 """
 
-from abc import abstractmethod
 from collections.abc import Generator, Sequence
 import math
-from typing import Any
+from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
@@ -23,37 +22,25 @@ from drive_can_bridge.protocols.exchange_book import ExchangeBook
 Raws = Sequence[int | None]
 
 
-class PolledSession(Session):
-    """A session whose exchange is rounds of reads."""
+class Polled(Protocol):
+    """What a family says about its rounds; the session itself."""
 
-    @abstractmethod
+    @property
+    def present(self) -> bool:
+        """A drive is there, should it answer."""
+
     def read_round(self) -> Generator[Any, Any, Raws | None]:
         """Read everything; return None when a read was not answered."""
 
-    @abstractmethod
     def round_found(self, now: float) -> None:
         """Handle a drive that was offline and has answered a round."""
 
-    @abstractmethod
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
         """
         Take a round before it becomes a sample.
 
         :param found: the drive was found by it.
         """
-
-    @abstractmethod
-    def round_missed(self, reason: Sentence, now: float) -> None:
-        """
-        Handle a round that was not answered.
-
-        :param reason: why the drive counts as lost, '' if it does not yet.
-        """
-
-    @property
-    def present(self) -> bool:
-        """A drive is there, should it answer."""
-        return True
 
 
 class PolledExchange:
@@ -65,8 +52,8 @@ class PolledExchange:
     :ivar received_at: when the last answer was received.
     """
 
-    def __init__(self, session: PolledSession, channel: Channel[Any, Any]) -> None:
-        self._session = session
+    def __init__(self, session: Session, rounds: Polled, channel: Channel[Any, Any]) -> None:
+        self._session, self._rounds = session, rounds
         self._channel = channel
         self._book = ExchangeBook(session.configuration, session.statistics)
         self._void = False  # this round began before the process stood still
@@ -83,7 +70,7 @@ class PolledExchange:
         """Begin a round; none is under way."""
         self._book.begin(now)
         self.reading, self._void = True, False
-        self._channel.run(self._session.read_round(), self._ended, now)
+        self._channel.run(self._rounds.read_round(), self._ended, now)
 
     def wait(self, now: float, patience: float) -> None:
         """Let a period pass: the round under way has not ended, and has so many s for it."""
@@ -120,11 +107,11 @@ class PolledExchange:
         self.forget()
         fresh = not session.online
         if fresh:
-            if not session.present:
+            if not self._rounds.present:
                 return
             session.gate.measured(raws)     # before anything is written
-            session.round_found(now)
-        session.round_answered(raws, now, found=fresh)
+            self._rounds.round_found(now)
+        self._rounds.round_answered(raws, now, found=fresh)
         session.gate.measured(raws)
         sample = tuple(raw for raw in raws if raw is not None)
         if len(sample) == len(raws):
@@ -133,4 +120,4 @@ class PolledExchange:
 
     def _miss(self, now: float) -> None:
         session, limit = self._session, self._session.configuration.missed_limit
-        session.round_missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)
+        session.exchange_missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)

@@ -141,8 +141,8 @@ class SimulatedServoDrive(SimulatedDrive):
         request += configuration.cyclic_request
         response += configuration.cyclic_response
         receive, transmit = ({pdo.number: list(pdo.entries) for pdo in pdos} for pdos in (
-            pdo_codec.request_pdos(configuration.station, options.request_pdos, request),
-            pdo_codec.response_pdos(configuration.station, options.response_pdos, response)))
+            pdo_codec.receive_pdos(configuration.station, options.request_pdos, request),
+            pdo_codec.transmit_pdos(configuration.station, options.response_pdos, response)))
         return Factory(receive, transmit, 1 if options.transmission == 'sync' else 255)
 
     def find_routes(self) -> list[Route]:

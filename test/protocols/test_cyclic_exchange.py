@@ -11,8 +11,10 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.users import RequestServer, Users
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 
 REQUEST = 0x10
@@ -49,9 +51,8 @@ class Plain(Session):
         super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
         server: RequestServer = Silent()
         self.users = Users(self, server)
-        self.exchange = CyclicExchange(
-            self, self._encode, self._send_cycle, slot=0, silence='no answer',
-            advice='look at the plug')
+        self.answers = Answers(self, silence='no answer', advice='look at the plug')
+        self.exchange = CyclicExchange(self.answers, self, slot=0)
         self.look_after(self.exchange, channel=Silent())
 
     def begin(self, now: float) -> None:
@@ -69,17 +70,23 @@ class Plain(Session):
     def see_to_control_word(self, now: float) -> None:
         self.exchange.hurry(now, setpoints=self.owed)
 
-    def _encode(self, raws: list[int]) -> bytes:
+    def encode_cycle(self, raws: list[int]) -> bytes:
         return bytes(raws)
 
-    def _send_cycle(self, telegram: bytes, now: float) -> None:
+    def send_cycle(self, telegram: bytes, now: float) -> None:
         self.exchange.put(Frame(REQUEST, telegram, False))
         self.exchange.expect_answer(now)
 
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        self.answers.lose(reason, now)
+
+    def last_cycle_left(self, now: float) -> None:
+        self.exchange.end_stop()
+
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
-        if not self.exchange.expects('answer', now, now - age):
+        if not self.answers.expects('answer', now, now - age):
             return
-        self.exchange.answered(now - age)
+        self.answers.answered(now - age)
         if not self.online and self.stage is Stage.RUNNING:
             self.be_online()
         assert self.control is not None
@@ -177,15 +184,15 @@ def test_last_cycles_are_not_hurried() -> None:
 def test_nothing_is_left_of_an_exchange_that_was_stopped() -> None:
     talk = Talk()
     talk.at(10.0)
-    talk.exchange.settle(10.02)
-    talk.exchange.settle(10.02)
+    talk.session.answers.settle(10.02)
+    talk.session.answers.settle(10.02)
     talk.exchange.expect_answer(10.03)
     talk.exchange.stop_soon(10.03)
-    assert talk.exchange.book.missed_in_row == 1
+    assert talk.session.answers.book.missed_in_row == 1
     talk.exchange.stop()
     assert talk.exchange.next_timer() == math.inf
     assert talk.exchange.cycles_left == -1
-    assert talk.exchange.book.missed_in_row == 0
+    assert talk.session.answers.book.missed_in_row == 0
     talk.answer(10.04)
     assert talk.session.take_events() == [AnswerLate(pytest.approx(0.02))], 'it was on its way'
 

@@ -13,12 +13,13 @@ answered is left alone until a late response must have come: its value may be ol
 between, and look like the response to that write.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
-from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     DOUBLE_RESPONSES, ParameterFrame, ParameterLayout, Response, RESPONSES, Task, WRITES,
@@ -64,15 +65,16 @@ class TaskCourier(Courier[Ask, Reply]):
     Hands tasks to the inverter, and tells which response belongs to them.
 
     :param layout: where the fields of a frame are.
-    :param send: takes the payload of a task, and who is told whether it left.
+    :param outbox: takes the frames.
+    :param identifier: of tasks; ``extended``: it has 29 bits.
     :param retry: how long and how often the inverter is asked.
     """
 
-    def __init__(self, layout: ParameterLayout, send: Callable[[bytes, Left], None],
-                 retry: RetryPolicy) -> None:
+    def __init__(self, layout: ParameterLayout, outbox: Outbox, identifier: int, *,
+                 extended: bool, retry: RetryPolicy) -> None:
         super().__init__(retry)
-        self._layout = layout
-        self._send = send
+        self._layout, self._outbox = layout, outbox
+        self._identifier, self._extended = identifier, extended
 
     def begin(self, step: Ask, now: float) -> None:
         self.silent = SILENT
@@ -82,7 +84,8 @@ class TaskCourier(Courier[Ask, Reply]):
             # a read that the bus refused is repeated when its time is over
             if not sent and step.task in WRITES:
                 self.end(step, NOT_SENT, then)
-        self._send(self._layout.encode(step.task, step.number, step.index, step.value), left)
+        payload = self._layout.encode(step.task, step.number, step.index, step.value)
+        self._outbox.put(Frame(self._identifier, payload, self._extended), left)
 
     def receive(self, answer: bytes, now: float) -> Reply:
         response, task = self._layout.decode(answer), self.step

@@ -15,7 +15,7 @@ others refuse what only the leader can do; but who stops one of them stops all.
 All sessions of a group live on one bus, under one lock, so that they may be called from here.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -33,10 +33,9 @@ from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.process_data import (
     encode_extra, encode_main, main_length, MAIN_VALUES, values_needed,
 )
+from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, STOP_CYCLES
 
-_SILENCE = 'no answer to process data'
-_ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 _SERVICES = {ControlAction.ENABLE: 'enable', ControlAction.RESET_FAULT: 'reset_fault'}
 
@@ -48,13 +47,12 @@ class Member:
 
     :ivar identifier: of the process frames that it gets to itself.
     :ivar answers: what it answers to those.
-    :ivar expect: (now, when the answer counts as missed): it was sent them.
     """
 
     session: Session
     identifier: int
     answers: Answers
-    expect: Callable[[float, float], None]
+    samples: Samples
 
 
 class Group:
@@ -88,28 +86,17 @@ class Group:
         self._members: list[Member] = []
         self._sessions: list[Session] = []
 
-    def join(self, session: Session, identifier: int, expect: Callable[[float, float], None],
-             settled: Callable[[], None] | None) -> Answers:
-        """
-        Take an inverter in.
-
-        :param expect: as of :class:`Member`.
-        :param settled: as of :class:`.Answers`.
-        """
-        answers: Answers
+    def join(self, member: Member) -> None:
+        """Take an inverter in."""
+        session = member.session
         if not self._members:
-            answers = self.exchange = CyclicExchange(
-                session, self._encode, self._send, slot=0, silence=_SILENCE, advice=_ADVICE,
-                settled=settled, in_turn=not self.alone)
+            self.exchange = CyclicExchange(member.answers, self, slot=0)
         else:
-            answers = Answers(session, silence=_SILENCE, advice=_ADVICE, settled=settled,
-                              in_turn=True)
-            self.exchange.audience.append(answers)
+            self.exchange.audience.append(member.answers)
             session.sent = self._leader.sent
-        self._members.append(Member(session, identifier, answers, expect))
+        self._members.append(member)
         self._sessions.append(session)
         session.partners = self._sessions
-        return answers
 
     @property
     def alone(self) -> bool:
@@ -127,7 +114,7 @@ class Group:
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def _encode(self, raws: list[int]) -> list[bytes]:
+    def encode_cycle(self, raws: list[int]) -> list[bytes]:
         word, *values = raws
         words = [setpoint.parameter.word_from_raw(raw)
                  for setpoint, raw in zip(self._leader.setpoints.items, values)]
@@ -136,12 +123,12 @@ class Group:
             payloads.append(encode_extra(words[MAIN_VALUES:]))
         return payloads
 
-    def _send(self, payloads: list[bytes], now: float) -> None:
-        """Send a cycle: to all, and to one or some of them alone."""
+    def send_cycle(self, payloads: list[bytes], now: float) -> None:
+        """Send it to all, and to one or some of them alone."""
         exchange, members = self.exchange, self._members
         if self._broadcast is None:
             self._put(members[0].identifier, payloads)
-            members[0].expect(now, math.inf)
+            self._expect(members[0], now, math.inf)
             return
         stopping, count = self._leader.stage is Stage.STOPPING, len(members)
         if stopping and exchange.again:     # nobody of a stop is left out for that
@@ -157,11 +144,24 @@ class Group:
         for member in alone:
             self._put(member.identifier, payloads, member.answers)
             member.answers.settle(now)
-            member.expect(now, now + self._lead.period)
+            self._expect(member, now, now + self._lead.period)
+
+    def last_cycle_left(self, now: float) -> None:
+        self.exchange.end_stop()
 
     def _put(self, identifier: int, payloads: list[bytes], *to: Answers) -> None:
         for payload in payloads:
             self.exchange.put(Frame(identifier, payload, self._extended), *to)
+
+    def _expect(self, member: Member, now: float, until: float) -> None:
+        """Expect an answer: the inverter was sent its process frames."""
+        answers = member.answers
+        answers.expect(now, until, runs=self.exchange.runs)
+        if member.session.stage is Stage.IDLE:
+            answers.book.expect_nothing()
+            answers.book.stale = self.extra
+        else:
+            member.samples.awaiting = self.extra
 
     # -- what becomes of its members --------------------------------------------------------------
 

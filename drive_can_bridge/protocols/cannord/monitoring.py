@@ -12,7 +12,6 @@ The scale of P513 comes from the profile, as that of every parameter; a profile 
 it gets no warning.
 """
 
-from collections.abc import Callable
 import math
 
 from drive_can_bridge.core import sentences
@@ -20,6 +19,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import (
     Failure, Outcomes, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
@@ -61,17 +61,17 @@ class TimeoutWatch:
     Reads the telegram time-out of one inverter, where its profile lists it.
 
     :param access: how parameters are read.
-    :param emit: takes what people should know.
+    :param report: takes what people should know.
     :ivar warning: why it does not fit; '' if it does, or nobody knows.
     """
 
     def __init__(self, drive: DriveConfiguration, access: TaskAccess,
-                 emit: Callable[[Noted], None]) -> None:
+                 report: Reporter) -> None:
         self.warning = NOTHING
         self._parameter = timeout_parameter(drive.profile)
         self._period = drive.period
         self._access = access
-        self._emit = emit
+        self._report = report
         self._ask_at = -math.inf
 
     def look(self, now: float) -> None:
@@ -96,8 +96,8 @@ class TimeoutWatch:
             self.warning = timeout_warning(
                 self._parameter, float(self._parameter.value_from_raw(outcome.raw)), self._period)
             if self.warning:
-                self._emit(Noted(self.warning, warning=True))
+                self._report.note(Noted(self.warning, warning=True))
         elif isinstance(outcome, Failure):
             self._ask_at = self._access.channel.now + UNKNOWN_PAUSE
-            self._emit(Noted(sentences.timeout_unknown(
+            self._report.note(Noted(sentences.timeout_unknown(
                 self._parameter.address, outcome.reason)))

@@ -5,7 +5,7 @@ Reading and writing parameters of an inverter, in words that users understand.
 Every generator here is for :class:`.channel.TaskChannel`.
 """
 
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
@@ -20,6 +20,7 @@ from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     DOUBLE_RESPONSES, error_text, ParameterFrame, Response, Task, WRITE_TASKS,
 )
+from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.placement import OneByOne
 
 WRONG_INDEX = 3
@@ -48,15 +49,15 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
     """
     Parameters by number and sub-index, one a task.
 
-    :param last_value: (parameter name) -> raw integer last received in process data, or None.
+    :param samples: what was received in process data.
     :param persist: write to EEPROM where the profile does not say where.
     :param signed: where the profile lists words with a sign, which raw names do not have.
     """
 
     def __init__(self, channel: TaskChannel, retry: RetryPolicy, *,
-                 last_value: Callable[[str], int | None], persist: bool, signed: Cells) -> None:
+                 samples: Samples, persist: bool, signed: Cells) -> None:
         super().__init__(channel, retry, OneByOne())
-        self._last_value = last_value
+        self._samples = samples
         self._persist = persist
         self._signed = signed
 
@@ -81,7 +82,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             return None
         if write:
             return Failure(PROCESS_DATA_ONLY)
-        raw = self._last_value(parameter.name)
+        raw = self._samples.last(parameter.name)
         return ReadValue(raw) if raw is not None else Failure(
             sentences.process_data_not_received())
 

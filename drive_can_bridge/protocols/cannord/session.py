@@ -22,20 +22,22 @@ from functools import partial
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
 from drive_can_bridge.protocols.cannord.control import make_control
-from drive_can_bridge.protocols.cannord.group import Group
+from drive_can_bridge.protocols.cannord.group import Group, Member
 from drive_can_bridge.protocols.cannord.identifiers import (
     broadcasts, identifier, MessageObject,
 )
@@ -46,6 +48,10 @@ from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
 )
+
+
+_SILENCE = 'no answer to process data'
+_ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'
 
 
 def make_group(drives: Sequence[DriveConfiguration]) -> list['CannordSession']:
@@ -82,37 +88,33 @@ class CannordSession(Session):
             leader=group.control)
         self.enabled_by = group.leads
         self._extended: bool = options.extended_identifiers
-        request_identifier, self._response_identifier, self._task_identifier, \
+        request_identifier, self._response_identifier, task_identifier, \
             self._task_response_identifier = (
                 identifier(kind, drive.station, extended=self._extended)
                 for kind in MessageObject)
         self._swap: bool = options.swap_setpoints_2_3
         self._samples = Samples(self)
         self._courier = TaskCourier(
-            ParameterLayout(options.value_order, options.index_byte),
-            lambda payload, left: self.outbox.put(
-                Frame(self._task_identifier, payload, self._extended), left), self.retry)
+            ParameterLayout(options.value_order, options.index_byte), self.outbox,
+            task_identifier, extended=self._extended, retry=self.retry)
         self._channel = TaskChannel(self._courier)
         access = procedures.TaskAccess(
-            self._channel, self.retry, last_value=self._samples.last,
-            persist=options.persist_writes,
+            self._channel, self.retry, samples=self._samples, persist=options.persist_writes,
             signed=procedures.signed_cells(drive.profile.parameters.values()))
         # what only a master sends
-        self._masters = request_identifier, self._task_identifier
+        self._masters = request_identifier, task_identifier
         self._broadcasts = broadcasts(drive.station, extended=self._extended)
-        self._timeout = TimeoutWatch(drive, access, self.report.note)
-        self.users = Users(
-            self, access, control_refusal=self._control_refusal,
-            answered=self._timeout.request_answered,
-            control=partial(group.stop_for, self) if self._led else None)
-        self._answers = group.join(
-            self, request_identifier, self._expect, self._samples.settle if group.extra else None)
-        self.look_after(self._answers, channel=self._channel)
+        self._timeout = TimeoutWatch(drive, access, self.report)
+        self.users = Users(self, access)
+        self._answers = Answers(self, silence=_SILENCE, advice=_ADVICE, in_turn=not group.alone)
+        group.join(Member(self, request_identifier, self._answers, self._samples))
+        self._cycles = self._answers if self._led else group.exchange
+        self.look_after(self._cycles, channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
     def begin(self, now: float) -> None:
-        self._answers.stop()
+        self._cycles.stop()
         self._forget_samples()
         self._group.forget(self)
         owed = self.duty.happened(Happened.STARTED) is Do.STOP
@@ -152,14 +154,12 @@ class CannordSession(Session):
         if not self._led:
             self._group.exchange.hurry(now, setpoints=self.owed)
 
-    def _expect(self, now: float, until: float) -> None:
-        """Expect an answer: the inverter was sent its process frames."""
-        self._answers.expect(now, until, runs=self._group.exchange.runs)
-        if self.stage is Stage.IDLE:
-            self._answers.book.expect_nothing()
-            self._answers.book.stale = self._group.extra
-            return
-        self._samples.awaiting = self._group.extra
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        self._answers.lose(reason, now)
+
+    def exchange_ended(self) -> None:
+        if self._group.extra:
+            self._samples.settle()
 
     # -- process data, receiving ------------------------------------------------------------------
 
@@ -234,7 +234,16 @@ class CannordSession(Session):
 
     # -- as one of those that are told the same ---------------------------------------------------
 
-    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def request_control(self, request: ControlRequest, now: float) -> None:
+        if self._led:
+            self._group.stop_for(self, request, now)
+        else:
+            super().request_control(request, now)
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        self._timeout.request_answered(request, outcomes)
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         return self._group.control_refusal(self, action, refusal)
 
     def take_events(self) -> list[Event]:

@@ -31,6 +31,7 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, Noted
@@ -38,7 +39,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.session import Stage
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network
@@ -56,10 +57,10 @@ from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Lane
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polled_exchange import PolledExchange, PolledSession, Raws
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 
-class PkwSession(PolledSession):
+class PkwSession(Session):
     """NMT supervision, the polled exchange, and the requests of users between its reads."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
@@ -79,10 +80,9 @@ class PkwSession(PolledSession):
             sent=SentWrites(self.sent, placement)))
         self._writers = Writers(self, self._channel)
         self._rounds = Rounds(self, self._channel, self._writers)
-        self._exchange = PolledExchange(self, self._channel)
+        self._exchange = PolledExchange(self, self, self._channel)
         self.users = Users(
-            self, procedures.RegisterAccess(self._channel, self.retry, placement),
-            blocked=self._refusal, control_refusal=self._writers.control_refusal)
+            self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self._course = Life(self._channel)
         self.look_after(channel=self._channel)
 
@@ -141,7 +141,7 @@ class PkwSession(PolledSession):
         self.control_changed(now)
         self._writers.write_setpoints(now)
 
-    def round_missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if reason and self.online:
             gap = self._rounds.gap
             self._silent(sentences.lost_because(reason, gap) if gap else reason, now)
@@ -227,7 +227,7 @@ class PkwSession(PolledSession):
             self._writers.stop(now)     # it may be listening
             self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
 
-    def _refusal(self, now: float) -> Sentence:
+    def request_refusal(self, now: float) -> Sentence:
         """Say why nothing can be asked by PDOs for a while; '' if it can."""
         text = self._node.refusal(now) if self.stage is Stage.RUNNING else NOTHING
         return sentences.drive_offline_because(text) if text else NOTHING
@@ -333,6 +333,9 @@ class PkwSession(PolledSession):
                       self._node.next_timer(), self.setpoints.expires_at,
                       self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
+
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+        return self._writers.control_refusal(action, refusal)
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ Whatever nobody answers ends it; it begins anew then. What differs from the conf
 cannot be made to fit, is told in words, and the drive is not cycled.
 """
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from enum import Enum
 import math
@@ -26,10 +26,9 @@ from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
 from drive_can_bridge.protocols.cia402 import pdo, states
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
-from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
-from drive_can_bridge.protocols.cia402.pdo import Pdo
+from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import MODES, State
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019
@@ -54,7 +53,8 @@ class Found(Enum):
     READY = 'ready'
     DIFFERS = 'differs'
     RUNS = 'runs on'
-    SILENT = 'no answer'
+    SILENT = 'no answer any more'
+    ABSENT = 'no answer at all'
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,12 @@ class Outcome:
     The end of the sequence.
 
     :param text: what differs, or how it runs on.
+    :param status: the status word that it began with, where it is ready.
     """
 
     found: Found
     text: Sentence = NOTHING
+    status: int = 0
 
 
 class _End(Exception):
@@ -84,14 +86,14 @@ class BringUp:
     :param rules: learn what the drive does at a quick stop.
     :ivar watch: sub-index of 1016h by which the drive watches the bridge, written by us; None.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
-    :ivar status: the status word that it began with.
-    :ivar heard: the drive has answered this time.
     :ivar nmt_at: when it was sent NMT last.
     """
 
-    def __init__(self, session: Session, node: Node, rules: DriveRules) -> None:
+    def __init__(self, session: Session, node: Node, rules: DriveRules,
+                 channel: SdoChannel) -> None:
         drive = session.configuration
         self._session, self._node, self._rules = session, node, rules
+        self._channel = channel
         self._drive, self._options = drive, drive.options
         self._mode = MODES[drive.options.mode]
         self._attempts = drive.parameter_retries + 1
@@ -100,20 +102,15 @@ class BringUp:
         self._told: set[str] = set()
         self.watch: int | None = None
         self.options: dict[int, int] = {}
-        self.status = 0
-        self.heard = False
         self.nmt_at = -math.inf
-        self._now: Callable[[], float] = lambda: self.nmt_at
 
-    def run(self, now: Callable[[], float]) -> Script:
-        """
-        Do it; returns an :class:`Outcome`.
-
-        :param now: the time.
-        """
-        self._now, self.heard = now, False
+    def run(self) -> Script:
+        """Do it; returns an :class:`Outcome`."""
+        reply = yield Ask(states.STATUS_WORD)
+        if _silent(reply):
+            return Outcome(Found.ABSENT)
         try:
-            yield from self._stand_still()
+            status = yield from self._stand_still(reply)
             yield from self._learn()
             yield from self._heartbeat()
             if self._options.mapping != 'assume':
@@ -125,15 +122,14 @@ class BringUp:
             yield from self._find_axes()
         except _End as end:
             return end.outcome
-        return Outcome(Found.READY)
+        return Outcome(Found.READY, status=status)
 
     # -- one object -------------------------------------------------------------------------------
 
     def _transfer(self, ask: Ask) -> Generator[Ask, Reply, Reply]:
         reply = yield ask
-        if reply.data is None and reply.abort is None:
+        if _silent(reply):
             raise _End(Outcome(Found.SILENT))
-        self.heard = True
         return reply
 
     def _read(self, index: int, subindex: int = 0, *, signed: bool = False,
@@ -165,11 +161,15 @@ class BringUp:
 
     # -- the steps --------------------------------------------------------------------------------
 
-    def _stand_still(self) -> Script:
-        """Disable a drive that is found enabled, before anything else is touched."""
+    def _stand_still(self, reply: Reply) -> Generator[Ask, Reply, int]:
+        """
+        Disable a drive that is found enabled, before anything else is touched.
+
+        :param reply: its status word.
+        :return: the last one.
+        """
         looks, word = 0, -1
         while True:
-            reply = yield from self._transfer(Ask(states.STATUS_WORD))
             if reply.data is None:
                 raise _differs(sentences.object_refused(
                     _place(states.STATUS_WORD), abort_codes.describe(reply.abort or 0)))
@@ -194,9 +194,10 @@ class BringUp:
                 yield from self._must(states.CONTROL_WORD, 0, word, 2)
             looks += 1
             yield Ask(pause=LOOK_PERIOD)
-        self.status = raw
+            reply = yield from self._transfer(Ask(states.STATUS_WORD))
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
+        return raw
 
     def _brakes(self, status: int) -> Generator[Ask, Reply, bool]:
         """Tell whether a quick stop takes its course: one that ends by itself does until then."""
@@ -249,7 +250,7 @@ class BringUp:
             self._nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
 
     def _nmt(self, command: NmtCommand) -> None:
-        self.nmt_at = max(self.nmt_at, self._now())
+        self.nmt_at = max(self.nmt_at, self._channel.now)
         self._session.outbox.put(network.encode_nmt(command, self._drive.station))
 
     def _find_axes(self) -> Script:
@@ -518,6 +519,10 @@ def interpolation_time(period: float) -> tuple[int, int] | None:
         if 1 <= count <= 0xFF and abs(count * 10.0 ** power - period) < 1e-9:
             return count, power
     return None
+
+
+def _silent(reply: Reply) -> bool:
+    return reply.data is None and reply.abort is None
 
 
 def _differs(text: Sentence) -> _End:

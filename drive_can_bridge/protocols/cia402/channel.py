@@ -6,13 +6,12 @@ An answer says which object it is about, so that only the late answer to a trans
 object could be mistaken for that to another one.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
-from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
@@ -67,14 +66,14 @@ class SdoCourier(Courier[Ask, Reply]):
     """
     Does one transfer at a time.
 
-    :param send: takes a frame, and who is told whether it left.
+    :param outbox: takes the frames.
     """
 
-    def __init__(self, node: int, send: Callable[[Frame, Left | None], None],
+    def __init__(self, node: int, outbox: Outbox,
                  retry: RetryPolicy) -> None:
         super().__init__(retry)
         self._node = node
-        self._send = send
+        self._outbox = outbox
         self._toggle = 0
         self._collected: bytearray | None = None    # of an object that takes segments
 
@@ -93,7 +92,7 @@ class SdoCourier(Courier[Ask, Reply]):
                 self.end(step, NOT_SENT, then)
         frame = sdo.encode_upload(self._node, step.index, step.subindex) if step.data is None \
             else sdo.encode_download(self._node, step.index, step.subindex, step.data)
-        self._send(frame, left)
+        self._outbox.put(frame, left)
 
     def receive(self, answer: bytes, now: float) -> Reply | bool:
         found, step = self.decode(answer), self.step
@@ -140,14 +139,14 @@ class SdoCourier(Courier[Ask, Reply]):
 
     def _ask_segment(self, now: float) -> None:
         self.deadline = now + self.retry.timeout
-        self._send(sdo.request(self._node, Message(
-            Kind.SEGMENT_WANTED, None, toggle=self._toggle)), None)
+        self._outbox.put(sdo.request(self._node, Message(
+            Kind.SEGMENT_WANTED, None, toggle=self._toggle)))
 
     def _give_up(self, code: int) -> None:
         step = self.step
         if step is not None:
-            self._send(sdo.request(self._node, Message(
-                Kind.ABORT, (step.index, step.subindex), number=code)), None)
+            self._outbox.put(sdo.request(self._node, Message(
+                Kind.ABORT, (step.index, step.subindex), number=code)))
 
     def handle_timer(self, now: float) -> Reply | bool:
         if self._collected is not None and self.busy and now >= self.deadline:

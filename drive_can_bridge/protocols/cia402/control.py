@@ -22,8 +22,7 @@ and one that was sent 0002h gets no other word until a status behind that was se
 way tells of older times, and 0006h or 0007h in the middle of a quick stop would end its braking.
 """
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
@@ -59,12 +58,23 @@ def control_table(options: Any) -> ControlTable:
         braking=StatusPattern(*PATTERNS[State.QUICK_STOP_ACTIVE]))
 
 
+class Known(Protocol):
+    """What the status word of a drive does not say; the session itself."""
+
+    @property
+    def mode_lacking(self) -> Sentence:
+        """What it lacks to be driven although it reports enabled; '' if nothing."""
+
+    @property
+    def why(self) -> Sentence:
+        """What else it says of why it is not enabled; '' if nothing."""
+
+
 class DriveRules(TableRules):
     """
     The words of one drive.
 
-    :param lacks: says what the drive lacks to be driven although it reports enabled: its mode.
-    :param why: says what is known of why it is not enabled.
+    :param known: what else is known of it.
     :ivar state: the newest one; None: not known.
     :ivar status: the word that told it; 0: not known.
     :ivar quick_stop_option: 605Ah; None: the drive has none.
@@ -74,8 +84,7 @@ class DriveRules(TableRules):
     :ivar halted: the drive was told to halt: its position is its own.
     """
 
-    def __init__(self, table: ControlTable, options: Any, *, lacks: Callable[[], Sentence],
-                 why: Callable[[], Sentence]) -> None:
+    def __init__(self, table: ControlTable, options: Any, known: Known) -> None:
         super().__init__(table)
         self.state: State | None = None
         self.status = 0
@@ -84,7 +93,7 @@ class DriveRules(TableRules):
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
         self.homing_bits: int | None = None
         self.halted = False
-        self._lacks, self._why = lacks, why
+        self._else_known = known
         self._disable_word = DISABLE_WORDS[options.disable_word]
         self._enable_word = states.ENABLE | (
             states.RAMP_BITS if options.mode == 'vl' and options.ramp_bits else 0)
@@ -169,7 +178,7 @@ class DriveRules(TableRules):
 
     @property
     def lacking(self) -> Sentence:
-        return self._lacks()
+        return self._else_known.mode_lacking
 
     @property
     def loose(self) -> bool:
@@ -179,7 +188,7 @@ class DriveRules(TableRules):
         if sending is ControlAction.ENABLE or self.state not in (
                 State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
             return sentences.together((
-                sentences.word_sent_last(self._last), self._lacks(), self._why()))
+                sentences.word_sent_last(self._last), self.lacking, self._else_known.why))
         return sentences.still_braking()
 
 

@@ -142,9 +142,9 @@ class Cia402(Family):
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         node, options = drive.station, drive.options
         used = {each.identifier: f'receive PDO{each.number} of node {node}'
-                for each in request_pdos(drive)}
+                for each in pdo.request_pdos(drive)}
         used |= {each.identifier: f'transmit PDO{each.number} of node {node}'
-                 for each in response_pdos(drive)}
+                 for each in pdo.response_pdos(drive)}
         used |= {sdo.REQUEST_BASE + node: f'SDO requests to node {node}',
                  sdo.RESPONSE_BASE + node: f'SDO responses of node {node}'}
         claims = node_claims(drive, used)
@@ -196,7 +196,7 @@ class Cia402(Family):
 
     def _own_load(self, drive: DriveConfiguration) -> float:
         bits = sum(worst_bits(each.length, extended=False)
-                   for each in (*request_pdos(drive), *response_pdos(drive)))
+                   for each in (*pdo.request_pdos(drive), *pdo.response_pdos(drive)))
         beat: float = drive.options.heartbeat_producer
         return bits / drive.period + (_HEARTBEAT / beat if beat > 0 else 0.0)
 
@@ -287,18 +287,6 @@ class Cia402(Family):
             if 0 < getattr(options, key) < 0.001:
                 yield Complaint(key, f'{getattr(options, key):g} s is too short, allowed is 0, or '
                                      'at least 0.001 s')
-
-
-def request_pdos(drive: DriveConfiguration) -> list[pdo.Pdo]:
-    """Return the receive PDOs of a drive: the control word, then its setpoints."""
-    return pdo.request_pdos(drive.station, drive.options.request_pdos,
-                            (CONTROL_PARAMETER, *drive.cyclic_request))
-
-
-def response_pdos(drive: DriveConfiguration) -> list[pdo.Pdo]:
-    """Return the transmit PDOs of a drive: the status word, then its actual values."""
-    return pdo.response_pdos(drive.station, drive.options.response_pdos,
-                             (STATUS_PARAMETER, *drive.cyclic_response))
 
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:

@@ -11,11 +11,11 @@ One after the other, the newest wins. When its commands cease, an axis that is o
 (bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises.
 """
 
-from collections.abc import Callable
 import math
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.control import DriveRules
@@ -28,16 +28,16 @@ class Handover:
 
     :param rules: get the bits of the control word.
     :param timeout: s that a drive may take to acknowledge.
-    :param tell: takes in words, once, that it does not.
+    :param report: is told once that it does not.
     """
 
     def __init__(self, setpoints: Setpoints, rules: DriveRules, timeout: float,
-                 tell: Callable[[Sentence], None]) -> None:
+                 report: Reporter) -> None:
         mode = MODES['pp']
         self._place = next(place for place, each in enumerate(setpoints.items) if (
             each.parameter.index, each.parameter.subindex or 0) == (mode.index, mode.subindex))
         self._setpoint = setpoints.items[self._place]
-        self._rules, self._timeout, self._tell = rules, timeout, tell
+        self._rules, self._timeout, self._report = rules, timeout, report
         self._waits_since, self._told = math.inf, False
         self._handed: int | None = None     # the drive was given this one
         self._rising = False                # bit 4 has yet to travel
@@ -79,7 +79,8 @@ class Handover:
         self._waits_since = min(self._waits_since, now)
         if now >= self._waits_since + self._timeout and not self._told:
             self._told = True
-            self._tell(sentences.target_not_acknowledged(self._timeout, int(high)))
+            self._report.note(Noted(
+                sentences.target_not_acknowledged(self._timeout, int(high)), warning=True))
 
     def carried(self, word: int, setpoints: list[int]) -> None:
         """Record a telegram that was made: the edge hands over what is in it."""

@@ -17,8 +17,7 @@ from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
 from drive_can_bridge.protocols.canopen.sdo import Kind as Said, Message
-from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
-from drive_can_bridge.protocols.cia402.pdo import Pdo
+from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict,

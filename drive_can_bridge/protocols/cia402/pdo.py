@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 import struct
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.protocols.cia402.states import CONTROL_PARAMETER, STATUS_PARAMETER
 
 PDO_MAX, LENGTH_MAX = 4, 8
 #: identifier of RPDO and TPDO 1, plus the node; the next ones 100h further each
@@ -128,7 +130,19 @@ class Pdo:
         return self._layout.unpack(data.ljust(self.length, b'\0'))[:whole]
 
 
-def request_pdos(node: int, numbers: Sequence[int],
+def request_pdos(drive: DriveConfiguration) -> list[Pdo]:
+    """Return the RPDOs of a drive: the control word, then its setpoints."""
+    return receive_pdos(drive.station, drive.options.request_pdos,
+                        (CONTROL_PARAMETER, *drive.cyclic_request))
+
+
+def response_pdos(drive: DriveConfiguration) -> list[Pdo]:
+    """Return the TPDOs of a drive: the status word, then its actual values."""
+    return transmit_pdos(drive.station, drive.options.response_pdos,
+                         (STATUS_PARAMETER, *drive.cyclic_response))
+
+
+def receive_pdos(node: int, numbers: Sequence[int],
                  parameters: Sequence[Parameter]) -> list[Pdo]:
     """
     Return the RPDOs that carry parameters to a drive.
@@ -139,9 +153,9 @@ def request_pdos(node: int, numbers: Sequence[int],
     return _pdos(numbers, parameters, RPDO_BASE + node, RPDO_COMMUNICATION)
 
 
-def response_pdos(node: int, numbers: Sequence[int],
+def transmit_pdos(node: int, numbers: Sequence[int],
                   parameters: Sequence[Parameter]) -> list[Pdo]:
-    """Return the TPDOs that carry parameters from a drive; see :func:`request_pdos`."""
+    """Return the TPDOs that carry parameters from a drive; see :func:`receive_pdos`."""
     return _pdos(numbers, parameters, TPDO_BASE + node, TPDO_COMMUNICATION)
 
 

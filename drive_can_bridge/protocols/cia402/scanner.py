@@ -20,8 +20,9 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.cia402 import pdo, states
-from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
-from drive_can_bridge.protocols.cia402.pdo import entry_text, MAPPING_OFFSET, Pdo
+from drive_can_bridge.protocols.cia402.pdo import (
+    entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos,
+)
 from drive_can_bridge.protocols.cia402.states import (
     ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION,
 )

@@ -2,23 +2,17 @@
 """
 The conversation with one drive of CiA 402.
 
-.. code-block:: text
-
-    IDLE ──activate, bus up──► SETTING UP ──ready──► CYCLIC ──missed_limit──► LEAVING
-      ▲                         ▲  │ ▲                 │ boot-up, heartbeat      │
-      │                         │  └─┼──differs──► DIFFERS (looks again in 1 s)  │
-      └──deactivate / bus down──┘    └────────3 neutral cycles, then silence─────┘
-
 Before the first PDO a drive is set up by SDO (:mod:`.bring_up`), and so it is after every loss:
 a node that has started anew has forgotten what was written. That it has power is not needed.
+That, again and again until it is ready to be cycled, is its life (:meth:`Cia402Session._life`).
+A drive that is lost while it is online gets three neutral cycles more before it begins anew.
 
 Whatever was told to run is told to stop: by cycles while PDOs flow, otherwise by SDO, which no
 mapping can misroute. At the end, stop cycles go on until the drive says that it is disabled, or
 for ``control_timeout``; then it watches the bridge no more.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from enum import Enum
+from collections.abc import Generator, Sequence
 from functools import partial
 import math
 
@@ -40,18 +34,21 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.core.users import Users
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
+from drive_can_bridge.protocols.canopen.node import (
+    Change, Node, START_PAUSE, START_PERIOD, START_SPACING,
+)
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERIOD, Outcome
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoCourier
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
-from drive_can_bridge.protocols.cia402.family import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
     cells, MAP, SdoAccess, write_until_answered,
 )
@@ -59,6 +56,7 @@ from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
 )
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
 
@@ -72,45 +70,34 @@ _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.M
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 
 
-class Phase(Enum):
-    """How far the session has come with its drive."""
+class Heartbeats:
+    """The part of a session that sends the bridge's heartbeat, and waits for that of the node."""
 
-    IDLE = 'idle'
-    SETTING_UP = 'setting up'
-    DIFFERS = 'differs'
-    CYCLIC = 'cycling'
-    LEAVING = 'last neutral cycles'
+    def __init__(self, session: 'Cia402Session', node: Node, beat: BridgeHeartbeat | None,
+                 ) -> None:
+        self._session, self._node, self._beat = session, node, beat
 
-
-class Watch:
-    """The part of a session that sends the heartbeat of the bridge, while it is in use."""
-
-    def __init__(self, session: Session, beat: BridgeHeartbeat | None) -> None:
-        self._session, self._beat = session, beat
-        self.in_use = False
-
-    def handle_timer(self, now: float) -> None:
-        """Send a heartbeat, if one is due."""
-        if self.in_use and self._beat is not None:
+    def send(self, now: float) -> None:
+        """Send one, if it is due."""
+        if self._beat is not None:
             self._beat.beat(self._session.outbox, now)
 
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        stage = self._session.stage
+        if stage is not Stage.IDLE:
+            self.send(now)
+        if stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+            self._session.heartbeat_lost(now)
+
     def next_timer(self) -> float:
-        """Return when one is due."""
-        return self._beat.next_timer() if self.in_use and self._beat is not None else math.inf
+        """Return when one is due, or overdue."""
+        stage = self._session.stage
+        own = math.inf if self._beat is None or stage is Stage.IDLE else self._beat.next_timer()
+        return min(own, self._node.next_timer()) if stage is Stage.RUNNING else own
 
     def stop(self) -> None:
-        """Send none any more."""
-        self.in_use = False
-
-
-class Looks:
-    """The part of a session that is two of its methods."""
-
-    def __init__(self, due: Callable[[], float], act: Callable[[float], None]) -> None:
-        self.next_timer, self.handle_timer = due, act
-
-    def stop(self) -> None:
-        """Leave it to the session."""
+        """Nothing to be done: the stage says it."""
 
 
 class Cia402Session(Session):
@@ -126,21 +113,20 @@ class Cia402Session(Session):
                  heartbeat: BridgeHeartbeat | None = None) -> None:
         options = drive.options
         table = control_table(options)
-        self._rules = DriveRules(table, options, lacks=self._mode_lacking, why=self._why)
+        self._rules = DriveRules(table, options, self)
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
-        self._machine = control
+        self._machine, self._mode = control, MODES[options.mode].number
         super().__init__(
             drive, control, image=ProcessImage.of(
                 drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
             roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
-        self._courier = SdoCourier(drive.station, self.outbox.put, self.retry)
+        self._courier = SdoCourier(drive.station, self.outbox, self.retry)
         self._channel: SdoChannel = Channel(self._courier)
-        self.users = Users(self, SdoAccess(self._channel, self.retry),
-                           control_refusal=self._control_refusal)
+        self.users = Users(self, SdoAccess(self._channel, self.retry))
         self._stop: SafeStop[Ask, Reply] = SafeStop(
             self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
             word=CONTROL_PARAMETER)
@@ -154,68 +140,57 @@ class Cia402Session(Session):
         self._synchronous: bool = options.transmission == 'sync'
         self._beat = beat or Beat()
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
-        self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(
-            self, self._encode, self._send_cycle, slot=0, silence='no complete set of PDOs',
-            missed=self._missed, ended=self._last_cycle_left, settled=self._set.clear,
-            in_turn=not self._synchronous, timer=self._turn)
+        self._answers = Answers(self, silence='no complete set of PDOs',
+                               in_turn=not self._synchronous, timer=self._turn)
+        self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
-        self._watch = Watch(self, heartbeat)
-        self._bring_up = BringUp(self, self._node, self._rules)
+        self._heartbeats = Heartbeats(self, self._node, heartbeat)
+        self._bring_up = BringUp(self, self._node, self._rules, self._channel)
         self.homes = options.homing
         self._handover = Handover(
-            self.setpoints, self._rules, drive.control_timeout,
-            lambda text: self.report.note(Noted(text, warning=True)),
+            self.setpoints, self._rules, drive.control_timeout, self.report,
             ) if options.mode == 'pp' else None
-        self._homing = Homing(self, control, self._rules, self._channel,
-                              MODES[options.mode].number)
-        self.look_after(Looks(self._next_look, self._look), self._watch, self._homing,
-                        self.exchange, channel=self._channel)
-        self._phase = Phase.IDLE
-        self._look_at = math.inf        # when the set-up begins again
-        self._cycling_since = -math.inf
+        self._homing = Homing(self, control, self._rules, self._channel, self._mode)
+        self._course = Life(self._channel)
+        self.look_after(self._course, self._heartbeats, self._homing, self.exchange,
+                        channel=self._channel)
+        self._differs = False           # what the last set-up has found
         self._stop_until = -math.inf
-        self._differing = ''            # as it was told
-        self._runs_told = False
         self._forget_state()
 
     def _forget_state(self) -> None:
         """Know nothing of what the drive shows while it is enabled."""
         self._mode_shown: int | None = None
-        self._mode_seen = self._looking = False
+        self._looking = False
         self._tells_velocity = True
-        self._pending_since = math.inf
         self._error_code: int | None = None
 
     # -- life cycle -------------------------------------------------------------------------------
 
-    @property
-    def _cycling(self) -> bool:
-        return self._phase in (Phase.CYCLIC, Phase.LEAVING)
-
     def begin(self, now: float) -> None:
         self.exchange.stop()
         self._channel.cancel(Lane.OWN)
+        self._course.stop()
         self._forget_state()
-        self._watch.in_use = True
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
-        self._set_up_soon(START_SPACING, now)
+        self._course.start(self._life(now, START_SPACING), now)
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
         self._looking = False
         self._homing.stop()
         self._stop.forget()
-        self._look_at = math.inf
+        self._course.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self._cycling or owes or self._bring_up.watch is not None)
+            self.exchange.cycling or owes or self._bring_up.watch is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
-        if self._cycling:
+        if self.exchange.cycling:
             self.exchange.stop_soon(now)
         elif self.owed:
             self._stop_by_sdo(now)
@@ -233,7 +208,7 @@ class Cia402Session(Session):
     def fall_silent(self) -> None:
         super().fall_silent()
         self._stop.forget()
-        self._phase, self._look_at = Phase.IDLE, math.inf
+        self._differs = False
         self._set.clear()
 
     def bus_down(self, now: float, reason: str) -> None:
@@ -242,70 +217,55 @@ class Cia402Session(Session):
 
     # -- setting up -------------------------------------------------------------------------------
 
-    def _next_look(self) -> float:
-        """Return when the set-up begins again, or something is overdue of the node."""
-        node = self._node.next_timer() if self.stage is Stage.RUNNING else math.inf
-        return min(self._look_at, node)
-
-    def _look(self, now: float) -> None:
-        if now >= self._look_at:
-            self._set_up(now)
-        if self.stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
-            if self._cycling:
-                self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
-
-    def _set_up_soon(self, spacing: float, now: float) -> None:
+    def _life(self, now: float, spacing: float) -> Script:
         """
-        Set the drive up, not too often: each time it is sent NMT.
+        Set the drive up until it can be cycled, not too often: each time it is sent NMT.
 
         :param spacing: s since the last NMT at least.
         """
-        self._phase = Phase.SETTING_UP
-        self._look_at = max(now, self._bring_up.nmt_at + spacing)
-        if self._look_at <= now:
-            self._set_up(now)
+        bring_up, told = self._bring_up, NOTHING
+        self._differs = False
+        again = bring_up.nmt_at + spacing
+        if again > now:
+            now = yield again
+        while True:
+            self._heartbeats.send(now)      # to be heard before the drive is to watch it
+            outcome: Outcome = yield bring_up.run()
+            now, found, text = self._channel.now, outcome.found, outcome.text
+            if found is Found.READY:
+                self._start_cycling(outcome.status, now)
+                return
+            self._differs = found is Found.DIFFERS
+            self.report.advice = text or sentences.set_up_unanswered()
+            again = now + LOOK_AGAIN
+            if found is Found.DIFFERS:
+                self.report.advice = sentences.mapping_differs(text)
+                if text != told:
+                    self.report.note(MappingDiffered(text))
+            elif found is Found.RUNS and text != told:
+                self.report.warn(text, may_run=True)
+            elif found is Found.SILENT:
+                again = max(now, bring_up.nmt_at + START_PERIOD)
+            elif found is Found.ABSENT:
+                again = now
+                if now >= bring_up.nmt_at + START_PERIOD:
+                    bring_up.wake(now)      # a node that was stopped answers nothing
+            told = text or told
+            now = yield again
+            self._differs = False
 
-    def _set_up(self, now: float) -> None:
-        """Set the drive up, from the beginning."""
-        self._phase, self._look_at = Phase.SETTING_UP, math.inf
-        self._watch.handle_timer(now)   # it is to be heard before the drive is to watch it
-        self._channel.run(self._bring_up.run(lambda: self._channel.now), self._set_up_ended, now)
-
-    def _set_up_ended(self, outcome: Outcome) -> None:
-        now = self._channel.now
-        if self.stage is not Stage.RUNNING:
-            return
-        if outcome.found is Found.READY:
-            self._differing, self._runs_told = '', False
-            self._phase, self._cycling_since = Phase.CYCLIC, now
-            self._machine.status_received(self._bring_up.status, now)
-            self.exchange.book.forget_asked()
-            self.exchange.book.stale = self._beat.running   # it answers to the SYNC of others
-            self.exchange.start(now)
-            self.report.advice = sentences.cycles_unanswered()
-        elif outcome.found is Found.DIFFERS:
-            self._phase, self._look_at = Phase.DIFFERS, now + LOOK_AGAIN
-            self.report.advice = sentences.mapping_differs(outcome.text)
-            if outcome.text != self._differing:
-                self._differing = outcome.text
-                self.report.note(MappingDiffered(outcome.text))
-        elif outcome.found is Found.RUNS:
-            self._look_at = now + LOOK_AGAIN
-            self.report.advice = outcome.text
-            if not self._runs_told:
-                self._runs_told = True
-                self.report.warn(outcome.text, may_run=True)
-        else:
-            self.report.advice = sentences.set_up_unanswered()
-            if not self._bring_up.heard and now >= self._bring_up.nmt_at + START_PERIOD:
-                self._bring_up.wake(now)    # a node that was stopped answers nothing
-            self._look_at = now if not self._bring_up.heard else max(
-                now, self._bring_up.nmt_at + START_PERIOD)
+    def _start_cycling(self, status: int, now: float) -> None:
+        exchange = self.exchange
+        self._machine.status_received(status, now)
+        self._answers.book.forget_asked()
+        self._answers.book.stale = self._beat.running    # it answers to the SYNC of others
+        exchange.start(now)
+        self.report.advice = sentences.cycles_unanswered()
 
     # -- online and offline -----------------------------------------------------------------------
 
-    def _missed(self, reason: Sentence, now: float) -> None:
-        if self._phase is Phase.LEAVING:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
+        if self.exchange.leaving:
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
                 self.start_over(now)
@@ -314,15 +274,19 @@ class Cia402Session(Session):
         elif not self._synchronous:
             self._expect_set(now)
 
+    def heartbeat_lost(self, now: float) -> None:
+        """Handle a node whose heartbeats have ceased."""
+        if self.exchange.cycling:
+            self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
+
     def _silent(self, reason: Sentence, now: float) -> None:
         """Have a drive that is lost stand still: it may be listening."""
-        self.exchange.forget()
+        self._answers.forget()
         if not self.online:
             self.exchange.stop()
-            self._set_up_soon(START_PERIOD, now)
+            self._course.start(self._life(now, START_PERIOD), now)
             return
         self.lose(reason, now)
-        self._phase = Phase.LEAVING
         self.exchange.run_out(self.exchange.timer.due)
 
     def lost(self, now: float, *, was_online: bool) -> None:
@@ -338,7 +302,10 @@ class Cia402Session(Session):
 
     # -- PDOs, sending ----------------------------------------------------------------------------
 
-    def _encode(self, raws: list[int]) -> list[bytes]:
+    def exchange_ended(self) -> None:
+        self._set.clear()
+
+    def encode_cycle(self, raws: list[int]) -> list[bytes]:
         if self._handover is not None:
             self._handover.carried(raws[0], raws[1:])
         payloads, at = [], 0
@@ -348,14 +315,14 @@ class Cia402Session(Session):
             at += count
         return payloads
 
-    def _send_cycle(self, payloads: list[bytes], now: float) -> None:
+    def send_cycle(self, payloads: list[bytes], now: float) -> None:
         exchange = self.exchange
         for each, payload in zip(self._requests, payloads):
             exchange.put(Frame(each.identifier, payload, False))
         if self._turn is not None:
             exchange.expect_answer(now)
             self._beat.begun(self._turn, now, exchange.await_frame())
-        elif not exchange.book.awaiting:
+        elif not self._answers.book.awaiting:
             self._expect_set(now)
 
     def _expect_set(self, now: float) -> None:
@@ -391,12 +358,12 @@ class Cia402Session(Session):
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
-        exchange, count = self.exchange, len(self._responses)
-        if not self._cycling:
-            exchange.book.take_stale()
+        exchange, answers, count = self.exchange, self._answers, len(self._responses)
+        if not self.exchange.cycling:
+            answers.book.take_stale()
             return
-        if self._synchronous and not exchange.wanted:
-            if place == count - 1 and not exchange.expects('transmit PDO', now, received_at):
+        if self._synchronous and not answers.wanted:
+            if place == count - 1 and not answers.expects('transmit PDO', now, received_at):
                 exchange.wait_out(now)
             return
         try:
@@ -412,11 +379,11 @@ class Cia402Session(Session):
                 return
             raws = tuple(raw for each in range(count) for raw in self._set[each])
             self._set.clear()
-        exchange.answered(received_at)
-        if not self._synchronous and self.exchange.timer.due < math.inf:
+        answers.answered(received_at)
+        if not self._synchronous and exchange.timer.due < math.inf:
             self._expect_set(now)
         if not self.online and self.stage is Stage.RUNNING:
-            if self._phase is Phase.LEAVING:    # it is back
+            if exchange.leaving:    # it is back
                 self.start_over(now)
                 return
             self.be_online()
@@ -442,8 +409,9 @@ class Cia402Session(Session):
             self._channel.clear()
             self._stop.forget()
             self._close(reason, now)
-        elif state is not NmtState.OPERATIONAL and self._phase is Phase.CYCLIC and (
-                now > self._cycling_since + START_SPACING):
+        elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
+                not self.exchange.leaving
+                and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
             self._close(sentences.node_state(state.text), now)
         else:
             self._again.heard(now, hurry=True)
@@ -454,9 +422,9 @@ class Cia402Session(Session):
         """Ask for what the status word does not say, where something depends on it."""
         state, control = self._rules.state, self._machine
         if state is not State.OPERATION_ENABLED:
-            self._mode_seen = False
+            self._mode_shown = None
         if not control.pending:
-            self._pending_since, self._error_code = now, None
+            self._error_code = None
         if self._looking:
             return
         if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
@@ -465,12 +433,12 @@ class Cia402Session(Session):
             self._channel.run(self._look_at_velocity(), self._looked, now)
         elif self.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
-        elif state is State.OPERATION_ENABLED and not self._mode_seen and (
+        elif state is State.OPERATION_ENABLED and self._mode_shown != self._mode and (
                 not control.stopping and not self._homing.under_way):
             self._looking = True
             self._channel.run(self._look_at_mode(), self._looked, now)
         elif control.pending and self._error_code is None and (
-                now > self._pending_since + 0.5 * self.configuration.control_timeout):
+                now > control.next_timer() - 0.5 * self.configuration.control_timeout):
             self._looking = True
             self._channel.run(self._look_at_error(), self._looked, now)
 
@@ -479,16 +447,14 @@ class Cia402Session(Session):
 
     def _look_at_mode(self) -> Generator[Ask, Reply, None]:
         """Read 6061h until it shows the mode."""
-        wanted = MODES[self.configuration.options.mode].number
         while self._rules.state is State.OPERATION_ENABLED:
             reply = yield Ask(states.MODE_SHOWN)
             if reply.abort is not None:
                 self._bring_up.tell(sentences.mode_not_shown())
-                self._mode_seen = True
+                self._mode_shown = self._mode       # nothing says otherwise
             elif reply.data:
                 self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
-                self._mode_seen = self._mode_shown == wanted
-            if self._mode_seen:
+            if self._mode_shown == self._mode:
                 self._machine.status_received(self._rules.status, self._channel.now)
                 self.control_changed(self._channel.now)
                 return
@@ -509,14 +475,17 @@ class Cia402Session(Session):
         reply = yield Ask(states.ERROR_CODE)
         self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
 
-    def _mode_lacking(self) -> Sentence:
-        if self._mode_seen or self._rules.state is not State.OPERATION_ENABLED:
+    @property
+    def mode_lacking(self) -> Sentence:
+        """What the drive lacks to be driven although it reports enabled; '' if nothing."""
+        if self._mode_shown == self._mode or self._rules.state is not State.OPERATION_ENABLED:
             return NOTHING
-        name = self.configuration.options.mode
-        return sentences.mode_differs(name, MODES[name].number, self._mode_shown)
+        return sentences.mode_differs(
+            self.configuration.options.mode, self._mode, self._mode_shown)
 
-    def _why(self) -> Sentence:
-        """Say what else the drive says of why it is not enabled."""
+    @property
+    def why(self) -> Sentence:
+        """What else the drive says of why it is not enabled; '' if nothing."""
         code, emergency = self._error_code, self._node.emergency
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
@@ -540,7 +509,7 @@ class Cia402Session(Session):
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
 
-    def _control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         emergency = self._node.emergency
         if refusal or action is not ControlAction.ENABLE or not self._machine.fault:
             return refusal
@@ -563,13 +532,13 @@ class Cia402Session(Session):
         return None if reply.data is None else int.from_bytes(reply.data, 'little')
 
     def _stop_by_sdo_ended(self) -> None:
-        if self.stage is Stage.STOPPING and not self._cycling:
+        if self.stage is Stage.STOPPING and not self.exchange.cycling:
             self._release(self._channel.now)
 
-    def _last_cycle_left(self, now: float) -> None:
+    def last_cycle_left(self, now: float) -> None:
         if self.stage is not Stage.STOPPING:
             return
-        book = self.exchange.book
+        book = self._answers.book
         # one that has answered its stop may miss some: it is lost by as many as ever
         listens = not book.missed_in_row or (
             book.stop_shown and book.missed_in_row < self.configuration.missed_limit)
@@ -596,11 +565,11 @@ class Cia402Session(Session):
 
     @property
     def unshown(self) -> bool:
-        return super().unshown and not self.exchange.book.stop_shown
+        return super().unshown and not self._answers.book.stop_shown
 
     @property
     def state(self) -> DriveState:
-        if self._phase is Phase.DIFFERS and not self.defect:
+        if self._differs and not self.defect:
             return DriveState.MAPPING_DIFFERS
         return super().state
 

@@ -44,6 +44,7 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
+from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended, procedures
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -88,10 +89,10 @@ class ExtendedSession(Session):
         self._wanted = (numbers.numbers(drive.cyclic_request),
                         numbers.numbers(drive.cyclic_response))
         self._rewrites: bool = options.mapping == 'configure'
-        self._exchange = CyclicExchange(
-            self, self._codec.encode_request, self._send_cycle, slot=self._side.control_slot,
-            silence='no cyclic response', missed=self._missed, ended=self._last_cycle_left)
-        self._exchange.heeded = not self._verify    # otherwise the maps tell who has heard it
+        self.encode_cycle = self._codec.encode_request
+        self._answers = Answers(self, silence='no cyclic response')
+        self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
+        self._answers.heeded = not self._verify      # otherwise the maps tell who has heard it
         self._course = Life(self._channel)
         self.look_after(self._exchange, self._course, *self._side.parts, channel=self._channel)
         self._differs = False       # what the last look at the maps found
@@ -227,7 +228,7 @@ class ExtendedSession(Session):
             self.duty.channel(CYCLE, Happened.MISROUTED)
         elif again and not exchange.cycling:    # its last cycles have reached what they were for
             self.duty.happened(
-                Happened.ANSWERED if exchange.book.stop_shown else Happened.SILENT)
+                Happened.ANSWERED if self._answers.book.stop_shown else Happened.SILENT)
         do = self.duty.happened(Happened.MAPS_DIFFER)
         self.lose(sentences.mapping_differs(text), now)
         # a request map that is right still takes neutral cycles, unless it is to be rewritten
@@ -237,7 +238,7 @@ class ExtendedSession(Session):
         if not by_cycles:
             exchange.stop()
             return
-        exchange.book.expect_nothing()
+        self._answers.book.expect_nothing()
         if not exchange.leaving:
             exchange.run_out(max(now, exchange.timer.began_at + exchange.timer.stop_spacing))
 
@@ -283,19 +284,19 @@ class ExtendedSession(Session):
     # -- cyclic exchange --------------------------------------------------------------------------
 
     def _start_cycling(self, now: float) -> None:
-        self._exchange.book.forget_asked()
+        self._answers.book.forget_asked()
         self._exchange.start(now, in_turn=True)
         self.report.advice = sentences.cycles_unanswered()
 
-    def _send_cycle(self, request: Frame, now: float) -> None:
+    def send_cycle(self, request: Frame, now: float) -> None:
         self._exchange.put(request)
         self._exchange.expect_answer(now)
         self._channel.hold(now + 0.5 * self.configuration.period)
 
-    def _last_cycle_left(self, now: float) -> None:
+    def last_cycle_left(self, now: float) -> None:
         if self.stage is Stage.STOPPING:
             self._exchange.timer.stop()
-            if self._side.control_slot is not None and not self._exchange.book.missed_in_row:
+            if self._side.control_slot is not None and not self._answers.book.missed_in_row:
                 self._side.stop.look(now)
             self.stop_ended()
         elif self._differs:
@@ -307,7 +308,7 @@ class ExtendedSession(Session):
             self._exchange.doubt_the_end()
             self.stop_left()
 
-    def _missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if self._exchange.leaving:
             if self._exchange.cycles_left == 0:
                 # if nobody answers any more: next it is told by number
@@ -316,7 +317,7 @@ class ExtendedSession(Session):
             return
         if not reason:
             return
-        self._exchange.forget()
+        self._answers.forget()
         if self._verify and not self.online:
             self.start_over(now)
             return
@@ -342,7 +343,7 @@ class ExtendedSession(Session):
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""
-        if not self._exchange.expects('cyclic response', now, received_at):
+        if not self._answers.expects('cyclic response', now, received_at):
             self._exchange.wait_out(now)
             return
         raws, wrong = self._codec.decode_response(data)
@@ -352,7 +353,7 @@ class ExtendedSession(Session):
                 return
         elif len(data) != extended.PAYLOAD:
             self.statistics.short += 1
-        self._exchange.answered(received_at)
+        self._answers.answered(received_at)
         if not self.online and self.stage is Stage.RUNNING:
             if self._exchange.leaving:
                 if not self._differs:  # it is back: look at its maps before anything else
@@ -396,7 +397,7 @@ class ExtendedSession(Session):
 
     @property
     def unshown(self) -> bool:
-        return super().unshown and not self._exchange.book.stop_shown
+        return super().unshown and not self._answers.book.stop_shown
 
     @property
     def warning(self) -> Sentence:

@@ -15,20 +15,22 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.session import Stage
+from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
-from drive_can_bridge.protocols.polled_exchange import PolledExchange, PolledSession, Raws
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 from drive_can_bridge.protocols.polling import TOLERANCE
 
 
 
-class StandardSession(PolledSession):
+class StandardSession(Session):
     """Rounds of reads, setpoints on change, and the acyclic frames between them."""
+
+    present = True
 
     def __init__(self, drive: DriveConfiguration) -> None:
         table, options = drive.profile.control, drive.options
@@ -45,7 +47,7 @@ class StandardSession(PolledSession):
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
         self._round = StandardRound(drive, self._side.courier, self._status_slot)
-        self._exchange = PolledExchange(self, self._channel)
+        self._exchange = PolledExchange(self, self, self._channel)
         self._timer = self._exchange.timer
         self._writer = SetpointWriter(
             self, self._exchange, self._side.courier, self._side.numbers, self._side.output,
@@ -172,7 +174,7 @@ class StandardSession(PolledSession):
         if known and self._side.control_slot is not None:
             self._writer.write_word(now, known=True)
 
-    def round_missed(self, reason: Sentence, now: float) -> None:
+    def exchange_missed(self, reason: Sentence, now: float) -> None:
         if not self.online:
             self.report.advice = self._round.gap or sentences.reads_unanswered()
         elif reason:

@@ -11,6 +11,9 @@ from test_cia402_set_up import FITS
 from test_cia402_stop import running, WATCH_OFF
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.cia402.handover import Handover
 
 
@@ -96,7 +99,8 @@ def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> Non
                                   armed=True, raw=5000)
     rules: Any = SimpleNamespace(mode_bits=0, halted=False)
     handover = Handover(
-        SimpleNamespace(items=[target]), rules, 2.0, print)  # type: ignore[arg-type]
+        SimpleNamespace(items=[target]), rules, 2.0,  # type: ignore[arg-type]
+        Reporter(DriveStatistics(), NOTHING))
     handover.look(0x0027, 0.0)
     handover.carried(0x003F, [5000])
     target.armed = False
