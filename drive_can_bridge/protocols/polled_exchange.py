@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Lane
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
