@@ -94,7 +94,6 @@ class PkwSession(Session):
             owes or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
-        self._course.stop()
         self._exchange.stop()
         self._channel.drop(now)
         self._writers.stop(now)

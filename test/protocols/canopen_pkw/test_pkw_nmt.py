@@ -1,10 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """NMT, heartbeats and emergency messages as the session handles them."""
 
-from builders import read
+from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, CONTROL, FLC, IDLE, IDLE_ANSWER, LEVEL, online, OPERATIONAL,
-    PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started, STATUS, STOPPED, TRIPPED_1,
+    ANSWER_0, ANSWER_1, BOOT_UP, configuration, CONTROL, FLC, IDLE, IDLE_ANSWER, LEVEL, online,
+    OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started, STATUS, STOPPED,
+    TRIPPED_1,
 )
 import pytest
 from saying import says
@@ -119,6 +120,14 @@ def test_node_is_only_listened_to_once_its_drive_was_stopped() -> None:
     assert talk.until(20.0) == []
     assert talk.session.facts()['nmt_state'] == 'pre-operational'
     assert talk.session.facts()['emergency'].startswith('2310h')
+
+
+def test_requests_of_tools_do_not_wait_for_a_node_that_nobody_starts() -> None:
+    talk = Conversation(configuration())
+    talk.bus_up(9.0)
+    talk.session.serve()
+    assert talk.hears(PRE_OPERATIONAL, 10.0) == []
+    assert talk.submits(read(FLC), 10.01) == [IDLE]
 
 
 def test_frames_of_other_nodes_and_malformed_ones() -> None:
