@@ -203,7 +203,7 @@ def threads() -> None:
     """Let a test have threads that are handed their events, and need no time limit."""
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def programs() -> None:
     """Let a test run programs to their ends, however long that takes."""
 

@@ -81,6 +81,7 @@ def test_channels_of_others_are_theirs(interface: str, channel: str | int) -> No
     assert check_channel(interface, channel) is None
 
 
+@pytest.mark.usefixtures('programs')
 def test_every_adapter_can_be_looked_at() -> None:
     for interface in can.interfaces.BACKENDS:
         missing = check_interface(interface)

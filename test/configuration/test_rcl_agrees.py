@@ -89,7 +89,7 @@ GARBLED = [
 
 
 @pytest.fixture(scope='module')
-def rcl(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def rcl(tmp_path_factory: pytest.TempPathFactory, programs: None) -> dict[str, Any]:
     """Return what rcl reads from every document; None where it refuses."""
     pytest.importorskip('rclpy')
     folder = tmp_path_factory.mktemp('documents')

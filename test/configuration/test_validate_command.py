@@ -215,6 +215,7 @@ def test_what_is_no_parameter_file(tmp_path: Path, content: str) -> None:
     assert all(str(path) in line for line in done.stderr.splitlines())
 
 
+@pytest.mark.usefixtures('programs')
 def test_needs_neither_ros_nor_a_bus_library(tmp_path: Path) -> None:
     code = ('import sys\n'
             'class Block:\n'
@@ -232,6 +233,7 @@ def test_needs_neither_ros_nor_a_bus_library(tmp_path: Path) -> None:
                            'unchecked\n')
 
 
+@pytest.mark.usefixtures('programs')
 def test_reader_that_went_away(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
@@ -244,6 +246,7 @@ def test_reader_that_went_away(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, '')
 
 
+@pytest.mark.usefixtures('programs')
 def test_reader_who_has_seen_enough(tmp_path: Path) -> None:
     trace = tmp_path / 'long.log'
     trace.write_text('(1.0) can0 123#00\n' * 20_000)
@@ -257,6 +260,7 @@ def test_reader_who_has_seen_enough(tmp_path: Path) -> None:
         assert (decoding.wait(60), decoding.stderr.read()) == (0, b'')
 
 
+@pytest.mark.usefixtures('programs')
 def test_outputs_that_are_closed(tmp_path: Path) -> None:
     for file, code in ((write(tmp_path), 0), (tmp_path / 'absent.yaml', 1)):
         for closed in ('>&-', '2>&-', '>&- 2>&-'):
@@ -268,6 +272,7 @@ def test_outputs_that_are_closed(tmp_path: Path) -> None:
             assert 'internal error' not in done.stdout + done.stderr
 
 
+@pytest.mark.usefixtures('programs')
 @pytest.mark.parametrize('encoding', ['ascii', 'latin-1'])
 @pytest.mark.parametrize('subcommand', ['scan', 'simulate'])
 def test_terminals_that_lack_characters(encoding: str, subcommand: str) -> None:

@@ -201,7 +201,7 @@ def test_without_ros_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) ->
         def __getattr__(self, name: str) -> object:
             raise ModuleNotFoundError('no', name='rclpy')
     monkeypatch.setitem(sys.modules, 'drive_can_bridge.ros.monitor.client', Incomplete('client'))
-    monkeypatch.setattr(command, 'SignalWatcher', lambda **_: nullcontext())
+    monkeypatch.setattr(command, 'SignalWatcher', lambda *_, **__: nullcontext())
     _, args = understood(['monitor'])
     args.clock = REAL
     with pytest.raises(DriveCanError) as said:

@@ -34,7 +34,7 @@ from drive_can_bridge.panel.feed import Feed
 from drive_can_bridge.panel.pages import application, Setting
 from drive_can_bridge.panel.server import log_to_standard_error, LOGGERS
 from drive_can_bridge.ros.monitor.client import MonitorClient
-from drive_can_bridge.ros.monitor.operations import Operations
+from drive_can_bridge.ros.monitor.client import Operations
 
 PORT = 8080
 #: s by which an event loop is late: it calls what is due within its resolution too early

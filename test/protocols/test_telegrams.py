@@ -131,7 +131,7 @@ def check_pdo(module: Any) -> None:
         if row['kind'] == 'download' and row['frame'].startswith('604#'):
             told.setdefault(int(row['index'], 16), {})[row['subindex']] = bytes.fromhex(
                 row['content'])
-    for index, make in ((0x1400, module.request_pdos), (0x1800, module.response_pdos)):
+    for index, make in ((0x1400, module.receive_pdos), (0x1800, module.transmit_pdos)):
         for number in (1, 2):
             mapped = told[index + number - 1 + module.MAPPING_OFFSET]
             entries = tuple(int.from_bytes(mapped[place], 'little')
@@ -143,7 +143,7 @@ def check_pdo(module: Any) -> None:
     for row in CIA402['vectors']:
         if row['kind'] == 'pdo':
             objects = [mapped_object(int(entry, 16)) for entry, _ in row['entries']]
-            made, = module.request_pdos(1, [1], objects)
+            made, = module.receive_pdos(1, [1], objects)
             assert made.pack([raw for _, raw in row['entries']]) == frame(row['frame']).data
 
 

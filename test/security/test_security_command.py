@@ -214,7 +214,7 @@ def monitor() -> None:
 def panel() -> None:
     """Do the same, and keep what stops drives at hand, as ``drive_can panel`` does."""
     from drive_can_bridge.ros.monitor.client import MonitorClient
-    from drive_can_bridge.ros.monitor.operations import Operations
+    from drive_can_bridge.ros.monitor.client import Operations
     source = MonitorClient(Model())
     operations = Operations(source.node)
     for _ in range(50):
