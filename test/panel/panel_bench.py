@@ -21,6 +21,7 @@ from urllib.parse import unquote_to_bytes
 
 from bridges import Bridge
 from jumping import JumpingAlarm, JumpingClock
+from leaks import KEPT
 from nicegui import app as framework, core
 from nicegui.client import Client
 from panel_builders import Answer, FILE, Visitors, write_profiles
@@ -33,8 +34,7 @@ from drive_can_bridge.panel.access import Access, Role
 from drive_can_bridge.panel.feed import Feed
 from drive_can_bridge.panel.pages import application, Setting
 from drive_can_bridge.panel.server import log_to_standard_error, LOGGERS
-from drive_can_bridge.ros.monitor.client import MonitorClient
-from drive_can_bridge.ros.monitor.client import Operations
+from drive_can_bridge.ros.monitor.client import MonitorClient, Operations
 
 PORT = 8080
 #: s by which an event loop is late: it calls what is due within its resolution too early
@@ -139,6 +139,7 @@ class House(Visitors):
         write_profiles(directory)
         self.bridge = Bridge(directory, FILE.format(directory=directory))
         self.bridge.begin()
+        KEPT.update(self.bridge.node.drives.values())
         access = Access(port=PORT)
         self.tokens = {role.value: access.tokens[role] for role in Role}
         model = Model('')

@@ -24,7 +24,7 @@ FILE = """
     diagnostics_period: 0.5
     profile_directories: ['{directory}']
     buses:
-      main: {{interface: slcan, channel: somewhere, bitrate: 500000, reconnect_period: 0.2}}
+      main: {{interface: slcan, channel: '{directory}', bitrate: 500000, reconnect_period: 0.2}}
     drives:
       conveyor:
         bus: main

@@ -4,6 +4,7 @@
 import gc
 import threading
 import time
+from weakref import WeakSet
 
 import can.interfaces.virtual
 from clients import Client, is_client, patience
@@ -26,11 +27,16 @@ def open_channels() -> list[str]:
     return [str(channel) for channel, queues in can.interfaces.virtual.channels.items() if queues]
 
 
+#: drive nodes that a web framework keeps, which is made for one application in a process
+KEPT: 'WeakSet[DriveNode]' = WeakSet()
+
+
 def drive_nodes() -> int:
     """Return how many drive nodes are still in memory."""
     gc.collect()
     # isinstance would ask each thing for its class, and some answer with an exception
-    return sum(issubclass(type(thing), DriveNode) for thing in gc.get_objects())
+    return sum(issubclass(type(thing), DriveNode) and thing not in KEPT
+               for thing in gc.get_objects())
 
 
 def assert_nothing_left(client: Client) -> None:
