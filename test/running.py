@@ -78,7 +78,7 @@ class Running:
             for child in (number / 'children').read_text().split():
                 words = Path(f'/proc/{child}/cmdline').read_bytes().decode().split('\0')
                 place = next((place for place, word in enumerate(words)
-                              if 'drive_can_bridge.demo.run' in word), None)
+                              if 'drive_can_bridge.demo.child' in word), None)
                 if place is not None:
                     program = words[place + 1]
                     found[words[place + 2] if program == 'drive_can' else program] = int(child)
