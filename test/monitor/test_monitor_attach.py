@@ -114,11 +114,13 @@ def test_keys_show_a_drive(run: Run, tmp_path: Path) -> None:
     terminal.type('\x1b[B')  # the next one
     terminal.type('\r')
     terminal.shows('/lift.*bus main, station 2.*enabled.*fault.*ready')
-    terminal.type('l')
-    terminal.shows('lift: online')
+    before = len(terminal.read())
+    terminal.type('\x1b')
+    terminal.shows('2 drives.*lift: online.*in detail', since=before)
+    terminal.type('\r')
     before = len(terminal.read())
     terminal.resize(60, 20)
-    terminal.shows('log, the newest below', since=before)
+    terminal.shows('drive lift.*esc back', since=before)
 
     # Ctrl-Z, and back
     before = len(terminal.read())
@@ -128,7 +130,7 @@ def test_keys_show_a_drive(run: Run, tmp_path: Path) -> None:
     assert terminal.echoes
     before = len(terminal.read())
     monitor.process.send_signal(signal.SIGCONT)
-    terminal.shows('log, the newest below', since=before)
+    terminal.shows('drive lift.*esc back', since=before)
     assert not terminal.echoes
 
     terminal.type('q')
