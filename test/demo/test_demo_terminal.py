@@ -97,5 +97,6 @@ def test_without_its_bridge_every_drive_is_offline_in_words(demo: Running,
 
 def test_what_the_demo_dies_of_its_processes_end(demo: Running) -> None:
     children = demo.children()
+    assert set(children) == {'monitor', 'simulate', 'drive_can_bridge'}
     demo.end(signal.SIGKILL)
     wait_for(lambda: all_gone(children), 'the end of all processes')
