@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Locks that all processes of this host respect, of any user.
+Locks that all processes of this host respect, of any user, and which bridges have drives here.
 
 A lock is a socket in the abstract name space of Linux, bound to a name that is made of its key.
 The kernel lets one process have a name, and takes it away when that process ends, however it ends.
@@ -11,10 +11,8 @@ names belong to the network namespace, as CAN interfaces do.
 Beside each lock its holder has a second name that says who it is; ``/proc/net/unix`` shows it to
 everybody.
 
-Which bridges have drives on this host, whether they answer or not.
-
-Beside its locks (:mod:`.locks`) a bridge has a name in the same name space that says what it is
-called in the ROS graph. It goes with the process, as the locks do.
+Beside its locks a bridge has a name in the same name space that says what it is called in the ROS
+graph. It goes with the process, as the locks do: whether it answers or not, it can be named.
 """
 
 from collections.abc import Sequence

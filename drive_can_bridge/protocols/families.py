@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The table of protocol families. A new family adds one row."""
+"""The table of protocol families: a row each, and another one in simulation/simulation.py."""
 
 from collections.abc import Sequence
 

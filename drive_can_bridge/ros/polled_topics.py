@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Command subscriptions that are taken by hand, when the exchange comes to it.
+Command subscriptions that are taken by hand, when the exchange comes to it, but for old commands.
 
 Nor does anybody wait for their events, such as a publisher of other quality: with Fast DDS that
 wait ends with every message, which at 3,000 commands/s costs more than everything else. They are

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Which buses are the same one, as far as that can be told without opening them.
+Which buses are the same one, as far as that can be told without opening them; locks of ports.
 
 A serial port has many names: the device, the links of udev below ``/dev/serial``, links of one's
 own. They are the same port when the device is the same. While there is no device (an adapter that

@@ -2,6 +2,8 @@
 """
 The telegrams of the DataModel protocol with 29-bit identifiers: bytes to values and back.
 
+Process data, the words of a cyclic telegram, are packed in :mod:`.process_words`.
+
 Source: chapter CANbus of the drive manual, section "Protocollo CAN con ID ESTESO" (the pages carry
 no numbers). Identifier:
 
