@@ -14,10 +14,11 @@ here stands what every such session has to see to, and what is not answered in :
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 import math
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
@@ -54,7 +55,8 @@ class Teller(Protocol[TelegramT]):
         """Handle the last cycle before silence; that of a stop was answered or waited for."""
 
 
-class Cycle(NamedTuple, Generic[TelegramT]):
+@dataclass(frozen=True)
+class Cycle(Generic[TelegramT]):
     """
     What cycles hold until something changes.
 
