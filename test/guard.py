@@ -19,7 +19,7 @@ from jumping import TurnThread
 import pytest
 
 #: marks of tests that may start anything
-MARKS = ('real', 'browser', 'linter', 'socketcan')
+MARKS = ('real', 'browser', 'linter')
 #: how threads and processes begin -> the fixture of those that need no time limit
 BEGINNINGS = {'threads': [(threading.Thread, 'start')],
               'programs': [(subprocess.Popen, '__init__'), (os, 'fork'), (os, 'posix_spawn')]}

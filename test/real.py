@@ -3,11 +3,12 @@
 Which tests run against the wall clock, and which of them ``make test`` tells.
 
 A test is *real* when its outcome hangs on how long things take: processes that talk to each other,
-what DDS does, signals, threads that wait for a time of this machine's clock. Where that follows
-from what a test uses, its fixtures say so (:data:`FIXTURES`); otherwise the test has the mark
-``real``. All of them are told by ``.ci/run``, one after the other. ``make test`` tells those of
-:data:`TOLD`: each executable and each fact about the machine once; the others have the mark
-``ci``. As a program (``real.py [all]``) it prints in which files those are that are told.
+what DDS does, signals, buses of the kernel, threads that wait for a time of this machine's clock.
+Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
+say so; otherwise the test has the mark ``real``. All of them are told by ``.ci/run``, one after
+the other. ``make test`` tells those of :data:`TOLD`: each executable and each fact about the
+machine once; the others have the mark ``ci``. As a program (``real.py [all]``) it prints in which
+files those are that are told.
 """
 
 from pathlib import Path
@@ -72,6 +73,8 @@ def mark(item: 'pytest.Item') -> None:
     for directory, wanted in FIXTURES.items():
         if item.nodeid.startswith(directory) and wanted.intersection(fixtures):
             item.add_marker('real')
+    if item.get_closest_marker('socketcan') is not None:    # a bus of the kernel
+        item.add_marker('real')
     if item.get_closest_marker('real') is not None and not any(
             item.nodeid == told or item.nodeid.startswith((f'{told}[', f'{told}::'))
             for told in TOLD):

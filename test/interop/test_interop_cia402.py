@@ -229,7 +229,7 @@ class TerminalBus(can.BusABC):
 
 @pytest.fixture(params=[
     'virtual', pytest.param('serial', marks=pytest.mark.real),
-    pytest.param('socketcan', marks=(pytest.mark.real, *on_socketcan))])
+    pytest.param('socketcan', marks=on_socketcan)])
 def place(request: pytest.FixtureRequest, channel: str, world: World | None,
           ) -> Iterator[tuple[BusConfiguration, Any]]:
     """Return a bus as the bridge opens it, and a network of the other stack on it."""
