@@ -110,7 +110,7 @@ def spread(periods: Sequence[float]) -> list[float]:
     milliseconds, and again in this process, where each answer is published before the next one is
     looked at. So drives of the same period are spread over it; but no finer than ``SLOT``,
     because every turn costs a wake-up, and five exchanges at 1 Mbit/s fill a slot
-    (docs/performance.md has what other slots cost).
+    (bench/README.md has what other slots cost).
 
     Drives of a period are taken in the order given; as many of them as need be share a slot.
     """

@@ -253,8 +253,7 @@ class CyclicExchange(Generic[TelegramT]):
         One that may start somebody counts even alone; otherwise a cycle counts only when the bus
         has taken every frame of it.
         """
-        session, cycle = self._session, self._cycle
-        runs = cycle is not None and cycle.runs
+        session, runs = self._session, self.runs
         self._frames_out -= 1
         if not sent:
             self._whole = False

@@ -23,6 +23,8 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
@@ -126,6 +128,16 @@ class Node:
         if self.emergency is None:
             return sentences.emergency_over()
         return sentences.emergency(self.emergency.text)
+
+    def take_emergency(self, data: bytes, report: Reporter) -> None:
+        """
+        Take the data of an emergency message, and tell what is new about it.
+
+        :raises RemoteProtocolError: it is malformed.
+        """
+        text = self.receive_emergency(network.decode_emergency(data))
+        if text:
+            report.note(Noted(text, warning=self.emergency is not None))
 
     def handle_timer(self, now: float) -> Change:
         """Do what is due."""

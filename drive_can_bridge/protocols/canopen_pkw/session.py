@@ -238,9 +238,7 @@ class PkwSession(Session):
         if base == network.HEARTBEAT_BASE:
             self._take_heartbeat(network.decode_heartbeat(data), now)
         elif base == network.EMERGENCY_BASE:
-            text = self._node.receive_emergency(network.decode_emergency(data))
-            if text:
-                self.report.note(Noted(text, warning=self._node.emergency is not None))
+            self._node.take_emergency(data, self.report)
         else:
             return False
         return True

@@ -347,9 +347,7 @@ class Cia402Session(Session):
             elif identifier == network.HEARTBEAT_BASE + self.configuration.station:
                 self._take_heartbeat(network.decode_heartbeat(data), now)
             elif identifier == network.EMERGENCY_BASE + self.configuration.station:
-                text = self._node.receive_emergency(network.decode_emergency(data))
-                if text:
-                    self.report.note(Noted(text, warning=self._node.emergency is not None))
+                self._node.take_emergency(data, self.report)
         except Unasked as error:
             self.report.unasked(sentences.malformed(str(error)), self._channel.late(
                 now - age, partial(self._courier.answers, data)), now)
@@ -359,7 +357,7 @@ class Cia402Session(Session):
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
         exchange, answers, count = self.exchange, self._answers, len(self._responses)
-        if not self.exchange.cycling:
+        if not exchange.cycling:
             answers.book.take_stale()
             return
         if self._synchronous and not answers.wanted:
@@ -380,7 +378,7 @@ class Cia402Session(Session):
             raws = tuple(raw for each in range(count) for raw in self._set[each])
             self._set.clear()
         answers.answered(received_at)
-        if not self._synchronous and exchange.timer.due < math.inf:
+        if not self._synchronous and exchange.cycling:
             self._expect_set(now)
         if not self.online and self.stage is Stage.RUNNING:
             if exchange.leaving:    # it is back
