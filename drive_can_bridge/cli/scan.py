@@ -26,7 +26,7 @@ from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scanner import Scout, Sighting
+from drive_can_bridge.protocols.scanner import Scanner, Sighting
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
@@ -56,7 +56,7 @@ class Survey:
         self._bus = bus
         self._port = port
         self._clock = clock
-        self.scouts: dict[str, Scout] = {name: family.make_scout()
+        self.scanners: dict[str, Scanner] = {name: family.make_scanner()
                                          for name, family in FAMILIES.items()}
         self.frames = 0
         self.trouble = ''
@@ -64,23 +64,23 @@ class Survey:
     @property
     def master(self) -> str:
         """What somebody else asks; '': nobody does."""
-        return next((scout.master for scout in self.scouts.values() if scout.master), '')
+        return next((scanner.master for scanner in self.scanners.values() if scanner.master), '')
 
     @property
     def nodes(self) -> dict[int, str]:
         """CANopen nodes, whatever they are."""
-        return {node: text for scout in self.scouts.values()
-                for node, text in scout.nodes.items()}
+        return {node: text for scanner in self.scanners.values()
+                for node, text in scanner.nodes.items()}
 
     @property
     def sightings(self) -> list[Sighting]:
         """All drives found, by family and station."""
-        return [scout.sightings[station] for scout in self.scouts.values()
-                for station in sorted(scout.sightings)]
+        return [scanner.sightings[station] for scanner in self.scanners.values()
+                for station in sorted(scanner.sightings)]
 
-    def forbidden(self, scout: Scout) -> bool:
-        """Tell whether somebody is there who might obey what a scout asks."""
-        return not scout.unmistakable and bool(self.nodes)
+    def forbidden(self, scanner: Scanner) -> bool:
+        """Tell whether somebody is there who might obey what a scanner asks."""
+        return not scanner.unmistakable and bool(self.nodes)
 
     def listen(self, seconds: float) -> None:
         """
@@ -101,18 +101,18 @@ class Survey:
 
         :raises BusUnavailable: the bus is lost.
         """
-        scout = self.scouts[protocol]
-        scout.begin()
+        scanner = self.scanners[protocol]
+        scanner.begin()
         due = self._clock()
         quiet_at = 0.0
         refused = 0
         # a node that was asleep may boot meanwhile
-        while not self.master and not self.trouble and not self.forbidden(scout):
+        while not self.master and not self.trouble and not self.forbidden(scanner):
             now = self._clock()
             if now < due:
                 self._hear(min(_PATIENCE, due - now))
                 continue
-            question = scout.take_question()
+            question = scanner.take_question()
             if question is None:
                 quiet_at = quiet_at or now + LAST_ANSWER
                 if now >= quiet_at:
@@ -121,7 +121,7 @@ class Survey:
                 continue
             quiet_at = 0.0
             due = now + self._pause(question)
-            scout.asked(question, now)
+            scanner.asked(question, now)
             try:
                 self._port.send(question, _SEND_TIMEOUT)
                 refused = 0
@@ -141,8 +141,8 @@ class Survey:
             return
         self.frames += 1
         now = self._clock() - self._port.age
-        for scout in self.scouts.values():
-            scout.hear(frame, now)
+        for scanner in self.scanners.values():
+            scanner.hear(frame, now)
 
 
 #: shipped tables for families of one maker, and an exchange that all their drives know
@@ -171,7 +171,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     Write a parameter file that ``validate`` accepts, after the tables that it names.
 
     :param sightings: at least one.
-    :param settings: for each sighting, what its scout knows.
+    :param settings: for each sighting, what its scanner knows.
     :return: the files written.
     :raises OSError: they cannot be written.
     """
@@ -221,7 +221,7 @@ def _write(path: Path, lines: Sequence[str]) -> None:
 
 
 #: families whose reads may be commands of others: only when named
-_NAMED = tuple(name for name, family in FAMILIES.items() if not family.make_scout().unmistakable)
+_NAMED = tuple(name for name, family in FAMILIES.items() if not family.make_scanner().unmistakable)
 _COLUMNS = ('protocol', 'station', 'how sure', 'what it said')
 
 
@@ -281,7 +281,7 @@ def run(args: Namespace) -> int:
     if args.output is not None and not _may_write(args.output, yes=args.yes):
         return FAILED
     for name in args.protocols:     # before anything is sent
-        agree_to_hazard(f'{name}: {FAMILIES[name].make_scout().hazard}',
+        agree_to_hazard(f'{name}: {FAMILIES[name].make_scanner().hazard}',
                         f'Ask {name} all the same?', yes=args.yes or args.passive,
                         who=f'--protocols {name}')
     return _scan(args, bus)
@@ -313,7 +313,7 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
     elif args.output is not None:
         for path in write_parameter_file(
                 args.output, bus, survey.sightings,
-                [survey.scouts[each.protocol].settings(each.station)
+                [survey.scanners[each.protocol].settings(each.station)
                  for each in survey.sightings]):
             complain(f'written: {path}')
         complain(f'next: drive_can validate {shlex.quote(str(args.output))}')
@@ -325,12 +325,12 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
 def _ask(args: Namespace, survey: Survey) -> list[str]:
     """Ask; return the families that were asked."""
     asked = []
-    for name in [*(each for each in FAMILIES if survey.scouts[each].unmistakable),
+    for name in [*(each for each in FAMILIES if survey.scanners[each].unmistakable),
                  *args.protocols]:
-        if not survey.master and not survey.forbidden(survey.scouts[name]):
+        if not survey.master and not survey.forbidden(survey.scanners[name]):
             asked.append(name)
             survey.ask(name)
-        if survey.forbidden(survey.scouts[name]):
+        if survey.forbidden(survey.scanners[name]):
             complain(f'{name} is not asked: there is a CANopen node '
                      f'({", ".join(map(str, survey.nodes))}), which might take its reads for '
                      'process data')

@@ -19,7 +19,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
 from drive_can_bridge.protocols.scanner import Prober
-from drive_can_bridge.protocols.scanner import Scout
+from drive_can_bridge.protocols.scanner import Scanner
 
 
 class Complaint(NamedTuple):
@@ -70,7 +70,7 @@ class Talk(NamedTuple):
 
     session: Callable[[DriveConfiguration], Session]
     observer: Callable[[DriveConfiguration, Emit], DriveObserver]
-    scout: Callable[[], Scout]
+    scanner: Callable[[], Scanner]
     prober: Callable[[DriveConfiguration], Prober]
 
 
@@ -217,9 +217,9 @@ class Family(ABC):
         """
         return [self.talk().observer(drive, emit) for drive in drives]
 
-    def make_scout(self) -> Scout:
+    def make_scanner(self) -> Scanner:
         """Make what looks for drives of this family on a bus that nobody has described."""
-        return self.talk().scout()
+        return self.talk().scanner()
 
     def make_prober(self, drive: DriveConfiguration) -> Prober:
         """Make what settles the open keys of a drive by harmless reads."""

@@ -2,9 +2,9 @@
 """
 Finding drives on a bus that nobody has described: what a family recognises, and what it may ask.
 
-A *scout* hears every frame and notes which stations of its family talk, and whether a master asks
-them. What it may ask are reads; but on 11-bit identifiers a read of one family is a command of
-another, so that each scout says what its questions would mean to others.
+A *scanner* hears every frame and notes which stations of its family talk, and whether a master
+asks them. What it may ask are reads; but on 11-bit identifiers a read of one family is a command
+of another, so that each scanner says what its questions would mean to others.
 
 A *prober* settles by harmless reads what the manuals leave open of a drive that is configured. It
 is a conversation as a generator: it yields questions and is sent the answer, or None where there
@@ -49,7 +49,7 @@ class Sighting(NamedTuple):
     certainty: Certainty
 
 
-class Scout(ABC):
+class Scanner(ABC):
     """
     Looks for the drives of one family.
 

@@ -20,7 +20,7 @@ from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scanner import Certainty, Scout
+from drive_can_bridge.protocols.scanner import Certainty, Scanner
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint
@@ -63,7 +63,7 @@ class Bench(EndPoint):
         return Survey(BusConfiguration('main', 'virtual', 'x', BITRATE), self, self.clock)
 
 
-SAFE = [name for name, family in FAMILIES.items() if family.make_scout().unmistakable]
+SAFE = [name for name, family in FAMILIES.items() if family.make_scanner().unmistakable]
 NAMED = [name for name in FAMILIES if name not in SAFE]
 CROWD = (
     *(datamodel_extended(station) for station in range(128)),
@@ -142,15 +142,15 @@ def frame_of(text: str) -> Frame:
     return Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) == 8)
 
 
-def scouted(protocol: str, *frames: tuple[float, str]) -> Scout:
-    scout = FAMILIES[protocol].make_scout()
+def scanned(protocol: str, *frames: tuple[float, str]) -> Scanner:
+    scanner = FAMILIES[protocol].make_scanner()
     for time, text in frames:
-        scout.hear(frame_of(text), time)
-    return scout
+        scanner.hear(frame_of(text), time)
+    return scanner
 
 
 def heard(protocol: str, *frames: tuple[float, str]) -> list[str]:
-    return [sighting.text for sighting in scouted(protocol, *frames).sightings.values()]
+    return [sighting.text for sighting in scanned(protocol, *frames).sightings.values()]
 
 
 def test_one_pair_of_others_may_be_chance() -> None:
@@ -184,17 +184,17 @@ ANSWER_1 = '103FFFF0#0102A5A5A5A5A5A5'
 ])
 def test_what_nobody_asked_for_makes_no_drive(text: str) -> None:
     for protocol in FAMILIES:
-        scout = scouted(protocol, *((0.01 * place, text) for place in range(5)))
-        assert not scout.sightings and not scout.master
-        assert not any(scout.settings(station).get('remarks') for station in (1, 2, 42))
+        scanner = scanned(protocol, *((0.01 * place, text) for place in range(5)))
+        assert not scanner.sightings and not scanner.master
+        assert not any(scanner.settings(station).get('remarks') for station in (1, 2, 42))
 
 
 def test_noise_makes_no_drive() -> None:
     noise = Random(1)
-    scout = FAMILIES['datamodel_extended'].make_scout()
+    scanner = FAMILIES['datamodel_extended'].make_scanner()
     for place in range(3000):
-        scout.hear(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
-    assert not scout.sightings
+        scanner.hear(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
+    assert not scanner.sightings
 
 
 def test_one_frame_before_all_stations_are_asked_makes_no_drive() -> None:
@@ -220,20 +220,20 @@ def test_a_29_bit_drive_of_another_master(request_: str, answer: str, text: str,
     other = (0.5, '0548B4E1#0000000000000000')
     for frames in (pair, (*pair, pair[1]), (*pair, *late), (*pair, other, again[1])):
         assert heard('datamodel_extended', *frames) == []
-    scout = scouted('datamodel_extended', *pair, *again)
-    [sighting] = scout.sightings.values()
+    scanner = scanned('datamodel_extended', *pair, *again)
+    [sighting] = scanner.sightings.values()
     assert sighting[2:] == (text, certainty)
-    assert scout.master == f'requests to station {sighting.station} of datamodel_extended'
+    assert scanner.master == f'requests to station {sighting.station} of datamodel_extended'
 
 
 def test_a_mailbox_that_another_master_asks_for() -> None:
     pair = (0.0, '605#4003160100000000'), (0.01, '585#4303160120010030')
     other = (0.02, '605#4003160000000000')
     assert heard('canopen_pkw', *pair) == heard('canopen_pkw', *pair, other, pair[1]) == []
-    scout = scouted('canopen_pkw', *pair, *pair)
-    assert [sighting.certainty for sighting in scout.sightings.values()] == [Certainty.CERTAIN]
+    scanner = scanned('canopen_pkw', *pair, *pair)
+    assert [sighting.certainty for sighting in scanner.sightings.values()] == [Certainty.CERTAIN]
     # whatever it is, it is there: nothing is asked that it might take for a command
-    assert list(scouted('canopen_pkw', pair[1]).nodes) == [5]
+    assert list(scanned('canopen_pkw', pair[1]).nodes) == [5]
 
 
 @pytest.mark.parametrize('protocol', ['canopen_pkw', 'cia402'])
@@ -260,17 +260,17 @@ def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
     assert not [frame for _, frame in bench.sent[asked:] if frame.identifier == 0x606 and (
         frame.data[1:4].hex() == '001000')]
     assert not survey.master
-    assert survey.scouts['cia402'].settings(6) == {'mode': 'pv'}
+    assert survey.scanners['cia402'].settings(6) == {'mode': 'pv'}
 
 
 def test_a_servo_that_another_master_drives() -> None:
     cycle = ((0.0, '205#0F0000000000'), (0.0, '080#'), (0.001, '185#371200000000'))
     assert heard('cia402', *cycle, *cycle) == []
-    scout = scouted('cia402', *cycle, *cycle, *cycle)
-    assert list(scout.sightings.values()) == [(
+    scanner = scanned('cia402', *cycle, *cycle, *cycle)
+    assert list(scanner.sightings.values()) == [(
         'cia402', 5, 'status word 1237h (operation enabled), answered with SYNC',
         Certainty.LIKELY)]
-    assert scout.master == 'process data for node 5'
+    assert scanner.master == 'process data for node 5'
     # without SYNC, and with words that are none
     assert heard('cia402', *(cycle[0], cycle[2]) * 9) == []
     assert heard('cia402', *((0.0, '205#7F0400000000'), *cycle[1:]) * 9) == []
@@ -278,17 +278,17 @@ def test_a_servo_that_another_master_drives() -> None:
 
 
 def test_a_node_of_another_profile_is_no_drive() -> None:
-    scout = scouted('cia402', (0.0, '605#4000100000000000'), (0.01, '585#4300100091010200'),
+    scanner = scanned('cia402', (0.0, '605#4000100000000000'), (0.01, '585#4300100091010200'),
                     (0.1, '585#8000100000000206'), (0.2, '585#43'))
-    assert not scout.sightings
+    assert not scanner.sightings
 
 
 def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:
-    scout = FAMILIES['datamodel_extended'].make_scout()
-    scout.asked(frame_of('004007A4#0000000000000000'), 0.0)
-    scout.hear(frame_of('104007A4#0032003300000000'), 0.25)
-    assert [sighting.certainty for sighting in scout.sightings.values()] == [Certainty.CERTAIN]
-    assert not scout.master
+    scanner = FAMILIES['datamodel_extended'].make_scanner()
+    scanner.asked(frame_of('004007A4#0000000000000000'), 0.0)
+    scanner.hear(frame_of('104007A4#0032003300000000'), 0.25)
+    assert [sighting.certainty for sighting in scanner.sightings.values()] == [Certainty.CERTAIN]
+    assert not scanner.master
 
 
 @pytest.mark.parametrize('protocol', list(FAMILIES))
@@ -433,13 +433,13 @@ def test_nothing_found_nothing_written(tmp_path: Path,
     ('0000000000000000', '0000000000000000', [])])
 def test_what_is_written_is_valid_whatever_the_maps(
         tmp_path: Path, request_map: str, response_map: str, unfit: list[str]) -> None:
-    scout = FAMILIES['datamodel_extended'].make_scout()
+    scanner = FAMILIES['datamodel_extended'].make_scanner()
     for identifier, data in ((0x104007A4, request_map), (0x104007E4, response_map)):
-        scout.asked(Frame(identifier & ~DIR, bytes(8), True), 1.0)
-        scout.hear(Frame(identifier, bytes.fromhex(data), True), 1.0)
+        scanner.asked(Frame(identifier & ~DIR, bytes(8), True), 1.0)
+        scanner.hear(Frame(identifier, bytes.fromhex(data), True), 1.0)
     output = tmp_path / 'found.yaml'
     write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', 500_000),
-                         [scout.sightings[2]], [scout.settings(2)])
+                         [scanner.sightings[2]], [scanner.settings(2)])
     assert drive_can('validate', output) == 0
     remarks = [line.strip() for line in output.read_text(encoding='utf-8').splitlines()
                if 'cannot be exchanged' in line]

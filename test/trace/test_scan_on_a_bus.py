@@ -37,7 +37,7 @@ ALL = {(drive.protocol, drive.station) for drive in SHIPPED}
 NODES = {drive.name: (drive.protocol, drive.station) for drive in SHIPPED
          if any(claim.shared == 'NMT' for claim in FAMILIES[drive.protocol].claims(drive))}
 UNMISTAKABLE = {(protocol, station) for protocol, station in ALL
-                if FAMILIES[protocol].make_scout().unmistakable}
+                if FAMILIES[protocol].make_scanner().unmistakable}
 
 #: against the wall clock (test/real.py)
 pytestmark = [pytest.mark.real, pytest.mark.timeout(5 * DEADLINE)]

@@ -152,10 +152,9 @@ class Cannord(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
-        from drive_can_bridge.protocols.cannord.scanner import CannordProber
-        from drive_can_bridge.protocols.cannord.scanner import CannordScout
+        from drive_can_bridge.protocols.cannord.scanner import CannordProber, CannordScanner
         from drive_can_bridge.protocols.cannord.session import CannordSession
-        return Talk(CannordSession, CannordObserver, CannordScout, CannordProber)
+        return Talk(CannordSession, CannordObserver, CannordScanner, CannordProber)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         from drive_can_bridge.protocols.cannord.session import make_group

@@ -24,7 +24,7 @@ from drive_can_bridge.protocols.cannord.parameter_frame import (
 from drive_can_bridge.protocols.cannord.process_data import decode_main
 from drive_can_bridge.protocols.cannord.states import ACKNOWLEDGE, QUICK_STOP, READY, RUN, state_of
 from drive_can_bridge.protocols.scanner import (
-    conclude, Conversation, Finding, Prober, Question, Scout, spaced,
+    conclude, Conversation, Finding, Prober, Question, Scanner, spaced,
 )
 
 
@@ -49,7 +49,7 @@ _BEYOND = 0xFF
 _NUMBER_AND_TASK = slice(0, 2)
 
 
-class CannordScout(Scout):
+class CannordScanner(Scanner):
     """Recognises process data and parameter frames of 11 bits, and reads one parameter."""
 
     protocol = 'cannord'

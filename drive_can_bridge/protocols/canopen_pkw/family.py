@@ -129,10 +129,9 @@ class CanopenPkw(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver
-        from drive_can_bridge.protocols.canopen_pkw.scanner import PkwProber
-        from drive_can_bridge.protocols.canopen_pkw.scanner import CanopenScout
+        from drive_can_bridge.protocols.canopen_pkw.scanner import CanopenScanner, PkwProber
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
-        return Talk(PkwSession, PkwObserver, CanopenScout, PkwProber)
+        return Talk(PkwSession, PkwObserver, CanopenScanner, PkwProber)
 
     def make_observers(self, drives: Sequence[DriveConfiguration], emit: Emit,
                        ) -> list[DriveObserver]:

@@ -27,7 +27,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.refusals import describe
 from drive_can_bridge.protocols.scanner import (
-    Certainty, conclude, Conversation, Finding, Prober, Question, Scout, spaced,
+    Certainty, conclude, Conversation, Finding, Prober, Question, Scanner, spaced,
 )
 
 
@@ -51,7 +51,7 @@ _SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-star
 _Asking = Generator[Question, Frame | None, tuple[bytes, Message] | None]
 
 
-class CanopenScout(Scout):
+class CanopenScanner(Scanner):
     """
     Recognises heartbeats, boot-up messages, mailbox traffic and SDO answers.
 

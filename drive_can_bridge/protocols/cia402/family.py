@@ -176,10 +176,9 @@ class Cia402(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cia402.observer import Cia402Observer
-        from drive_can_bridge.protocols.cia402.scanner import Cia402Prober
-        from drive_can_bridge.protocols.cia402.scanner import Cia402Scout
+        from drive_can_bridge.protocols.cia402.scanner import Cia402Prober, Cia402Scanner
         from drive_can_bridge.protocols.cia402.session import Cia402Session
-        return Talk(Cia402Session, Cia402Observer, Cia402Scout, Cia402Prober)
+        return Talk(Cia402Session, Cia402Observer, Cia402Scanner, Cia402Prober)
 
     def make_sessions(self, drives: Sequence[DriveConfiguration]) -> list[Session]:
         """Make the sessions of one bus, which share SYNC and the heartbeat of the bridge."""

@@ -27,7 +27,7 @@ from drive_can_bridge.protocols.cia402.states import (
     ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION,
 )
 from drive_can_bridge.protocols.scanner import (
-    Certainty, Conversation, Finding, Prober, Question, Scout,
+    Certainty, Conversation, Finding, Prober, Question, Scanner,
 )
 from drive_can_bridge.protocols.telegrams import Direction
 
@@ -47,7 +47,7 @@ _CONSUMER_HEARTBEAT = 0x1016
 _SILENT = 'no answer: check station, bit rate and power'
 
 
-class Cia402Scout(Scout):
+class Cia402Scanner(Scanner):
     """
     Recognises what nodes answer to anybody's reads of 1000h.
 
@@ -64,7 +64,7 @@ class Cia402Scout(Scout):
         self._cycles: Counter[int] = Counter()      # by identifier; SYNC among them
 
     def begin(self) -> None:
-        # what another scout's question brought is known already
+        # what another scanner's question brought is known already
         self._questions += [sdo.encode_upload(node, sdo.DEVICE_TYPE, 0) for node in range(
             1, network.NODE_MAX + 1) if node not in self._types]
         for node in self.sightings:

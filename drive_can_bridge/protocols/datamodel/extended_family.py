@@ -53,9 +53,8 @@ class DataModelExtended(Family):
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
-        from drive_can_bridge.protocols.datamodel.scanner import extended_prober
-        from drive_can_bridge.protocols.datamodel.scanner import ExtendedScout
-        return Talk(ExtendedSession, ExtendedObserver, ExtendedScout, extended_prober)
+        from drive_can_bridge.protocols.datamodel.scanner import extended_prober, ExtendedScanner
+        return Talk(ExtendedSession, ExtendedObserver, ExtendedScanner, extended_prober)
 
     def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         offset = drive.options.parameter_offset

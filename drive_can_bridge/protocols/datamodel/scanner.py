@@ -21,7 +21,7 @@ from drive_can_bridge.protocols.datamodel.mapping import (
 )
 from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
 from drive_can_bridge.protocols.scanner import (
-    Certainty, Conversation, Finding, Prober, Question, Scout,
+    Certainty, Conversation, Finding, Prober, Question, Scanner,
 )
 
 
@@ -36,7 +36,7 @@ _CANNORD_TASKS = range(0x200, 0x400)
 _Asking = Generator[Question, Frame | None, tuple[int, ...] | None]
 
 
-class ExtendedScout(Scout):
+class ExtendedScanner(Scanner):
     """
     Recognises 29-bit identifiers, and reads both maps of each station.
 
@@ -112,7 +112,7 @@ def _exchangeable(numbers: Sequence[int]) -> list[int]:
     return [] if unfit else list(numbers)
 
 
-class StandardScout(Scout):
+class StandardScanner(Scanner):
     """
     Recognises the default identifiers of 11 bits, and reads P30 of each station.
 

@@ -49,9 +49,8 @@ class DataModelStandard(Family):
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
         from drive_can_bridge.protocols.datamodel.observer import StandardObserver
-        from drive_can_bridge.protocols.datamodel.scanner import standard_prober
-        from drive_can_bridge.protocols.datamodel.scanner import StandardScout
-        return Talk(StandardSession, StandardObserver, StandardScout, standard_prober)
+        from drive_can_bridge.protocols.datamodel.scanner import standard_prober, StandardScanner
+        return Talk(StandardSession, StandardObserver, StandardScanner, standard_prober)
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         bases = _bases(drive)
