@@ -184,7 +184,7 @@ class BusExchange:
     :param open_bus: opens the bus; None: python-can, by the configuration.
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
-    :ivar errand: what its timer thread sees to beside its drives; to be set before ``open``.
+    :ivar errand: what its threads see to beside its drives; to be set before ``open``.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],

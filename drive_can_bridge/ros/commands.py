@@ -3,8 +3,8 @@
 Setpoint commands: taken by the exchange at its tick, not by callbacks.
 
 A callback per message makes an executor pay for its whole wait set each time, and a flood of
-commands would starve the services. Here the exchange's timer thread takes what is waiting just
-before a cycle: the newest command goes out in the very next frame, and a flood costs nothing but
+commands would starve the services. Here the thread that begins a cycle takes what is waiting just
+before it: the newest command goes out in the very next frame, and a flood costs nothing but
 the take of as many as can wait (:mod:`.polled_topics`). The subscriptions stand in a callback
 group that no executor ever runs.
 """

@@ -4,8 +4,8 @@ All joints of a bridge in one message: ``~/joint_states`` and ``~/joint_commands
 
 Drives answer one after the other, each with a stamp of its own; what reads joints wants all of
 them in one message (the hardware interface of ros2_control keeps the latest message only). So at a
-rate of its own the newest sample of each is taken together, under the stamp of the oldest; by the
-timer thread of an exchange, which is awake in any case (``exchange.Errand``).
+rate of its own the newest sample of each is taken together, under the stamp of the oldest; by a
+thread of an exchange, which is awake in any case (``exchange.Errand``).
 
 It always names the same joints: the hardware interface copies a message while it reads the one
 before, and fails when the number of names has changed. A joint whose drive is not online has NaN
