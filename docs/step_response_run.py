@@ -44,8 +44,8 @@ class Commander:
     def take_commands(self, now: float) -> None:
         """Say what the drive is to do now."""
         rpm = [rpm for since, rpm in STEPS if now - self._begun >= since][-1]
-        self._session.users.command(0, rpm, now)
-        self._session.users.command(1, 0.0 if now - self._begun < STEPS[1][0] else 50.0, now)
+        self._session.services.command(0, rpm, now)
+        self._session.services.command(1, 0.0 if now - self._begun < STEPS[1][0] else 50.0, now)
 
     def nothing(self, *_: object, **__: object) -> None:
         """Take no notice."""

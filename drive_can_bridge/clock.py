@@ -21,7 +21,7 @@ _CLOCK = getattr(time, 'CLOCK_BOOTTIME', time.CLOCK_MONOTONIC)
 Item = TypeVar('Item')
 
 
-class Alarm(Protocol):
+class WakeEvent(Protocol):
     """Wakes one sleeper. A ring while nobody sleeps is kept for the next; several count once."""
 
     def wait(self, until: float = math.inf) -> bool:
@@ -71,7 +71,7 @@ class Clock(Protocol):
     def used(self) -> float:
         """Return the s of a processor that this thread has used."""
 
-    def alarm(self) -> Alarm:
+    def wake_event(self) -> WakeEvent:
         """Return what a thread waits by, for a time or for somebody."""
 
     def lock(self) -> Lock:
@@ -86,10 +86,10 @@ class Clock(Protocol):
 
 class Bell:
     """
-    An alarm for half of what ``threading.Event`` costs.
+    A wake event for half of what ``threading.Event`` costs.
 
     That makes a new lock for every wait and takes three of them; that is more CPU time than the
-    exchange needs to send a frame. Here it is one lock, which is free while the alarm rings.
+    exchange needs to send a frame. Here it is one lock, which is free while the event rings.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -161,7 +161,7 @@ class SteadyClock:
         """Return the s of a processor that this thread has used."""
         return time.thread_time()
 
-    def alarm(self) -> Bell:
+    def wake_event(self) -> Bell:
         """Return what a thread waits by."""
         return Bell(self.now)
 
@@ -189,7 +189,7 @@ class Mailbox(Generic[Item]):
         self._now = clock.now
         self._items: deque[Item] = deque()
         self._limit = limit
-        self._alarm = clock.alarm()
+        self._wake = clock.wake_event()
 
     def put(self, item: Item, *, always: bool = False) -> bool:
         """
@@ -200,7 +200,7 @@ class Mailbox(Generic[Item]):
         if len(self._items) >= self._limit and not always:
             return False
         self._items.append(item)
-        self._alarm.ring()
+        self._wake.ring()
         return True
 
     def get(self, until: float = math.inf) -> Item:
@@ -210,7 +210,7 @@ class Mailbox(Generic[Item]):
         :raises TimeoutError: nothing came until then.
         """
         while not self._items:
-            if not self._alarm.wait(until) and not self._items:
+            if not self._wake.wait(until) and not self._items:
                 raise TimeoutError
         return self._items.popleft()
 

@@ -297,7 +297,7 @@ class AnyOrder(RuleBasedStateMachine):
     def submit(self, request: ReadRequest | WriteRequest) -> None:
         waiting = len(self.open)
         self.open.append(request)
-        self.session.users.submit(request, self.now)
+        self.session.services.submit(request, self.now)
         refused = any(
             isinstance(event, RequestCompleted) and event.request is request
             and Failure(sentences.busy()) in event.outcomes
@@ -311,10 +311,10 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(action=st.sampled_from(ControlAction))
     def control(self, action: ControlAction) -> None:
-        refusal = self.session.users.control_refusal(action)
+        refusal = self.session.services.control_refusal(action)
         request = ControlRequest(action)
         self.control_requests.append(request)
-        self.session.users.submit(request, self.now)
+        self.session.services.submit(request, self.now)
         if not refusal:
             assert self.observer.active
             if self.session.control is None:
@@ -437,7 +437,7 @@ class AnyOrder(RuleBasedStateMachine):
     def counts_are_right(self) -> None:
         if self.session is None:
             return
-        assert self.session.users.waiting <= 64
+        assert self.session.services.waiting <= 64
         assert self.session.online == self.observer.online or not self.observer.active
         if not self.observer.bus:
             assert not self.session.online

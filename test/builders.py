@@ -204,20 +204,20 @@ class Conversation:
 
     def submits(self, request: Request, now: float) -> list[str]:
         self.now = now
-        self.session.users.submit(request, now)
+        self.session.services.submit(request, now)
         return self.sent()
 
     def asks(self, action: ControlAction, now: float) -> list[str]:
         """Ask for a control action, which has to be taken."""
         self.now = now
-        refusal = self.session.users.control_refusal(action)
+        refusal = self.session.services.control_refusal(action)
         assert not refusal, refusal
-        self.session.users.submit(ControlRequest(action), now)
+        self.session.services.submit(ControlRequest(action), now)
         return self.sent()
 
     def commands(self, index: int, value: Value, now: float) -> CommandOutcome:
         self.now = now
-        return self.session.users.command(index, value, now)
+        return self.session.services.command(index, value, now)
 
     def listen(self) -> None:
         """Take what the session has to tell; outcomes of control requests are kept apart."""

@@ -12,7 +12,7 @@ def again_and_again(action: Callable[[], object], period: float = 0.05, *,
                     after: float = 0.0) -> Iterator[None]:
     """Do it after some seconds and every ``period`` s, until the block ends."""
     clock = waiting.clock()
-    ending = clock.alarm()
+    ending = clock.wake_event()
 
     def run() -> None:
         pause = after

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The clock of this machine: its alarms, threads, locks and mailboxes."""
+"""The clock of this machine: its wake_events, threads, locks and mailboxes."""
 
 import threading
 
@@ -13,49 +13,49 @@ pytestmark = pytest.mark.usefixtures('threads')
 
 
 def test_ring_before_the_sleep_is_kept() -> None:
-    alarm = CLOCK.alarm()
-    alarm.ring()
-    assert alarm.wait(CLOCK.now() + 3600.0), 'somebody rang'
-    assert not alarm.wait(0.0)
+    wake_event = CLOCK.wake_event()
+    wake_event.ring()
+    assert wake_event.wait(CLOCK.now() + 3600.0), 'somebody rang'
+    assert not wake_event.wait(0.0)
 
 
 def test_several_rings_count_once() -> None:
-    alarm = CLOCK.alarm()
+    wake_event = CLOCK.wake_event()
     for _ in range(3):
-        alarm.ring()
-    assert alarm.wait(CLOCK.now() + 3600.0)
-    assert not alarm.wait(0.0), 'nothing is left: this one ends by its time'
+        wake_event.ring()
+    assert wake_event.wait(CLOCK.now() + 3600.0)
+    assert not wake_event.wait(0.0), 'nothing is left: this one ends by its time'
 
 
 def test_sleep_ends_by_itself_even_when_its_time_is_over() -> None:
-    alarm = CLOCK.alarm()
-    assert not alarm.wait(-1.0)
-    assert not alarm.wait(CLOCK.now() + 0.001)
-    assert not alarm.wait(0.0)
+    wake_event = CLOCK.wake_event()
+    assert not wake_event.wait(-1.0)
+    assert not wake_event.wait(CLOCK.now() + 0.001)
+    assert not wake_event.wait(0.0)
 
 
 def test_ring_wakes_the_sleeper() -> None:
-    alarm = CLOCK.alarm()
-    sleeper = CLOCK.worker(lambda: alarm.wait(), 'sleeper')
+    wake_event = CLOCK.wake_event()
+    sleeper = CLOCK.worker(lambda: wake_event.wait(), 'sleeper')
     sleeper.start()
-    alarm.ring()
+    wake_event.ring()
     sleeper.join(30.0)
     assert not sleeper.is_alive()
 
 
 def test_rings_of_many_threads() -> None:
-    alarm = CLOCK.alarm()
-    threads = [threading.Thread(target=lambda: [alarm.ring() for _ in range(2000)])
+    wake_event = CLOCK.wake_event()
+    threads = [threading.Thread(target=lambda: [wake_event.ring() for _ in range(2000)])
                for _ in range(4)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        alarm.wait(CLOCK.now() + 0.001)
+        wake_event.wait(CLOCK.now() + 0.001)
     for thread in threads:
         thread.join()
-    alarm.wait(0.0)
-    alarm.ring()
-    assert alarm.wait(0.0)
+    wake_event.wait(0.0)
+    wake_event.ring()
+    assert wake_event.wait(0.0)
 
 
 def test_a_thread_may_be_joined_whatever_became_of_it() -> None:

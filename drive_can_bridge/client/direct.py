@@ -67,7 +67,7 @@ class BusConversation:
         self.bus = bus
         self.now = clock.now
         self._ownership = ownership
-        self._changed = clock.alarm()
+        self._changed = clock.wake_event()
         self._lock = threading.Lock()
         self._outcomes: dict[int, tuple[Outcome, ...]] = {}
         self._trouble: DriveCanError | None = None
@@ -265,7 +265,7 @@ class DirectDrive(Drive):
             return 'control word: only a running bridge sends it'
         if owner is not None and owner[0] is Role.CYCLIC:
             return f'setpoint {owner[1].name}: only a running bridge sends it'
-        return self._session.users.write_refusal(parameter)
+        return self._session.services.write_refusal(parameter)
 
     # -- reading ----------------------------------------------------------------------------------
 

@@ -38,7 +38,7 @@ class Watched(Protocol):
     sample_parameters: tuple[Parameter, ...]
 
     @property
-    def users(self) -> Desk:
+    def services(self) -> Desk:
         """Where it is asked which one."""
 
 
@@ -107,7 +107,7 @@ class FaultWatch:
             self.shows = True
             if self._place is None:
                 self._request = ReadRequest((self._parameter,))
-                self._session.users.submit(self._request, now)
+                self._session.services.submit(self._request, now)
         if not self.text and self._place is not None and self._place < len(raws):
             raw = raws[self._place]
             if raw or raw in self._names:   # some drives say what it is a moment later

@@ -11,7 +11,7 @@ import math
 from typing import Protocol
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.command_gate import CommandGate
+from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.reporter import Reporter
@@ -24,7 +24,7 @@ class Commanded(Protocol):
 
     configuration: DriveConfiguration
     setpoints: Setpoints
-    gate: CommandGate
+    interlock: CommandInterlock
     report: Reporter
 
     def hand_out_neutral(self, now: float) -> None:
@@ -69,7 +69,7 @@ class NeutralStop:
         if not names:
             self._end(True, sentences.nothing_commanded())
         else:
-            session.gate.hold(True)
+            session.interlock.hold(True)
             session.hand_out_neutral(now)
 
     def left(self, name: str) -> None:
@@ -110,4 +110,4 @@ class NeutralStop:
         if wait is not None:
             for request in wait.requests:
                 self._session.report.note(ControlCompleted(request, success, message))
-            self._session.gate.hold(False)
+            self._session.interlock.hold(False)

@@ -32,10 +32,11 @@ import math
 from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.command_gate import CommandGate
+from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event
 from drive_can_bridge.core.fault_watch import FaultWatch
@@ -52,7 +53,6 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty
-from drive_can_bridge.core.users import Users
 
 
 class Part(Protocol):
@@ -105,7 +105,7 @@ class Session(ABC):
     :ivar configuration: of the drive.
     :ivar control: the control and status word machine, or None.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
-    :ivar gate: whether commands reach the drive.
+    :ivar interlock: whether commands reach the drive.
     :ivar fault_watch: knows which fault the drive has; None: the profile does not say how.
     :ivar neutral_stop: the quick stop of a drive without a control word.
     :ivar roles: what the bridge uses parameters for.
@@ -126,7 +126,7 @@ class Session(ABC):
         that share its bus; None: whenever it is ready.
     """
 
-    users: Users
+    services: DriveServices
     #: it can look for its reference
     homes = False
     _acyclic: AcyclicPart
@@ -146,7 +146,7 @@ class Session(ABC):
         self.setpoints = Setpoints(
             image.setpoints, timeout=drive.command_timeout,
             rearm_immediate=drive.rearm_immediate, sample=image.sample, sent=self.sent)
-        self.gate = CommandGate(
+        self.interlock = CommandInterlock(
             self, self.setpoints, control, image.sample, self.report, leader,
             missed_limit=drive.missed_limit)
         self.neutral_stop = NeutralStop(self)
@@ -228,7 +228,7 @@ class Session(ABC):
         owes = self.prepare_stop(now)
         if owes:
             self.stage = Stage.STOPPING
-        self.users.fail_all(reason)
+        self.services.fail_all(reason)
         self.withdraw(reason, now)
         if owes and self.begin_stop(now):
             return
@@ -267,7 +267,7 @@ class Session(ABC):
         self.bus_available = False
         if self.unshown or not (self.active or self.stopped):
             self.duty.happened(Happened.SILENT)     # no answer to the stop will come
-        self.users.fail_all(sentences.bus_down())
+        self.services.fail_all(sentences.bus_down())
         down = sentences.bus_is_down(self.configuration.bus, reason)
         self.lose(down, now)
         self.go_idle(down)
@@ -309,7 +309,7 @@ class Session(ABC):
         was_online = self.online
         self.withdraw(reason, now)
         self.setpoints.forget()
-        if was_online and self.gate.mute:
+        if was_online and self.interlock.position_unknown:
             self._leave_owing(sentences.position_unknown())
         self.be_offline(reason)
         self.lost(now, was_online=was_online)
@@ -321,7 +321,7 @@ class Session(ABC):
     def withdraw(self, reason: Sentence, now: float) -> None:
         """Go neutral, and back to ``disable``."""
         self.neutral_stop.fail(reason)
-        self.gate.withdraw(reason, now)
+        self.interlock.withdraw(reason, now)
         if self.control is not None:
             self.withdrawn(now)
 
@@ -470,7 +470,7 @@ class Session(ABC):
 
     def control_changed(self, now: float) -> None:
         """React to a control word, or a state, that may have changed."""
-        self.gate.follow()
+        self.interlock.follow()
         self.see_to_control_word(now)
 
     def reconfigure(self, *, command_timeout: float | None = None,
@@ -496,7 +496,7 @@ class Session(ABC):
         watch = self.fault_watch
         if watch is not None and watch.shows and self.control is None and self.online:
             return DriveState.FAULT
-        return self.gate.state
+        return self.interlock.state
 
     @property
     def warning(self) -> Sentence:

@@ -10,7 +10,7 @@ in the thread that received it: a hop through an executor costs 50 µs and a qua
 
 What is due is served in a *pass*. Passes follow the earliest of the sessions' deadlines, which are
 absolute: that needs no executor, no wait set, and follows each session's own rhythm (cycles, time-
-outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:func:`spread`).
+outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:func:`stagger`).
 
 Where the adapter wakes the reader in time (``EndPoint.punctual``), the reader makes the passes,
 too: it sleeps once for whatever comes first, a frame or a deadline, and no thread has to wait for
@@ -101,7 +101,7 @@ class Router(Generic[Owner]):
         return table
 
 
-def spread(periods: Sequence[float]) -> list[float]:
+def stagger(periods: Sequence[float]) -> list[float]:
     """
     Return for each drive when in its period its turn is, in s.
 
@@ -117,15 +117,15 @@ def spread(periods: Sequence[float]) -> list[float]:
     groups: dict[float, list[int]] = {}
     for index, period in enumerate(periods):
         groups.setdefault(period, []).append(index)
-    phases = [0.0] * len(periods)
+    turns = [0.0] * len(periods)
     for period, members in groups.items():
         slots = max(1, min(len(members), int(period / SLOT + 1e-6)))
         for place, index in enumerate(members):
-            phases[index] = place * slots // len(members) * period / slots
-    return phases
+            turns[index] = place * slots // len(members) * period / slots
+    return turns
 
 
-class Errand:
+class PeriodicTask:
     """
     Calls ``action`` with the time, once a period. No thread waits for another one's call.
 
@@ -184,7 +184,7 @@ class BusExchange:
     :param open_bus: opens the bus; None: python-can, by the configuration.
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
-    :ivar errand: what its threads see to beside its drives; to be set before ``open``.
+    :ivar periodic_task: what its threads see to beside its drives; to be set before ``open``.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
@@ -210,10 +210,10 @@ class BusExchange:
         self.link = Link(bus, filters, self, clock, send_timeout=send_timeout,
                          stations=len(self._sessions), prepare_thread=prepare_thread,
                          opener=open_bus and (lambda: open_bus(bus)), keep_time=self._keep_time)
-        for session, phase in zip(sessions, spread(periods)):
+        for session, phase in zip(sessions, stagger(periods)):
             session.phase = phase
-        self.errand: Errand | None = None
-        self._alarm = clock.alarm()
+        self.periodic_task: PeriodicTask | None = None
+        self._wake = clock.wake_event()
         self._wake_at = 0.0     # when the next pass is due
         self._back_at = -math.inf   # when the reader will look after that
         self._meant_at = 0.0    # when the next pass was to be
@@ -257,7 +257,7 @@ class BusExchange:
                 member.anew_at = math.inf
                 member.tell(member.listener.discard_commands, '')
                 member.take(member.session.activate, now)
-        self._alarm.ring()
+        self._wake.ring()
 
     def serve(self) -> None:
         """Serve parameter requests only: nothing is sent that nobody asked for."""
@@ -274,7 +274,7 @@ class BusExchange:
         with self.lock:
             if self.active:
                 self._begin_stop(self._clock())
-        self._alarm.ring()
+        self._wake.ring()
         return self._wait_for_stop()
 
     def _begin_stop(self, now: float) -> None:
@@ -323,7 +323,7 @@ class BusExchange:
     def close(self) -> None:
         """End both threads and close the bus."""
         self._closing = True
-        self._alarm.ring()
+        self._wake.ring()
         self._thread.join(2.0)
         self.link.stop()
 
@@ -341,7 +341,7 @@ class BusExchange:
         with self.lock:
             now = self._clock()
             try:
-                session.users.submit(request, now)
+                session.services.submit(request, now)
                 member.pump()
             except Exception as error:
                 member.contain(error)
@@ -361,7 +361,7 @@ class BusExchange:
     def _ring_if_sooner(self, member: Member) -> None:
         """Wake the timer thread if a drive, or a partner of it, wants to be served before that."""
         if member.soonest < self._wake_at:
-            self._alarm.ring()
+            self._wake.ring()
 
     # -- the timer thread -------------------------------------------------------------------------
 
@@ -374,7 +374,7 @@ class BusExchange:
                     self._serve()
                 with self.lock:
                     until = self._turn()
-                rung = self._alarm.wait(until)
+                rung = self._wake.wait(until)
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 
@@ -393,11 +393,11 @@ class BusExchange:
         return max(0.0, self._back_at - now)
 
     def _serve(self) -> None:
-        """Make a pass, and see to the errand."""
+        """Make a pass, and see to the periodic task."""
         with self.lock:
             self._wake_at = self._pass()
-        if self.errand is not None:
-            due = self.errand.run(self._clock())
+        if self.periodic_task is not None:
+            due = self.periodic_task.run(self._clock())
             with self.lock:
                 self._wake_at = min(self._wake_at, due)
 
@@ -470,7 +470,7 @@ class BusExchange:
             if now < self._back_at + GRACE:     # this thread keeps time, and looks next
                 self._wake_at = due
                 return
-        self._alarm.ring()
+        self._wake.ring()
 
     def bus_opened(self) -> None:
         """Begin (again) with every drive."""
@@ -479,7 +479,7 @@ class BusExchange:
             self.bus_state, self.bus_reason = 'up', ''
             for member in self._members:
                 member.take(member.session.bus_up, now)
-        self._alarm.ring()
+        self._wake.ring()
         self._listener.bus_opened(self.bus.name)
 
     def bus_lost(self, reason: str) -> None:
@@ -499,7 +499,7 @@ class BusExchange:
     def link_failed(self, reason: str) -> None:
         """Give up: the reader thread met a defect."""
         self._back_at = -math.inf
-        self._alarm.ring()
+        self._wake.ring()
         self._fail(reason)
 
     def _fail(self, reason: str) -> None:

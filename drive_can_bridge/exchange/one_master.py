@@ -2,7 +2,7 @@
 """
 One master for each drive: a process locks drives on this host before it talks to them.
 
-A drive is known by its place (interface, channel), its protocol and its station, whatever a
+A drive is known by its bus (interface, channel), its protocol and its station, whatever a
 parameter file calls it. Serial ports are locked as a whole: what two processes read from one
 arrives at neither. Buses that other processes may use besides (SocketCAN) are not locked; drives
 on them that the other process does not know are nobody's business.
@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.locks import BRIDGE, Held, holder, HostLock, take
-from drive_can_bridge.transport.places import place_of
+from drive_can_bridge.transport.bus_identity import identity_of
 
 #: what to do for commands that have only the direct way
 END_FIRST = 'end that first'
@@ -37,14 +37,14 @@ class Ownership:
                  who: str, advice: str) -> None:
         claims: dict[str, str] = {}
         for bus, drives in buses:
-            place = place_of(bus)
+            identity = identity_of(bus)
             for drive in drives:
-                for name in place.names:
+                for name in identity.names:
                     claims[f'drive {name} {drive.protocol} {drive.station}'] = (
                         f'bus {bus.name}: drive {drive.name}')
-            if place.port:      # behind the drives: they say more
+            if identity.port:      # behind the drives: they say more
                 claims.update(dict.fromkeys(
-                    place.names, f'bus {bus.name}: the serial port {place.port}'))
+                    identity.names, f'bus {bus.name}: the serial port {identity.port}'))
         try:
             self._locks: list[HostLock] = take(list(claims), who)
         except Held as held:

@@ -15,15 +15,13 @@ from typing import Generic, Union
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request,
-    WriteRequest,
-)
+    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request, WriteRequest)
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.words import value_text
-from drive_can_bridge.protocols.channel import Channel, Lane
-from drive_can_bridge.protocols.courier import ReplyT, StepT
+from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.placement import ParameterPlacement, SpanT
+from drive_can_bridge.protocols.transactor import ReplyT, StepT
 
 Item = tuple[Parameter, int]
 #: the words that a read brought, one for each address of its span
@@ -38,7 +36,7 @@ def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
 
 class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     """
-    The parameters of one drive: serves the requests of users in their lane of its channel.
+    The parameters of one drive: serves the requests of users in their turn on its channel.
 
     A family says how one frame is read (:meth:`read`), how one is written (:meth:`write`), and
     what fits into it (:meth:`misfit`).
@@ -59,14 +57,14 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         return self.channel.waiting_users
 
     def serve(self, request: Request, done: Callable[[Outcomes], None], now: float,
-              lane: Lane = Lane.USERS) -> None:
+              priority: Priority = Priority.USERS) -> None:
         """Queue a request; ``done`` gets an outcome for each name."""
         self.channel.run(self._read_all(request.parameters) if isinstance(request, ReadRequest)
-                         else self._write_all(request), done, now, lane)
+                         else self._write_all(request), done, now, priority)
 
     def cancel(self) -> None:
         """Forget all of them; nobody is told."""
-        self.channel.cancel(Lane.USERS)
+        self.channel.cancel(Priority.USERS)
 
     # -- what a family knows ----------------------------------------------------------------------
 

@@ -1,21 +1,21 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The acyclic channel to one drive: procedures, lanes, repetitions, and what must not be asked yet.
+The acyclic channel to one drive: procedures, priorities, repetitions, what must not be asked yet.
 
 Anything that takes several exchanges (a verified write, a map check, a round of reads) is a
 *procedure*: a generator that yields steps and is sent what became of each, so that it reads like
 the sequence it is. What the steps are, and how one of them is done, is the family's business: its
-:class:`.Courier` does one exchange at a time. Everything else is done here, for all families.
+:class:`.Transactor` does one exchange at a time. Everything else is done here, for all families.
 
-*Order.* Every lane (:class:`Lane`) runs its procedures one after the other. A stop comes first,
-whatever holds the others back; then the control word, then setpoints. Our own procedures and those
-of users take turns after every step, and after every attempt at one, so that neither a flood of
-users nor a parameter that nobody answers keeps the other waiting for more than one. Where answers
-do not say what they answer (``anonymous``), our own are rounds that must not be torn: they run to
-their end, users get one step in between and whatever time is left.
+*Order.* Procedures of one :class:`Priority` run one after the other. A stop comes first, whatever
+holds the others back; then the control word, then setpoints. Our own procedures and those of users
+take turns after every step, and after every attempt at one, so that neither a flood of users nor a
+parameter that nobody answers keeps the other waiting for more than one. Where answers do not say
+what they answer (``anonymous``), our own are rounds that must not be torn: they run to their end,
+users get one step in between and whatever time is left.
 
-*Repetitions.* A step that nobody answered is done again as often as its courier says. Between its
-attempts others may have their turn.
+*Repetitions.* A step that nobody answered is done again as often as its transactor says. Others
+may have their turn between its attempts.
 
 *Quarantine* (:class:`Quarantine`). After a step that nobody answered, nothing is asked that the
 late answer could be mistaken for, for as long as such an answer may come. The attempts at one step
@@ -30,7 +30,7 @@ from enum import Enum
 import math
 from typing import Any, Generic
 
-from drive_can_bridge.protocols.courier import ANYTHING, Courier, ReplyT, StepT
+from drive_can_bridge.protocols.transactor import ANYTHING, ReplyT, StepT, Transactor
 
 
 #: s by which the read after a quarantine may be late, and it still was listened to
@@ -41,7 +41,7 @@ CATCHING_UP = 0.01
 REMEMBERED = 32
 #: s that a stop waits for the answer under way, where a device has one request at a time
 STOP_PATIENCE = 0.05
-#: s, beyond those that a courier expects it, after which an answer counts as nobody's
+#: s, beyond those that a transactor expects it, after which an answer counts as nobody's
 LATE_MAX = 0.5
 #: so many questions that were given up are remembered
 LATE_COUNT = 16
@@ -99,7 +99,7 @@ class Quarantine:
             del self._until[key]
 
 
-class Lane(Enum):
+class Priority(Enum):
     """Who a procedure works for; the first comes first."""
 
     STOP = 'what makes the drive stand still'
@@ -110,18 +110,19 @@ class Lane(Enum):
 
 
 class _Queue(Generic[StepT, ReplyT]):
-    """The procedures of one lane, and the step that the first of them wants done."""
+    """The procedures of one priority, and the step that the first of them wants done."""
 
-    __slots__ = ('_courier', '_running', 'attempts_left', 'lane', 'repeated', 'step', 'waiting')
+    __slots__ = (
+        '_running', '_transactor', 'attempts_left', 'priority', 'repeated', 'step', 'waiting')
 
-    def __init__(self, lane: Lane, courier: Courier[StepT, ReplyT]) -> None:
-        self.lane = lane
+    def __init__(self, priority: Priority, transactor: Transactor[StepT, ReplyT]) -> None:
+        self.priority = priority
         self.waiting: deque[tuple[Generator[StepT, ReplyT, Any], Done]] = deque()
         self.step: StepT | None = None
         self.attempts_left = 0
         self.repeated = False  # nobody answered the attempt before
         self._running: tuple[Generator[StepT, ReplyT, Any], Done] | None = None
-        self._courier = courier
+        self._transactor = transactor
 
     def fetch(self) -> StepT | None:
         """Return the step to be done next, beginning procedures as needed."""
@@ -143,7 +144,7 @@ class _Queue(Generic[StepT, ReplyT]):
             done(stop.value)
         else:
             self.step = step
-            self.attempts_left = self._courier.attempts(step)
+            self.attempts_left = self._transactor.attempts(step)
 
     @property
     def idle(self) -> bool:
@@ -162,17 +163,17 @@ class _Queue(Generic[StepT, ReplyT]):
 
 class Channel(Generic[StepT, ReplyT]):
     """
-    Runs procedures through a courier.
+    Runs procedures through a transactor.
 
     :ivar now: ``now`` of the call being served, for callbacks.
     """
 
-    def __init__(self, courier: Courier[StepT, ReplyT]) -> None:
+    def __init__(self, transactor: Transactor[StepT, ReplyT]) -> None:
         self.now = -math.inf
-        self._courier = courier
-        courier.wake = self.wake
-        self._queues: dict[Lane, _Queue[StepT, ReplyT]] = {
-            lane: _Queue(lane, courier) for lane in Lane}
+        self._transactor = transactor
+        transactor.wake = self.wake
+        self._queues: dict[Priority, _Queue[StepT, ReplyT]] = {
+            priority: _Queue(priority, transactor) for priority in Priority}
         stop, control, setpoints, own, users = self._queues.values()
         self._stop = stop
         self._orders = (control, setpoints, own, users), (control, setpoints, users, own)
@@ -197,7 +198,7 @@ class Channel(Generic[StepT, ReplyT]):
         :param answers: tells whether it may be that to a step.
         :return: how many s ago the step was given up that it answers; None: there is none.
         """
-        horizon = received_at - LATE_MAX - self._courier.silence
+        horizon = received_at - LATE_MAX - self._transactor.silence
         for place, (at, step) in enumerate(self._given_up):
             if at >= horizon and answers(step):
                 del self._given_up[place]
@@ -207,27 +208,27 @@ class Channel(Generic[StepT, ReplyT]):
     # -- queueing ---------------------------------------------------------------------------------
 
     def run(self, procedure: Generator[StepT, ReplyT, Any], done: Done, now: float,
-            lane: Lane = Lane.OWN) -> None:
+            priority: Priority = Priority.OWN) -> None:
         """Queue a procedure; ``done`` gets its return value."""
-        self._queues[lane].waiting.append((procedure, done))
+        self._queues[priority].waiting.append((procedure, done))
         self.wake(now)
 
-    def is_idle(self, lane: Lane) -> bool:
-        """Tell whether a lane has nothing to do."""
-        return self._queues[lane].idle
+    def is_idle(self, priority: Priority) -> bool:
+        """Tell whether nothing is to be done at a priority."""
+        return self._queues[priority].idle
 
     @property
     def waiting_users(self) -> int:
         """User procedures that have not begun."""
-        return len(self._queues[Lane.USERS].waiting)
+        return len(self._queues[Priority.USERS].waiting)
 
-    def cancel(self, lane: Lane) -> None:
-        """Forget the procedures of a lane; an exchange under way is still waited for."""
-        queue = self._queues[lane]
+    def cancel(self, priority: Priority) -> None:
+        """Forget the procedures of a priority; an exchange under way is still waited for."""
+        queue = self._queues[priority]
         if self._serving is queue:
             self._expect_late()
             self._serving = None
-            self._courier.abandon(math.inf)
+            self._transactor.abandon(math.inf)
         queue.clear()
 
     def clear(self) -> None:
@@ -239,20 +240,20 @@ class Channel(Generic[StepT, ReplyT]):
         self._expect_late()
         for queue in self._queues.values():
             queue.clear()
-        self._courier.forget()
+        self._transactor.forget()
         self._serving = None
         self._hurried = self._awake = False
 
     def make_room(self, now: float) -> None:
         """Let a stop follow soon: the answer under way is waited for a moment only."""
-        if self._courier.busy and not self._hurried:
+        if self._transactor.busy and not self._hurried:
             self._hurried = True
-            self._courier.abandon(now + STOP_PATIENCE)
+            self._transactor.abandon(now + STOP_PATIENCE)
 
     def drop(self, now: float) -> None:
         """Forget everything but the exchange under way, for which a stop waits a moment."""
-        for lane in Lane:
-            self.cancel(lane)
+        for priority in Priority:
+            self.cancel(priority)
         self.make_room(now)
 
     def hold(self, until: float) -> None:
@@ -269,11 +270,11 @@ class Channel(Generic[StepT, ReplyT]):
 
     def receive(self, answer: Any, now: float) -> bool:
         """
-        Take an answer, in the form that the courier wants; False: nobody asked for it.
+        Take an answer, in the form that the transactor wants; False: nobody asked for it.
 
         :raises RemoteProtocolError: malformed, or not the answer to what is under way.
         """
-        reply = self._courier.receive(answer, now)
+        reply = self._transactor.receive(answer, now)
         if isinstance(reply, bool):
             return reply
         self.now = now
@@ -283,7 +284,7 @@ class Channel(Generic[StepT, ReplyT]):
 
     def disturbed(self, now: float) -> None:
         """Record an answer that nobody asked for: more may follow."""
-        self._quarantine.begin(ANYTHING, now + self._courier.silence)
+        self._quarantine.begin(ANYTHING, now + self._transactor.silence)
 
     def wake(self, now: float) -> None:
         """Look at everything: there is something new."""
@@ -294,9 +295,9 @@ class Channel(Generic[StepT, ReplyT]):
         """Record that nobody listened until now: an answer may lie in some buffer."""
         self.now = now
         self._quarantine.time_lost(now)
-        if self._courier.busy:
+        if self._transactor.busy:
             self._deadline = max(self._deadline, now)
-            reply = self._courier.time_lost(now)
+            reply = self._transactor.time_lost(now)
             if reply is not False:
                 self._end(reply)  # type: ignore[arg-type]  # True is never returned
 
@@ -316,9 +317,9 @@ class Channel(Generic[StepT, ReplyT]):
         """Return when ``advance`` wants to be called."""
         if not self._awake:
             return math.inf
-        soonest = self._courier.express_at(self._held_until)
-        if self._courier.busy:
-            return min(soonest, self._courier.deadline)
+        soonest = self._transactor.express_at(self._held_until)
+        if self._transactor.busy:
+            return min(soonest, self._transactor.deadline)
         if soonest < math.inf:
             return soonest
         for queue in self._order():
@@ -335,12 +336,12 @@ class Channel(Generic[StepT, ReplyT]):
 
     def _advance_once(self, now: float) -> bool:
         """Do the next thing; False when it cannot be done yet."""
-        courier = self._courier
-        went = courier.express(now, self._held_until)
+        transactor = self._transactor
+        went = transactor.express(now, self._held_until)
         if went:
             return True
-        if courier.busy:
-            reply = courier.handle_timer(now)
+        if transactor.busy:
+            reply = transactor.handle_timer(now)
             if reply is False:
                 return False
             self._finish(reply)  # type: ignore[arg-type]  # True is never returned
@@ -350,7 +351,7 @@ class Channel(Generic[StepT, ReplyT]):
         queue = self._choose(now)
         if queue is None or queue.step is None:
             self._awake = not all(queue.idle for queue in self._queues.values()) or (
-                courier.express_at(self._held_until) < math.inf)
+                transactor.express_at(self._held_until) < math.inf)
             return self._awake and now >= self._held_until
         step = queue.step
         key = self._key(queue, step)
@@ -360,8 +361,8 @@ class Channel(Generic[StepT, ReplyT]):
             return False
         self._serving = queue
         queue.attempts_left -= 1
-        courier.begin(step, now)
-        self._deadline = courier.deadline
+        transactor.begin(step, now)
+        self._deadline = transactor.deadline
         return False    # nothing more until it has ended
 
     def _order(self) -> tuple[_Queue[StepT, ReplyT], ...]:
@@ -388,33 +389,33 @@ class Channel(Generic[StepT, ReplyT]):
 
     def _key(self, queue: _Queue[StepT, ReplyT], step: StepT) -> Hashable | None:
         """Return which quarantine, if it has begun, concerns the step of a queue."""
-        courier = self._courier
-        return courier.key(step) if courier.anonymous or not queue.repeated else None
+        transactor = self._transactor
+        return transactor.key(step) if transactor.anonymous or not queue.repeated else None
 
     def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT,
                   key: Hashable | None) -> float:
         """Return when the step of a queue may be done."""
         stop = queue is self._stop
-        ready = self._courier.ready_at(step, stop=stop)
+        ready = self._transactor.ready_at(step, stop=stop)
         if not stop:
             ready = max(ready, self._held_until)
         return ready if key is None else max(ready, self._quarantine.ready_at(key))
 
     def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
         """Tell whether others go on while the step of this queue is in quarantine."""
-        if self._courier.anonymous or queue.step is None:
+        if self._transactor.anonymous or queue.step is None:
             return False
         key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
 
     def _expect_late(self) -> None:
         """Record that the answer under way is not waited for any more."""
-        if self._serving is None or not self._courier.busy:
+        if self._serving is None or not self._transactor.busy:
             return
         step = self._serving.step
-        key = None if step is None else self._courier.key(step)
+        key = None if step is None else self._transactor.key(step)
         if key is not None:
-            self._quarantine.begin(key, self._deadline + self._courier.silence)
+            self._quarantine.begin(key, self._deadline + self._transactor.silence)
 
     def _end(self, reply: ReplyT) -> None:
         """End the exchange under way; what that sets in motion waits."""
@@ -425,24 +426,24 @@ class Channel(Generic[StepT, ReplyT]):
             self._advancing = False
 
     def _finish(self, reply: ReplyT) -> None:
-        """End the exchange under way; then it is another lane's turn."""
+        """End the exchange under way; then it is the turn of others."""
         queue, self._serving = self._serving, None
         hurried, self._hurried = self._hurried, False
         if queue is None:
             return
-        courier = self._courier
+        transactor = self._transactor
         step = queue.step
         if step is None:
             return
-        silent = courier.unanswered(step, reply)
+        silent = transactor.unanswered(step, reply)
         if silent:
             self._given_up.append((self.now, step))
         # what answers a repetition may be the answer to the attempt before
-        if silent or queue.repeated and not courier.anonymous:
-            key = courier.key(step)
+        if silent or queue.repeated and not transactor.anonymous:
+            key = transactor.key(step)
             if key is not None:
                 since = self.now if silent else self._deadline
-                self._quarantine.begin(key, since + courier.silence)
+                self._quarantine.begin(key, since + transactor.silence)
         if silent and hurried:  # it had to make room: that was no attempt
             queue.attempts_left += 1
         if silent and queue.attempts_left > 0:
@@ -450,8 +451,8 @@ class Channel(Generic[StepT, ReplyT]):
         else:
             queue.step = None
             queue.resume(reply)
-        if queue.lane is Lane.USERS:
+        if queue.priority is Priority.USERS:
             self._users_next = False
-        elif queue.lane is Lane.OWN and (
-                queue.step is None or not courier.anonymous):
+        elif queue.priority is Priority.OWN and (
+                queue.step is None or not transactor.anonymous):
             self._users_next = True

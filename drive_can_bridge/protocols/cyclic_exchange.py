@@ -149,7 +149,7 @@ class CyclicExchange(Generic[TelegramT]):
         session, answers, timer = self._session, self._answers, self.timer
         if now < timer.due:
             answers.handle_timer(now)
-            if session.gate.expire(now) and session.setpoints.changed:
+            if session.interlock.expire(now) and session.setpoints.changed:
                 # a drive has that long for its answer
                 timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
             return
@@ -159,7 +159,7 @@ class CyclicExchange(Generic[TelegramT]):
             answers.settle(now)
         if timer.due == math.inf:   # what was missed has ended the cycles
             return
-        session.gate.expire(now)
+        session.interlock.expire(now)
         control, cycle = session.control, self._cycle
         if (session.setpoints.changed or cycle is None
                 or control is not None and control.word != cycle.word):

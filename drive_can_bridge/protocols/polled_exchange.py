@@ -15,7 +15,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
 from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.channel import Channel, Lane
+from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 
 #: of a round, in the order of samples; None: of what was refused
@@ -88,7 +88,7 @@ class PolledExchange:
 
     def cancel(self) -> None:
         """Leave the round that is under way alone."""
-        self._channel.cancel(Lane.OWN)
+        self._channel.cancel(Priority.OWN)
         self.reading = False
 
     def stop(self) -> None:
@@ -109,10 +109,10 @@ class PolledExchange:
         if fresh:
             if not self._rounds.present:
                 return
-            session.gate.measured(raws)     # before anything is written
+            session.interlock.measured(raws)     # before anything is written
             self._rounds.round_found(now)
         self._rounds.round_answered(raws, now, found=fresh)
-        session.gate.measured(raws)
+        session.interlock.measured(raws)
         sample = tuple(raw for raw in raws if raw is not None)
         if len(sample) == len(raws):
             self._book.answered(self.received_at)

@@ -2,9 +2,9 @@
 """
 The stop of a drive by acyclic writes, whatever its family: what has to be told, and what follows.
 
-How that is written and confirmed, and how often it is tried, is a procedure of the family, in the
-lane that comes first. At the end of the bridge, a drive that has confirmed it is asked once for
-its status: what it was told is not what it does.
+How that is written and confirmed, and how often it is tried, is a procedure of the family, of the
+first priority. At the end of the bridge, a drive that has confirmed it is asked once for its
+status: what it was told is not what it does.
 """
 
 from collections.abc import Callable, Generator
@@ -19,8 +19,8 @@ from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
-from drive_can_bridge.protocols.channel import Channel, Lane
-from drive_can_bridge.protocols.courier import ReplyT, StepT
+from drive_can_bridge.protocols.channel import Channel, Priority
+from drive_can_bridge.protocols.transactor import ReplyT, StepT
 
 #: how often a drive is told to stand still by writes, at most, until it has confirmed that
 STOP_ATTEMPTS = 3
@@ -109,14 +109,15 @@ class SafeStop(Generic[StepT, ReplyT]):
         session = self._session
         self.running = True
         kind = _Kind(session.owed and not again, insist, again,
-                     setpoints and not session.gate.mute)
-        self._channel.run(self._then_look(procedure), partial(self._done, kind), now, Lane.STOP)
+                     setpoints and not session.interlock.position_unknown)
+        self._channel.run(
+            self._then_look(procedure), partial(self._done, kind), now, Priority.STOP)
 
     def look(self, now: float) -> None:
         """Read the status at the end of a stop by other means, if it does not come by itself."""
         if self._status is not None and not self.running:
             self.running = True
-            self._channel.run(self._look(), self._looked, now, Lane.STOP)
+            self._channel.run(self._look(), self._looked, now, Priority.STOP)
 
     def forget(self) -> None:
         """Record that the channel was cleared."""
@@ -135,7 +136,7 @@ class SafeStop(Generic[StepT, ReplyT]):
             return
         raw = yield from self._read(self._status, self.answer_time)
         if raw is not None:
-            session.gate.status(raw, self._channel.now)
+            session.interlock.status(raw, self._channel.now)
 
     def _looked(self, _: None) -> None:
         self.running = False

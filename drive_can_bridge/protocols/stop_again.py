@@ -12,7 +12,7 @@ from typing import Any
 
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Happened
-from drive_can_bridge.protocols.channel import Channel, Lane
+from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
 #: s after one that was told again until the next: what looks for the drive goes on meanwhile
@@ -50,14 +50,14 @@ class StopAgain:
         """
         if not self._wanted:
             self._pause, self._first = PAUSE, True
-        elif now >= self._stop.again_at + self._pause and self._channel.is_idle(Lane.STOP):
+        elif now >= self._stop.again_at + self._pause and self._channel.is_idle(Priority.STOP):
             if hurry and self._first:
                 self._channel.make_room(now)
             self._first = False
             if answered:
                 self._again(now)
             else:
-                self._channel.run(self._begin(), lambda _: None, now, Lane.STOP)
+                self._channel.run(self._begin(), lambda _: None, now, Priority.STOP)
 
     @property
     def _wanted(self) -> bool:

@@ -25,8 +25,7 @@ import shlex
 from typing import Any
 
 from rcl_interfaces.msg import (
-    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult,
-)
+    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult)
 from rclpy.context import Context
 from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -39,8 +38,7 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import (
-    check_dynamic, configuration_from_overrides, declared_parameters,
-)
+    check_dynamic, configuration_from_overrides, declared_parameters)
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -50,9 +48,9 @@ from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.ros.answers import Answers
+from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
-from drive_can_bridge.ros.fleet import Fleet
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
 from drive_can_bridge.ros.stamps import Stamps
@@ -234,7 +232,7 @@ class BridgeNode(LifecycleNode):
                                                clock, send=self._answers.send)
         self._ending = False
         self._leaving: list[DriveNode] = []
-        self._fleet: Fleet | None = None
+        self._runtime: BridgeRuntime | None = None
         self._node_parameters = NodeParameters(self, self._parameter_changed,
                                                self._parameter_refusal)
         _guard_transitions(self, self.log.warning, self._transition_lock,
@@ -272,8 +270,8 @@ class BridgeNode(LifecycleNode):
         return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
 
     def _parameter_refusal(self, name: str, value: Any) -> str:
-        fleet = self._fleet
-        drive = None if fleet is None else fleet.drive_of(name)
+        runtime = self._runtime
+        drive = None if runtime is None else runtime.drive_of(name)
         if drive is not None and name.endswith('.rearm') and value == 'immediate':
             for setpoint in drive.session.setpoints.held:
                 return (f'{setpoint.parameter.name} would jump: it has neutral_from, which needs '
@@ -281,9 +279,9 @@ class BridgeNode(LifecycleNode):
         return ''
 
     def _parameter_changed(self, name: str, value: Any) -> None:
-        fleet = self._fleet
-        if fleet is not None:
-            fleet.parameter_changed(name, value)
+        runtime = self._runtime
+        if runtime is not None:
+            runtime.parameter_changed(name, value)
 
     # -- transitions ------------------------------------------------------------------------------
 
@@ -355,28 +353,28 @@ class BridgeNode(LifecycleNode):
         for warning in configuration.warnings:
             self.log.warning(warning)
         self._node_parameters.declare(configuration)
-        self._fleet = Fleet(
+        self._runtime = BridgeRuntime(
             self, self.log, configuration, self._spinner, self._control_thread,
             self._parameter_thread, self._stamps, self._steady, open_bus=self._open_bus,
             announce=self._node_parameters.announce, dismiss=self._dismiss, fatal=self._fatal)
         try:
-            self._fleet.open()
+            self._runtime.open()
         except BaseException:
             self._clean_up()
             raise
 
     def _activate(self) -> None:
-        if self._fleet is not None:
-            self._fleet.activate()
+        if self._runtime is not None:
+            self._runtime.activate()
 
     def _stop_drives(self) -> None:
-        if self._fleet is not None:
-            self._fleet.stop()
+        if self._runtime is not None:
+            self._runtime.stop()
 
     def _clean_up(self) -> None:
-        fleet, self._fleet = self._fleet, None
-        if fleet is not None:
-            fleet.close()
+        runtime, self._runtime = self._runtime, None
+        if runtime is not None:
+            runtime.close()
             gc.collect()    # see scheduling.PASSES
 
     def _dismiss(self, drives: Iterable[DriveNode] = ()) -> None:
@@ -405,8 +403,8 @@ class BridgeNode(LifecycleNode):
         alone = self._transition_lock.acquire(timeout=5.0)
         try:
             self._stop_drives()
-            if self._fleet is not None:
-                self._fleet.diagnostics.conclude()
+            if self._runtime is not None:
+                self._runtime.diagnostics.conclude()
         finally:
             if alone:
                 self._transition_lock.release()
@@ -428,22 +426,22 @@ class BridgeNode(LifecycleNode):
     @property
     def configuration(self) -> BridgeConfiguration | None:
         """What is in effect, from configure to cleanup."""
-        return None if self._fleet is None else self._fleet.configuration
+        return None if self._runtime is None else self._runtime.configuration
 
     @property
     def exchanges(self) -> Mapping[str, BusExchange]:
         """The buses by name, from configure to cleanup."""
-        return {} if self._fleet is None else self._fleet.exchanges
+        return {} if self._runtime is None else self._runtime.exchanges
 
     @property
     def drives(self) -> Mapping[str, DriveNode]:
         """The drives by name, from configure to cleanup."""
-        return {} if self._fleet is None else self._fleet.drives
+        return {} if self._runtime is None else self._runtime.drives
 
     @property
     def diagnostics(self) -> Diagnostics | None:
         """What reports on buses and drives, from configure to cleanup."""
-        return None if self._fleet is None else self._fleet.diagnostics
+        return None if self._runtime is None else self._runtime.diagnostics
 
 
 def _gone(drive: DriveNode) -> bool:

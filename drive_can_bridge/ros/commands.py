@@ -125,7 +125,7 @@ class CommandIntake:
     def _command(self, index: int, value: Value, now: float) -> None:
         session = self._session
         try:
-            outcome = session.users.command(index, value, now)
+            outcome = session.services.command(index, value, now)
         except ValueRefused as error:
             name = session.setpoints.items[index].parameter.name
             self._warn(f'refused {name}', f'command {name} refused: {error}')

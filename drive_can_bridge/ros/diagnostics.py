@@ -74,12 +74,12 @@ class Attendance:
         self._log = log
         self._drives = drives
         self._clock = clock
-        self._over = clock.alarm()
+        self._over = clock.wake_event()
         self._thread = clock.worker(self._run, 'attendance')
 
     def begin(self) -> None:
         """Look in a while."""
-        self._over = self._clock.alarm()
+        self._over = self._clock.wake_event()
         self._thread = self._clock.worker(self._run, 'attendance')
         self._thread.start()
 
@@ -257,7 +257,7 @@ class DriveReporter:
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, together(told)
         told = self._warnings(rejected)
-        obeyed = session.gate.obeyed
+        obeyed = session.interlock.obeyed
         if obeyed is not None and obeyed.disregard:
             return DiagnosticStatus.ERROR, together((obeyed.disregard, *told))
         if obeyed is not None and obeyed.stopping and obeyed.unconfirmed:

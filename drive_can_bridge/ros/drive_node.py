@@ -134,7 +134,7 @@ class DriveNode(DriveListener):
             return Question(partial(self._submit, request))
         self._services.append(ParameterServices(
             self.node, parameter_thread, directory, stamps, submit=submit,
-            write_refusal=session.users.write_refusal, role=session.roles.role,
+            write_refusal=session.services.write_refusal, role=session.roles.role,
             active=lambda: session.active, restore=drive.profile.restore,
             failed=self._parameter_failed).services)
         self._services.append(control_services(

@@ -5,7 +5,7 @@ All joints of a bridge in one message: ``~/joint_states`` and ``~/joint_commands
 Drives answer one after the other, each with a stamp of its own; what reads joints wants all of
 them in one message (the hardware interface of ros2_control keeps the latest message only). So at a
 rate of its own the newest sample of each is taken together, under the stamp of the oldest; by a
-thread of an exchange, which is awake in any case (``exchange.Errand``).
+thread of an exchange, which is awake in any case (``exchange.PeriodicTask``).
 
 It always names the same joints: the hardware interface copies a message while it reads the one
 before, and fails when the number of names has changed. A joint whose drive is not online has NaN
@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, JointConfiguration
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.exchange.exchange import Errand
+from drive_can_bridge.exchange.exchange import PeriodicTask
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader, QUANTITIES
@@ -173,7 +173,7 @@ class Joints:
         warn = speaker.warn
         self._taken: list[PolledTopics] = []
         self._states: JointStates | None = None
-        self._errand: Errand | None = None
+        self._periodic_task: PeriodicTask | None = None
         ordered = [drives[name] for name in configuration.drives]
         known = {drive.drive.joint.name for drive in ordered if drive.drive.joint is not None}
         for bus in configuration.buses:
@@ -194,19 +194,19 @@ class Joints:
         if configuration.joint_state_rate > 0.0:
             self._period = 1.0 / configuration.joint_state_rate
             self._states = JointStates(node, ordered, stamps, warn)
-            self._errand = Errand(self._states.publish)
+            self._periodic_task = PeriodicTask(self._states.publish)
             for drive in ordered:
-                drive.exchange.errand = self._errand
+                drive.exchange.periodic_task = self._periodic_task
 
     def start(self) -> None:
         """Begin to publish."""
-        if self._errand is not None:
-            self._errand.begin(self._period, self._now())
+        if self._periodic_task is not None:
+            self._periodic_task.begin(self._period, self._now())
 
     def destroy(self) -> None:
         """Take the topics out of the node. Nobody may take commands any more."""
-        if self._errand is not None:
-            self._errand.end()
+        if self._periodic_task is not None:
+            self._periodic_task.end()
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:

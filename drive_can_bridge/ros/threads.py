@@ -124,7 +124,7 @@ class PeriodicThread:
         self._now = clock.now
         self._action = action
         self._failed = failed
-        self._changed = clock.alarm()   # an Event costs more than many an action
+        self._changed = clock.wake_event()   # an Event costs more than many an action
         self._ending = False
         self._thread = clock.worker(self._run, name)
 
@@ -156,7 +156,7 @@ class PeriodicThread:
             due = max(due + self._period, self._now())  # never twice to catch up
 
 
-class Pace:
+class CpuThrottle:
     """
     Have one thread pause when it has used more than its share. Made and used by that thread.
 
@@ -265,17 +265,17 @@ class ServiceThread:
 
     def _take_all(self) -> None:
         self._prepare_thread()
-        pace = Pace(self._share, self._clock)
+        throttle = CpuThrottle(self._share, self._clock)
         while not self._ending and self._context.ok():
             try:
-                self._take_while_unchanged(pace)
+                self._take_while_unchanged(throttle)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._ending:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._clock.wait(self._clock.now() + ERROR_PAUSE)
 
-    def _take_while_unchanged(self, pace: Pace) -> None:
+    def _take_while_unchanged(self, throttle: CpuThrottle) -> None:
         """Take what comes until something else is to be served."""
         self._changed = False
         context_handle: Any = self._context.handle
@@ -299,7 +299,7 @@ class ServiceThread:
                 waiting.wait(-1)
                 for pointer in waiting.get_ready_entities('service'):
                     self._take(present[pointer])
-                pace.keep()
+                throttle.keep()
 
     def _take(self, service: Service) -> None:
         kind: Any = service.srv_type
@@ -330,9 +330,9 @@ class ServiceThread:
             answered()
 
     def _answer_all(self) -> None:
-        pace = Pace(self._share, self._clock)
+        throttle = CpuThrottle(self._share, self._clock)
         while self._do_one_job():
-            pace.keep()
+            throttle.keep()
 
     def _do_one_job(self) -> bool:
         """Do what comes next; the job is forgotten then, and with it the drive that it was for."""

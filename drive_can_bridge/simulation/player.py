@@ -57,7 +57,7 @@ class BusPlayer:
         self._show_frame = show_frame or (lambda *_: None)
         self._lock = threading.Lock()
         self._now = clock.now
-        self._alarm = clock.alarm()
+        self._wake = clock.wake_event()
         self._wake_at = 0.0
         self._closing = False
         self._opened = False            # ever
@@ -86,7 +86,7 @@ class BusPlayer:
 
     def stop(self) -> None:
         self._closing = True
-        self._alarm.ring()
+        self._wake.ring()
         self._thread.join()
         self._link.stop()
 
@@ -95,7 +95,7 @@ class BusPlayer:
         """Hold the drives, and give the time; what comes of it is sent at once afterwards."""
         with self._lock:
             yield self._now()
-        self._alarm.ring()
+        self._wake.ring()
 
     def _run(self) -> None:
         try:
@@ -110,7 +110,7 @@ class BusPlayer:
                         (drive.next_timer() for drive in self._drives), default=math.inf)
                 for notice in notices:
                     self._say(notice)
-                self._alarm.wait(self._wake_at)
+                self._wake.wait(self._wake_at)
         except Exception as error:  # noqa: BLE001  the outermost loop: end with a line of text
             self.link_failed(f'{type(error).__name__}: {error}')
 
@@ -154,7 +154,7 @@ class BusPlayer:
             notices = self._pump(drives)
             due = any(drive.next_timer() < self._wake_at for drive in drives)
         if due:
-            self._alarm.ring()
+            self._wake.ring()
         for notice in notices:
             self._say(notice)
 

@@ -205,7 +205,7 @@ class FlightRecorder:
             for bus in buses if bus.trace_seconds > 0.0}
         self._first: dict[str, list[Path]] = {name: [] for name in self._buses}
         self._lock = threading.Lock()
-        self._changed = clock.alarm()
+        self._changed = clock.wake_event()
         self._closing = False
         self._thread = clock.worker(self._run, 'flight recorder')
         if self._buses:

@@ -18,7 +18,7 @@ import can
 import can.interfaces
 
 from drive_can_bridge.core.words import show, suggestion
-from drive_can_bridge.transport.places import SERIAL_INTERFACES
+from drive_can_bridge.transport.bus_identity import SERIAL_INTERFACES
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')

@@ -23,10 +23,10 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.transport.bus_identity import adapter_of, device_of, is_absent
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import gone, in_words
-from drive_can_bridge.transport.places import adapter_of, device_of, is_absent
 from drive_can_bridge.transport.port import open_port
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
@@ -101,7 +101,7 @@ class Link:
         self._no_room_since: float | None = None
         self._heard = False
         self._closing = self._tried = False
-        self._end, self._first_attempt = clock.alarm(), clock.alarm()
+        self._end, self._first_attempt = clock.wake_event(), clock.wake_event()
         self._thread = clock.worker(self._run, f'bus {bus.name}')
         self.frames_sent = 0
         self.frames_received = 0

@@ -14,8 +14,8 @@ from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.transport.bus_identity import adapter_of, is_absent
 from drive_can_bridge.transport.failures import gone, in_words, with_outlook
-from drive_can_bridge.transport.places import adapter_of, is_absent
 from drive_can_bridge.transport.port import open_port, Port
 
 #: entries that may wait to be taken; beyond, they are lost and counted
@@ -74,7 +74,7 @@ class Tap:
         self._records = records
         self._complain = complain
         self._closing = False
-        self._end = clock.alarm()
+        self._end = clock.wake_event()
         self._port: Port | None = self._open()
         self._thread = clock.worker(self._run, f'tap {bus.name}')
         self._thread.start()

@@ -55,7 +55,7 @@ class Wire:
         """Take the bus away."""
         self.down = reason
         for end in self.ends:
-            end.alarm.ring()
+            end.wake_event.ring()
 
     def restore(self) -> None:
         """Give it back."""
@@ -75,7 +75,7 @@ class End(EndPoint):
         self.witness: Callable[[can.Message], None] | None = None
         if wire.down:
             raise BusUnavailable(wire.down)
-        self.alarm = wire.clock.alarm()
+        self.wake_event = wire.clock.wake_event()
         self._wire = wire
         self._routes = routes
         self._coming: deque[tuple[float, Frame]] = deque()
@@ -85,7 +85,7 @@ class End(EndPoint):
         """Let a frame come in."""
         if not self._routes or any(route.matches(frame) for route in self._routes):
             self._coming.append((at, frame))
-            self.alarm.ring()
+            self.wake_event.ring()
 
     def receive(self, timeout: float) -> Frame | None:
         """Wait for a frame."""
@@ -105,7 +105,7 @@ class End(EndPoint):
                 return frame
             if clock.now() >= until:
                 return None
-            self.alarm.wait(min(due, until))
+            self.wake_event.wait(min(due, until))
 
     def send(self, frame: Frame, timeout: float) -> None:
         """Hand a frame over."""

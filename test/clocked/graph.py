@@ -19,14 +19,13 @@ import os
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from jumping import JumpingAlarm, JumpingClock
+from jumping import JumpingClock, JumpingWakeEvent
 from rcl_interfaces.msg import Log
 from rclpy.impl.implementation_singleton import rclpy_implementation as real
 from rclpy.logging import LoggingSeverity
 from rclpy.qos import (
     DurabilityPolicy, HistoryPolicy, qos_profile_services_default, QoSPolicyKind, QoSProfile,
-    ReliabilityPolicy,
-)
+    ReliabilityPolicy)
 from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
 from states import STATES, TRANSITIONS
 import yaml
@@ -326,7 +325,7 @@ class Entity(Destroyable):
         except real.RCLError as error:
             raise ValueError(str(error)) from None
         self.quality = quality.to_dict()
-        self.alarms: set[JumpingAlarm] = set()
+        self.wake_events: set[JumpingWakeEvent] = set()
         self.type_name = _type_name(kind)
         getattr(self.graph, self.where).append(self)
 
@@ -352,8 +351,8 @@ class Entity(Destroyable):
 
     def ring(self) -> None:
         """Wake who waits for it."""
-        for alarm in self.alarms:
-            alarm.ring()
+        for wake_event in self.wake_events:
+            wake_event.ring()
 
 
 def _type_name(kind: Any) -> str:
@@ -380,7 +379,7 @@ class TopicEnd(Entity):
         self.misfits = 0
         self.told_misfits = 0
         self.misfit = QoSPolicyKind.INVALID
-        self.events: set[JumpingAlarm] = set()
+        self.events: set[JumpingWakeEvent] = set()
 
     def get_topic_name(self) -> str:
         """Return the full name."""
@@ -414,8 +413,8 @@ class TopicEnd(Entity):
             for end in (self, other):
                 end.misfits += 1
                 end.misfit = reason
-                for alarm in end.events:
-                    alarm.ring()
+                for wake_event in end.events:
+                    wake_event.ring()
 
 
 def _misfit(offered: dict[str, Any], requested: dict[str, Any]) -> QoSPolicyKind | None:
@@ -512,7 +511,7 @@ class EventHandle(Destroyable):
             real.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
             real.rcl_publisher_event_type_t.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS)
         self._told = 0
-        self.alarms = parent.events
+        self.wake_events = parent.events
 
     def ready(self) -> bool:
         """Tell whether there is news."""
@@ -675,7 +674,7 @@ class GuardCondition(Destroyable):
 
     def __init__(self, context: Context) -> None:
         super().__init__()
-        self.alarms: set[JumpingAlarm] = set()
+        self.wake_events: set[JumpingWakeEvent] = set()
         self.triggered = False
 
     def ready(self) -> bool:
@@ -685,8 +684,8 @@ class GuardCondition(Destroyable):
     def trigger_guard_condition(self) -> None:
         """Do."""
         self.triggered = True
-        for alarm in self.alarms:
-            alarm.ring()
+        for wake_event in self.wake_events:
+            wake_event.ring()
 
 
 class Timer(Destroyable):
@@ -694,7 +693,7 @@ class Timer(Destroyable):
 
     def __init__(self, clock: 'Clock', context: Context, period: int, autostart: bool) -> None:
         super().__init__()
-        self.alarms: set[JumpingAlarm] = set()
+        self.wake_events: set[JumpingWakeEvent] = set()
         self._period = period
         self.next_call = self.graph.clock.now() + 1e-9 * period if autostart else math.inf
 
@@ -734,16 +733,17 @@ class WaitSet(Destroyable):
         """Wait until something is ready, or for so many ns; -1: for ever."""
         clock = self.graph.clock
         until = clock.now() + 1e-9 * timeout if timeout >= 0 else math.inf
-        alarm = clock.alarm()
+        wake_event = clock.wake_event()
         everything = list(itertools.chain(*self._entities.values()))
         for entity in everything:
-            entity.alarms.add(alarm)
+            entity.wake_events.add(wake_event)
         try:
             while not any(entity.ready() for entity in everything) and clock.now() < until:
-                alarm.wait(min([until, *(timer.next_call for timer in self._entities['timer'])]))
+                wake_event.wait(min(
+                    [until, *(timer.next_call for timer in self._entities['timer'])]))
         finally:
             for entity in everything:
-                entity.alarms.discard(alarm)
+                entity.wake_events.discard(wake_event)
         self._ready = {kind: [entity for entity in those if entity.ready()]
                        for kind, those in self._entities.items()}
         for guard in self._ready['guard_condition']:

@@ -103,8 +103,8 @@ class Task:
         self._clock.hand_over()
 
 
-class JumpingAlarm:
-    """Wakes one sleeper; see :class:`drive_can_bridge.clock.Alarm`."""
+class JumpingWakeEvent:
+    """Wakes one sleeper; see :class:`drive_can_bridge.clock.WakeEvent`."""
 
     def __init__(self, clock: 'JumpingClock') -> None:
         self._clock = clock
@@ -203,9 +203,9 @@ class JumpingClock:
         """Return the s of a processor that this thread has used: computing takes no time."""
         return 0.0
 
-    def alarm(self) -> JumpingAlarm:
+    def wake_event(self) -> JumpingWakeEvent:
         """Return what a thread waits by."""
-        return JumpingAlarm(self)
+        return JumpingWakeEvent(self)
 
     def lock(self) -> JumpingLock:
         """Return what keeps others out."""

@@ -10,6 +10,7 @@ from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
@@ -17,7 +18,6 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.core.users import Users
 
 
 class Idle(Session):
@@ -29,7 +29,7 @@ class Idle(Session):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.done: list[str] = []
-        self.users = Users(self, self.Server(self))
+        self.services = DriveServices(self, self.Server(self))
 
     class Server:
         """Lets everybody wait."""
@@ -95,7 +95,7 @@ def test_loss_of_the_bus() -> None:
     assert made.done == ['cancel', 'lost: bus main is down', 'idle: bus main is down']
     assert made.take_events() == [StationLost(says('bus_is_down', bus='main', reason='unplugged'))]
     assert made.take_frames() == []
-    made.users.submit(read(GAIN), 5.0)
+    made.services.submit(read(GAIN), 5.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
 
 
@@ -104,13 +104,13 @@ def test_refusals_in_order() -> None:
     reasons = []
     for change in (lambda: None, lambda: made.activate(1.0), lambda: made.bus_up(2.0)):
         change()
-        made.users.submit(read(GAIN), 3.0)
+        made.services.submit(read(GAIN), 3.0)
         reasons += [event.outcomes for event in made.take_events()]
     assert reasons == [(Failure('bridge inactive'),), (Failure('bus down'),)]
     assert made.waiting == 1
     made.waiting = 63
-    made.users.submit(read(GAIN), 4.0)
-    made.users.submit(read(GAIN, SPEED), 4.0)
+    made.services.submit(read(GAIN), 4.0)
+    made.services.submit(read(GAIN, SPEED), 4.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('busy'),) * 2]
     assert made.statistics.requests_failed == 4
 
@@ -120,7 +120,7 @@ def test_empty_request_is_answered_at_once() -> None:
     made.activate(1.0)
     made.bus_up(1.0)
     empty = read()
-    made.users.submit(empty, 2.0)
+    made.services.submit(empty, 2.0)
     assert made.take_events() == [RequestCompleted(empty, ())]
     assert made.waiting == 0
 
@@ -141,14 +141,14 @@ def test_states() -> None:
     assert made.control is not None
     made.activate(0.5)
     made.bus_available = True
-    made.users.submit(ControlRequest(ControlAction.ENABLE), 1.0)
+    made.services.submit(ControlRequest(ControlAction.ENABLE), 1.0)
     for raw in (1, 3):
-        assert made.users.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
+        assert made.services.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
         made.control.word_sent(1.0)
         made.control.status_received(raw, 1.0)
         made.control_changed(1.0)
     assert made.state is DriveState.NOT_ARMED
-    assert made.users.command(0, 1.0, 1.0) is CommandOutcome.ARMED
+    assert made.services.command(0, 1.0, 1.0) is CommandOutcome.ARMED
     assert made.state is DriveState.ONLINE
     made.control.status_received(8, 1.0)
     assert made.state is DriveState.FAULT
@@ -159,19 +159,19 @@ def test_states() -> None:
 def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
     plain = session(request=(WORD, SPEED))
     assert [item.parameter for item in plain.setpoints.items] == [WORD, SPEED]
-    assert plain.users.write_refusal(WORD) == says('sent_cyclically', name='control_word')
+    assert plain.services.write_refusal(WORD) == says('sent_cyclically', name='control_word')
     controlled = session(request=(WORD, SPEED), control=CONTROL)
-    assert controlled.users.write_refusal(WORD) == 'use ~/enable'
-    assert session(control=CONTROL).users.write_refusal(WORD) == 'use ~/enable'
-    assert controlled.users.write_refusal(STATUS) == ''
+    assert controlled.services.write_refusal(WORD) == 'use ~/enable'
+    assert session(control=CONTROL).services.write_refusal(WORD) == 'use ~/enable'
+    assert controlled.services.write_refusal(STATUS) == ''
 
 
 def test_refused_commands_are_counted() -> None:
     made = session()
     for value in (math.nan, 1e9, True):
         with pytest.raises(ValueRefused):
-            made.users.command(0, value, 1.0)
-    made.users.command(0, 5.0, 1.0)
+            made.services.command(0, value, 1.0)
+    made.services.command(0, 5.0, 1.0)
     assert made.statistics.commands_refused == 3
 
 
@@ -179,7 +179,7 @@ def test_a_command_of_any_size_is_refused_not_a_defect() -> None:
     made = session(request=(parameter('free', 60, scale=0.01),))
     for value in (1.7e308, -1.7e308):
         with pytest.raises(ValueRefused):
-            made.users.command(0, value, 1.0)
+            made.services.command(0, value, 1.0)
     assert made.statistics.commands_refused == 2
 
 
@@ -195,11 +195,11 @@ def test_reconfigure_changes_what_is_named() -> None:
 def test_control_requests_need_a_drive() -> None:
     made = session(control=CONTROL)
     made.active = made.bus_available = made.online = True
-    made.users.submit(ControlRequest(ControlAction.DISABLE), 1.0)
+    made.services.submit(ControlRequest(ControlAction.DISABLE), 1.0)
     assert made.take_events() == [], 'it waits for the drive'
     request = ControlRequest(ControlAction.DISABLE)
     without = session()
-    without.users.submit(request, 1.0)
+    without.services.submit(request, 1.0)
     assert without.take_events() == [
         ControlCompleted(request, False, says('no_control_section'))]
 
@@ -238,7 +238,7 @@ class Parts(Session):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.log: list[str] = []
-        self.users = Users(self, Idle.Server(Idle(drive(), None)))
+        self.services = DriveServices(self, Idle.Server(Idle(drive(), None)))
         self.first, self.second = Acting('first', self.log), Acting('second', self.log)
         self.channel = Acting('channel', self.log)
         self.look_after(self.first, self.second, channel=self.channel)
@@ -278,7 +278,7 @@ def test_parts_act_when_they_are_due_and_in_their_order() -> None:
     assert made.log == ['second']
     made.log.clear()
     made.online = True
-    made.users.submit(ControlRequest(ControlAction.ENABLE), 1.0)
+    made.services.submit(ControlRequest(ControlAction.ENABLE), 1.0)
     assert made.next_timer() == 3.0, 'control waits for 2 s'
     made.log.clear()
     made.handle_timer(7.0)

@@ -57,7 +57,7 @@ class DriveNotes:
         if self.failing:
             raise ZeroDivisionError('a defect')
         for index, value in self.commands:
-            self.session.users.command(index, value, now)
+            self.session.services.command(index, value, now)
         self.commands.clear()
 
     def request_sent(self, now: float) -> None:

@@ -306,7 +306,7 @@ def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: Jumpin
     assert len(bench.link.take()) == 20     # one every 5 ms, as ever
     # somebody rings: the timer thread does not wait for the reader
     passes.clear()
-    exchange._alarm.ring()
+    exchange._wake.ring()
     clock.wait(clock.now() + 1e-6)
     assert passes == ['exchange main']
     # and it goes on, where the reader does not come back
@@ -326,13 +326,13 @@ def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
     exchange.activate()
     bench.at(10.0)
     exchange._keep_time(0.02)
-    while exchange._alarm.wait(0.0):
+    while exchange._wake.wait(0.0):
         pass
     for back, rings in ((10.02, False), (9.97, True)):  # it is back; it is not
         exchange._back_at, exchange._wake_at = back, 20.0
         bench.hears('7F1#00', 10.001)
         bench.hears(ANSWER, 10.001)
-        assert exchange._alarm.wait(0.0) is rings
+        assert exchange._wake.wait(0.0) is rings
         assert (exchange._wake_at < 20.0) is not rings
 
 
@@ -455,10 +455,10 @@ def test_fault_of_one_stops_its_broadcast_group_at_once() -> None:
     outcome, = [event for event in bench.notes[0].events if isinstance(event, ControlCompleted)]
     assert outcome.success, outcome.message
     exchange._wake_at = exchange._pass()
-    while exchange._alarm.wait(0.0):
+    while exchange._wake.wait(0.0):
         pass
     bench.hears('005#380B0000', bench.now + 0.01)       # told unasked
-    assert exchange._alarm.wait(0.0)
+    assert exchange._wake.wait(0.0)
     assert [text for text in bench.at(bench.now + 0.001) if text.startswith('408')] == [
         '408#7E040000']
 
@@ -583,7 +583,7 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -
             if failing:
                 raise ZeroDivisionError('a defect')
             return now + 0.01
-    bench.exchange.errand = Broken()  # type: ignore[assignment]
+    bench.exchange.periodic_task = Broken()  # type: ignore[assignment]
     bench.exchange.bus_opened()
     bench.exchange.open()
     bench.exchange.activate()
@@ -643,18 +643,18 @@ def test_whatever_is_due_sooner_wakes_the_timer() -> None:
     bench.hears(ANSWER, 10.001)
     exchange = bench.exchange
     exchange._wake_at = exchange._pass()
-    exchange._alarm.wait(0.0)
+    exchange._wake.wait(0.0)
     exchange.submit(bench.sessions[0], read(GAIN))
-    assert exchange._alarm.wait(0.0)         # its time-out comes before the next pass
+    assert exchange._wake.wait(0.0)         # its time-out comes before the next pass
 
     exchange._wake_at = 10.01
     bench.hears('10200281#0007000000000000', 10.003)
-    assert not exchange._alarm.wait(0.0)     # nothing to wait for any more
+    assert not exchange._wake.wait(0.0)     # nothing to wait for any more
     exchange._wake_at = 20.0
     bench.hears('7F1#00', 10.004)
-    assert not exchange._alarm.wait(0.0)
+    assert not exchange._wake.wait(0.0)
     bench.hears('102001E0#0000000000000000', 10.005)
-    assert exchange._alarm.wait(0.0)         # the next cycle comes before that
+    assert exchange._wake.wait(0.0)         # the next cycle comes before that
 
 
 def test_age_of_a_frame_does_not_shorten_the_pause_after_an_eeprom_write() -> None:

@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 from bus import End
 import can
-from jumping import JumpingAlarm, JumpingClock
+from jumping import JumpingClock, JumpingWakeEvent
 from world import World
 
 from drive_can_bridge.core.frame import Frame
@@ -33,7 +33,7 @@ class Condition:
 
     def __init__(self, clock: JumpingClock) -> None:
         self._clock = clock
-        self._sleeping: list[JumpingAlarm] = []
+        self._sleeping: list[JumpingWakeEvent] = []
 
     def __enter__(self) -> None:
         """Keep nobody out."""
@@ -42,9 +42,9 @@ class Condition:
         """Let nobody in."""
 
     def wait(self, timeout: float) -> bool:
-        alarm = self._clock.alarm()
-        self._sleeping.append(alarm)
-        return alarm.wait(self._clock.now() + timeout)
+        wake_event = self._clock.wake_event()
+        self._sleeping.append(wake_event)
+        return wake_event.wait(self._clock.now() + timeout)
 
     def notify_all(self) -> None:
         while self._sleeping:
@@ -56,12 +56,12 @@ class Queue:
 
     def __init__(self, clock: JumpingClock) -> None:
         self._clock = clock
-        self._alarm = clock.alarm()
+        self._wake = clock.wake_event()
         self._items: deque[Any] = deque()
 
     def put(self, item: Any) -> None:
         self._items.append(item)
-        self._alarm.ring()
+        self._wake.ring()
 
     def empty(self) -> bool:
         return not self._items
@@ -69,7 +69,7 @@ class Queue:
     def get(self, block: bool, timeout: float) -> Any:
         until = self._clock.now() + timeout
         while not self._items:
-            if not self._alarm.wait(until):
+            if not self._wake.wait(until):
                 raise queue.Empty
         return self._items.popleft()
 
@@ -80,7 +80,7 @@ class Periodic:
     def __init__(self, clock: JumpingClock, bus: 'Bus', message: can.Message, period: float,
                  ) -> None:
         self._clock, self._bus, self._message, self._period = clock, bus, message, period
-        self._ending = clock.alarm()
+        self._ending = clock.wake_event()
         clock.worker(self._run, f'{message.arbitration_id:X} again and again').start()
 
     def _run(self) -> None:

@@ -387,7 +387,7 @@ class Bridge:
 
     def command(self, value: float) -> None:
         with self.exchange.lock:
-            self.session.users.command(0, value, clock().now())
+            self.session.services.command(0, value, clock().now())
 
 
 def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration, Any]) -> None:

@@ -20,7 +20,7 @@ from unittest.mock import patch
 from urllib.parse import unquote_to_bytes
 
 from bridges import Bridge
-from jumping import JumpingAlarm, JumpingClock
+from jumping import JumpingClock, JumpingWakeEvent
 from leaks import KEPT
 from nicegui import app as framework, core
 from nicegui.client import Client
@@ -45,15 +45,15 @@ Result = TypeVar('Result')
 class _Selector(selectors.DefaultSelector):
     """Waits by the clock of the bench for what never comes: there are no sockets."""
 
-    def __init__(self, clock: JumpingClock, alarm: JumpingAlarm) -> None:
+    def __init__(self, clock: JumpingClock, wake_event: JumpingWakeEvent) -> None:
         super().__init__()
         self._clock = clock
-        self._alarm = alarm
+        self._wake = wake_event
 
     def select(self, timeout: float | None = None) -> Any:
         """Let time pass until something is due, or somebody calls."""
         if timeout is None or timeout > 0.0:
-            self._alarm.wait(math.inf if timeout is None else self._clock.now() + timeout + TICK)
+            self._wake.wait(math.inf if timeout is None else self._clock.now() + timeout + TICK)
         return super().select(0)
 
 
@@ -62,15 +62,15 @@ class JumpingLoop(asyncio.SelectorEventLoop):
 
     def __init__(self, clock: JumpingClock) -> None:
         self._clock = clock
-        self._alarm = clock.alarm()
-        super().__init__(_Selector(clock, self._alarm))
+        self._wake = clock.wake_event()
+        super().__init__(_Selector(clock, self._wake))
 
     def time(self) -> float:
         """Return the time of the bench."""
         return self._clock.now()
 
     def _write_to_self(self) -> None:
-        self._alarm.ring()
+        self._wake.ring()
 
 
 class Told:

@@ -1,19 +1,19 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What the channel of all families does with any courier; a drive with one request at a time."""
+"""What the channel of all families does with any transactor; a drive with one request."""
 
 from collections.abc import Callable, Generator, Hashable
 import math
 
 import pytest
 
-from drive_can_bridge.protocols.channel import Channel, Lane, STOP_PATIENCE
-from drive_can_bridge.protocols.courier import Courier
+from drive_can_bridge.protocols.channel import Channel, Priority, STOP_PATIENCE
+from drive_can_bridge.protocols.transactor import Transactor
 
 TIMEOUT = 0.1
 Asking = Generator[str, 'str | None', list['str | None']]
 
 
-class Postman(Courier[str, 'str | None']):
+class Postman(Transactor[str, 'str | None']):
     """Steps and replies are words; None: nobody answered. Capitals are asked once."""
 
     busy = False
@@ -62,13 +62,13 @@ class Line:
         self.channel = Channel(self.postman)
         self.results: list[object] = []
 
-    def asks(self, *steps: str, now: float, lane: Lane = Lane.OWN) -> list[str]:
+    def asks(self, *steps: str, now: float, priority: Priority = Priority.OWN) -> list[str]:
         def asking() -> Asking:
             found = []
             for step in steps:
                 found.append((yield step))
             return found
-        self.channel.run(asking(), self.results.append, now, lane)
+        self.channel.run(asking(), self.results.append, now, priority)
         return self.sent()
 
     def sent(self) -> list[str]:
@@ -87,8 +87,8 @@ class Line:
 def test_lanes_come_in_their_order() -> None:
     line = Line()
     assert line.asks('a', now=1.0) == ['a']
-    for lane in reversed(Lane):
-        line.asks(lane.name.lower(), now=1.0, lane=lane)
+    for priority in reversed(Priority):
+        line.asks(priority.name.lower(), now=1.0, priority=priority)
     assert [line.answer('', 1.01 + 0.01 * step) for step in range(6)] == [
         ['stop'], ['control'], ['setpoints'], ['users'], ['own'], []]
 
@@ -102,9 +102,9 @@ def test_what_is_held_back_is_begun_as_late_as_possible() -> None:
     def asking() -> Asking:
         begun.append(line.channel.now)
         return [(yield 'word')]
-    line.channel.run(asking(), line.results.append, 1.0, Lane.CONTROL)
+    line.channel.run(asking(), line.results.append, 1.0, Priority.CONTROL)
     assert line.channel.next_timer() == 2.0
-    assert line.asks('stop', now=1.1, lane=Lane.STOP) == ['stop']
+    assert line.asks('stop', now=1.1, priority=Priority.STOP) == ['stop']
     assert line.answer('', 1.2) == []
     assert begun == []
     assert line.at(2.0) == ['word']
@@ -114,7 +114,7 @@ def test_what_is_held_back_is_begun_as_late_as_possible() -> None:
 def test_a_stop_has_the_exchange_under_way_make_room_which_was_no_attempt() -> None:
     line = Line()
     assert line.asks('read', now=1.0) == ['read']
-    line.asks('stop', now=1.01, lane=Lane.STOP)
+    line.asks('stop', now=1.01, priority=Priority.STOP)
     line.channel.make_room(1.01)
     assert line.channel.next_timer() == pytest.approx(1.01 + STOP_PATIENCE)
     assert line.at(1.0601) == ['stop']
@@ -127,7 +127,7 @@ def test_a_stop_has_the_exchange_under_way_make_room_which_was_no_attempt() -> N
 def test_cancelled_exchange_is_waited_for_and_tells_nobody() -> None:
     line = Line()
     line.asks('a', 'b', now=1.0)
-    line.channel.cancel(Lane.OWN)
+    line.channel.cancel(Priority.OWN)
     assert line.asks('c', now=1.01) == [], 'one at a time'
     assert line.answer('late', 1.02) == ['c']
     assert line.answer('there', 1.03) == []
@@ -135,7 +135,7 @@ def test_cancelled_exchange_is_waited_for_and_tells_nobody() -> None:
 
 
 @pytest.mark.parametrize('forget', [
-    lambda line, now: line.channel.clear(), lambda line, now: line.channel.cancel(Lane.OWN)])
+    lambda line, now: line.channel.clear(), lambda line, now: line.channel.cancel(Priority.OWN)])
 def test_forgotten_question_is_not_asked_again_before_its_answer_would_have_come(
         forget: Callable[[Line, float], None]) -> None:
     line = Line()
@@ -143,7 +143,7 @@ def test_forgotten_question_is_not_asked_again_before_its_answer_would_have_come
     forget(line, 1.05)
     line.postman.forget()
     assert line.asks('A', now=1.06) == []
-    assert line.asks('B', now=1.06, lane=Lane.USERS) == ['B'], 'others go on'
+    assert line.asks('B', now=1.06, priority=Priority.USERS) == ['B'], 'others go on'
     line.answer('', 1.07)
     assert line.channel.next_timer() == pytest.approx(1.2)
     assert line.at(1.2001) == ['A']

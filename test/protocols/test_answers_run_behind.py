@@ -162,11 +162,11 @@ class Bus:
         leader = self.sessions[0]
         assert all(session.online for session in self.sessions)
         if leader.control is not None:
-            leader.users.submit(ControlRequest(ControlAction.ENABLE), self.now)
+            leader.services.submit(ControlRequest(ControlAction.ENABLE), self.now)
             self.look()
             self.live(1.0)
         for value in (0.0, 100.0):
-            leader.users.command(0, value, self.now)
+            leader.services.command(0, value, self.now)
             self.live(0.15)
         assert all(device.runs for device in self.devices)
 
@@ -228,7 +228,7 @@ def test_what_was_lost_before_is_no_doubt(kind: str, lost: int, silence: float) 
         bus.lose = 1
         bus.live(0.3)
         for session in bus.sessions[:1]:
-            session.users.command(0, 100.0, bus.now)
+            session.services.command(0, 100.0, bus.now)
     if not all(device.runs for device in bus.devices):
         bus.live(2.0)
         bus.run()
@@ -295,7 +295,7 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
     """The bus takes the broadcast that starts them all, and no frame of a member."""
     bus = Bus('cannord group of four', 0.02, 0.002)
     leader = bus.sessions[0]
-    leader.users.submit(ControlRequest(ControlAction.ENABLE), bus.now)
+    leader.services.submit(ControlRequest(ControlAction.ENABLE), bus.now)
     while not bus.devices[1].runs:
         for session in bus.sessions:
             session.handle_timer(bus.now)

@@ -9,11 +9,11 @@ from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_services import DriveServices, RequestServer
 from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.users import RequestServer, Users
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 
@@ -50,7 +50,7 @@ class Plain(Session):
         configuration = drive(control=CONTROL, request=(WORD, SPEED), period=period)
         super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
         server: RequestServer = Silent()
-        self.users = Users(self, server)
+        self.services = DriveServices(self, server)
         self.answers = Answers(self, silence='no answer', advice='look at the plug')
         self.exchange = CyclicExchange(self.answers, self, slot=0)
         self.look_after(self.exchange, channel=Silent())
@@ -162,7 +162,7 @@ def test_what_starts_a_drive_waits_for_its_turn() -> None:
     talk = Talk(period=0.3)
     talk.at(10.0)
     talk.answer(10.001)
-    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.01)
+    talk.session.services.submit(ControlRequest(ControlAction.ENABLE), 10.01)
     assert talk.session.next_timer() == pytest.approx(10.3)
     assert talk.at(10.301) == ['0100']
 
@@ -202,7 +202,7 @@ def test_the_answer_to_the_last_cycle_is_waited_for_where_the_drive_ran(answered
     talk = Talk()
     talk.at(10.0)
     talk.answer(10.001)
-    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.01)
+    talk.session.services.submit(ControlRequest(ControlAction.ENABLE), 10.01)
     talk.at(10.02)
     talk.answer(10.021)
     assert talk.at(10.04) == ['0100']

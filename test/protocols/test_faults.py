@@ -91,7 +91,7 @@ class TestKnown:
     def test_refusals_name_it(self, name: str, mapped: bool) -> None:
         partner = meet(name, mapped=mapped)
         trip(partner, 7)
-        partner.talk.session.users.submit(ControlRequest(ControlAction.ENABLE), partner.now)
+        partner.talk.session.services.submit(ControlRequest(ControlAction.ENABLE), partner.now)
         (_, success, message), = partner.talk.control_outcomes()
         assert (success, message) == (False, says('reset_first', fault='7 overcurrent'))
         assert message.startswith('fault 7 overcurrent: remove its cause, then ')
@@ -112,10 +112,10 @@ class TestKnown:
     def test_a_drive_that_is_found_in_fault(self, name: str, mapped: bool) -> None:
         partner = meet(name, mapped=mapped)
         trip(partner, 7)
-        partner.mute = True
+        partner.position_unknown = True
         partner.live(1.0)
         assert text(partner) == ''
-        partner.mute = False
+        partner.position_unknown = False
         partner.live(2.0)
         assert text(partner) == '7 overcurrent'
 

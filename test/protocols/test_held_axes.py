@@ -302,5 +302,5 @@ def test_pkw_does_not_enable_what_refuses_its_position() -> None:
     sent = talk.hears('485#C002002A00000000', 10.054)
     assert sent == ['505#C60200AA46000000']
     talk.hears('485#C60200CE22000008', 10.055)      # 0800 0022h: not in the present state
-    answer = talk.session.users.control_refusal(ControlAction.ENABLE)
+    answer = talk.session.services.control_refusal(ControlAction.ENABLE)
     assert answer.startswith('it would jump: write of position_setpoint refused')

@@ -36,7 +36,7 @@ def word(partner: Partner, name: str) -> dict[str, int]:
 def test_nothing_was_sent_at_first(family: str) -> None:
     partner = PARTNERS[family]()
     assert set(told(partner).values()) == {None}
-    partner.mute = True
+    partner.position_unknown = True
     partner.deliver(partner.talk.bus_up(partner.now))
     assert set(told(partner).values()) == {None}
 
@@ -50,7 +50,7 @@ def test_setpoints_as_the_drive_got_them(family: str) -> None:
     partner.enable()
     session = partner.talk.session
     session.setpoints.items[0].armed = True
-    session.users.command(0, -150.0, partner.now)
+    session.services.command(0, -150.0, partner.now)
     assert told(partner)['speed_setpoint'] == 0, 'commanded, not sent'
     partner.take()
     partner.live(0.1)
@@ -66,12 +66,12 @@ def test_what_the_bus_refused_was_not_sent(family: str) -> None:
     session = partner.talk.session
     partner.enable()
     session.setpoints.items[0].armed = True
-    session.users.command(0, -150.0, partner.now)
+    session.services.command(0, -150.0, partner.now)
     partner.talk.refusing = lambda text: bool(partner.setpoints(text))
     partner.live(0.03)     # no longer than the drive may be missed
     assert told(partner)['speed_setpoint'] == 0
     partner.talk.refusing = lambda text: False
-    session.users.command(0, -150.0, partner.now)
+    session.services.command(0, -150.0, partner.now)
     partner.live(1.1)
     assert told(partner)['speed_setpoint'] == -1500
 

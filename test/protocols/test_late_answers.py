@@ -186,7 +186,7 @@ def test_no_read_ever_gives_what_was_overwritten(kind: type[Partner], seed: int)
                 if chance.random() < 0.5 else
                 ReadRequest(tuple(chance.sample(registers, chance.randint(1, 2)))))
             submitted[id(request)] = now
-            session.users.submit(request, now)
+            session.services.submit(request, now)
         for frame in session.take_frames():
             partner.hear(frame, now)
         session.frames_left(now)

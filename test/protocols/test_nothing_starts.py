@@ -263,14 +263,14 @@ class Story:
         self.look()
 
     def asks(self, action: ControlAction) -> None:
-        if self.talk.session.users.control_refusal(action):
+        if self.talk.session.services.control_refusal(action):
             return
         if action is ControlAction.ENABLE:
             self.allowed = self.enabling = True
         elif action is ControlAction.DISABLE or action is ControlAction.QUICK_STOP and (
                 'PKW' not in self.kind):    # whose profile here has none
             self.allowed = False
-        self.talk.session.users.submit(ControlRequest(action), self.talk.now)
+        self.talk.session.services.submit(ControlRequest(action), self.talk.now)
         self.line.took(self.talk.sent())
         self.look()
 

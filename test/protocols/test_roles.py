@@ -55,29 +55,29 @@ def test_another_name_of_a_setpoint(family: str) -> None:
     one, = make_sessions([drive(family, table=table, request=table[:1],
                                 response=(partner.own(ACTUAL),), **MORE.get(family, {}))])
     for name in ('speed_setpoint', 'jog', partner.raw_name(50)):
-        assert one.users.write_refusal(raw(one, name)) == CYCLIC, name
+        assert one.services.write_refusal(raw(one, name)) == CYCLIC, name
         assert one.roles.role(raw(one, name)) is Role.CYCLIC, name
     for name in ('gain', partner.raw_name(40)):
-        assert one.users.write_refusal(raw(one, name)) == '', name
+        assert one.services.write_refusal(raw(one, name)) == '', name
         assert one.roles.role(raw(one, name)) is None, name
     # what is received is nobody's business, unless it cannot be written anyway
     assert one.roles.role(raw(one, 'speed')) is Role.CYCLIC
-    assert one.users.write_refusal(raw(one, 'speed')) == ''
+    assert one.services.write_refusal(raw(one, 'speed')) == ''
 
 
 @pytest.mark.parametrize('family', [*DATAMODEL, 'canopen_pkw'])
 def test_another_name_of_the_control_word(family: str) -> None:
     one = session(family, WORD_ALIAS)
     for name in ('control_word', 'start', 'p52'):
-        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.services.write_refusal(raw(one, name)) == 'use ~/enable', name
         assert one.roles.role(raw(one, name)) is Role.CONTROL, name
 
 
 def test_a_double_word_that_covers_one_of_ours() -> None:
     one = session('canopen_pkw', WIDE_WORD, WIDE_BEFORE, WIDE_SPEED)
-    assert one.users.write_refusal(raw(one, 'wide_word')) == 'use ~/enable'
-    assert one.users.write_refusal(raw(one, 'wide_before')) == 'use ~/enable'
-    assert one.users.write_refusal(raw(one, 'wide_speed')) == CYCLIC
+    assert one.services.write_refusal(raw(one, 'wide_word')) == 'use ~/enable'
+    assert one.services.write_refusal(raw(one, 'wide_before')) == 'use ~/enable'
+    assert one.services.write_refusal(raw(one, 'wide_speed')) == CYCLIC
 
 
 def test_a_word_inside_one_of_ours() -> None:
@@ -86,7 +86,7 @@ def test_a_word_inside_one_of_ours() -> None:
     one, = make_sessions([drive('canopen_pkw', table=(*TABLE, wide, low), request=(wide,),
                                 response=(ACTUAL,))])
     for name in ('position', 'position_low', 'p60', 'p61'):
-        assert one.users.write_refusal(raw(one, name)) == (
+        assert one.services.write_refusal(raw(one, name)) == (
             says('sent_cyclically', name='position')), name
 
 
@@ -98,14 +98,14 @@ def test_a_register_and_its_object() -> None:
     one, = make_sessions([drive('canopen_pkw', table=(*TABLE, word, by_object), control=table,
                                 request=(SPEED,), response=(ACTUAL,))])
     for name in ('p704', 'x2008.5', 'by_object'):
-        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.services.write_refusal(raw(one, name)) == 'use ~/enable', name
 
 
 def test_the_first_element_of_an_array_is_the_parameter_itself() -> None:
     one = session('cannord', control=False)
     for name in ('p50', 'p50.0'):
-        assert one.users.write_refusal(raw(one, name)) == CYCLIC, name
-    assert one.users.write_refusal(raw(one, 'p50.1')) == ''
+        assert one.services.write_refusal(raw(one, name)) == CYCLIC, name
+    assert one.services.write_refusal(raw(one, 'p50.1')) == ''
     assert not raw(one, 'p209.0').writable
     assert raw(one, 'p209.1').writable
 
@@ -116,9 +116,9 @@ def test_maps(family: str) -> None:
     one = session(family, copy, control=False)
     for name in ('p122', 'map_of_slot_2', 'p129'):
         assert one.roles.role(raw(one, name)) is Role.MAP
-        assert one.users.write_refusal(raw(one, name)) == ''
+        assert one.services.write_refusal(raw(one, name)) == ''
         one.active = True
-        assert one.users.write_refusal(raw(one, name)) == (
+        assert one.services.write_refusal(raw(one, name)) == (
             says('mapping_parameter'))
         one.active = False
     assert one.roles.role(raw(one, 'p121')) is one.roles.role(raw(one, 'p130')) is None
@@ -129,23 +129,23 @@ def test_what_a_servo_is_controlled_and_mapped_by() -> None:
     timer = Parameter('timer', index=0x1800, subindex=5)
     one = session('cia402', word, timer, mode='vl')
     for name in ('word', 'x6040.0', 'x6060.00'):
-        assert one.users.write_refusal(raw(one, name)) == 'use ~/enable', name
+        assert one.services.write_refusal(raw(one, name)) == 'use ~/enable', name
         assert one.roles.role(raw(one, name)) is Role.CONTROL, name
     maps = ('timer', 'x1400.1', 'x1bff.2', 'x1005.0', 'x1006.0', 'x1016.1', 'x1017.0', 'x60c2.2')
     for name in maps:
         assert one.roles.role(raw(one, name)) is Role.MAP, name
-        assert one.users.write_refusal(raw(one, name)) == '', name
+        assert one.services.write_refusal(raw(one, name)) == '', name
     one.active = True
     for name in maps:
-        assert one.users.write_refusal(raw(one, name)) == says('mapping_parameter'), name
-    assert one.users.write_refusal(raw(one, 'x13ff.1')) == ''
-    assert one.users.write_refusal(raw(one, 'x1c00.1')) == ''
+        assert one.services.write_refusal(raw(one, name)) == says('mapping_parameter'), name
+    assert one.services.write_refusal(raw(one, 'x13ff.1')) == ''
+    assert one.services.write_refusal(raw(one, 'x1c00.1')) == ''
 
 
 def test_process_data_without_a_number() -> None:
     frequency = parameter('frequency', None, storage=None)
     one, = make_sessions([drive('cannord', table=(*TABLE, frequency), request=(frequency,),
                                 response=(ACTUAL,))])
-    assert one.users.write_refusal(frequency) == says('sent_cyclically', name='frequency')
+    assert one.services.write_refusal(frequency) == says('sent_cyclically', name='frequency')
     assert one.roles.role(frequency) is Role.CYCLIC
     assert one.roles.role(WORD) is one.roles.role(GAIN) is None

@@ -8,24 +8,18 @@ import re
 import time
 from typing import Any
 
-from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.msg import (
-    Log, Parameter, ParameterEvent, ParameterType, ParameterValue,
-)
-from rcl_interfaces.srv import (
-    GetParameters, SetParameters, SetParametersAtomically,
-)
+from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.qos import (
-    DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy,
-)
+from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from service_handshake import shake_hands
 import waiting
 
 _COUNTER = itertools.count(1)
@@ -184,7 +178,7 @@ class Client:
                        what=f'a subscriber of {name}')
             host = host or re.split('/command/|/joint_command', name)[0]
             if host != name:    # nothing is sent again to a subscriber that finds out later
-                self._acquaint(name, host)
+                self._shake_hands(name, host)
         return self._publishers[name]
 
     def publish(self, name: str, message: Any) -> None:
@@ -200,11 +194,11 @@ class Client:
             found = self._services[name] = self.node.create_client(
                 service_type, name, qos_profile=qos_profile_parameters)
             wait_until(found.service_is_ready, what=f'the service {name}')
-            self._acquaint(name, host)
+            self._shake_hands(name, host)
         wait_until(found.service_is_ready, what=f'the service {name}')
         return found
 
-    def _acquaint(self, name: str, host: str) -> None:
+    def _shake_hands(self, name: str, host: str) -> None:
         clock = waiting.clock()
         deadline = clock.now() + patience(60.0)
 
@@ -214,7 +208,7 @@ class Client:
                 assert clock.now() < deadline, f'no answer from the node of {name}'
                 waiting.pause(0.002)
             return condition()
-        acquaint(self.node, name, wait, host)
+        shake_hands(self.node, name, wait, host)
 
     def ask(self, name: str, service_type: Any, request: Any = None, *, host: str = '') -> Any:
         """Call a service; return the future."""

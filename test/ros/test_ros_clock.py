@@ -121,7 +121,7 @@ def test_drives_go_on_whatever_simulated_time_is_published(
     client.listen()
     topics = stamped_topics(client)
     said = [Time(sec=1000)]
-    ending = clock().alarm()
+    ending = clock().wake_event()
 
     def publish() -> None:
         while not ending.wait(clock().now() + 0.02):

@@ -220,7 +220,7 @@ def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) 
     one.online()
     client.service('/lift/quick_stop', Trigger)
     assert enable(client)[0]
-    reached, go_on = clock().alarm(), clock().alarm()
+    reached, go_on = clock().wake_event(), clock().wake_event()
 
     def be_busy() -> None:
         reached.ring()

@@ -16,8 +16,8 @@ from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, Noted, StationFound, StationLost
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
+from drive_can_bridge.ros.bridge_runtime import Occasions
 from drive_can_bridge.ros.diagnostics import Report
-from drive_can_bridge.ros.fleet import Occasions
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.tracer import Tracer
 
@@ -148,7 +148,7 @@ def test_whoever_waits_for_a_trace_is_answered_before_the_bridge_is_cleaned_up(
     one = bridge(recording(tmp_path))
     one.online()
     future = client.ask('/drive_can_bridge/save_trace', Trigger)
-    recorder = one.node._fleet and one.node._fleet._flight
+    recorder = one.node._runtime and one.node._runtime._flight
     wait_until(lambda: recorder and recorder._calls == 1)
     assert client.transition(Transition.TRANSITION_DEACTIVATE)
     assert client.transition(Transition.TRANSITION_CLEANUP)

@@ -245,7 +245,7 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
     writes = client.node.create_client(SetParameters, '/conveyor/set_parameters')
     enable = client.node.create_client(SetBool, '/lift/enable')
     futures: list[Any] = []
-    ending = clock().alarm()
+    ending = clock().wake_event()
 
     def traffic() -> None:
         value = 0

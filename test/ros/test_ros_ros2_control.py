@@ -68,7 +68,7 @@ class Manager:
         self.hardware = HardwareTwin(client.node, self.system)
         self.update: Callable[[], None] = lambda: None
         self.crash = ''
-        self._ending = clock().alarm()
+        self._ending = clock().wake_event()
         self._worker = clock().worker(self._run, 'controllers')
         self._worker.start()
 

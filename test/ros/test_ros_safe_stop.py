@@ -72,8 +72,8 @@ def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client:
     def fail(_: float) -> bool:
         raise RuntimeError('a defect')
     with one.record() as recorder:
-        monkeypatch.setattr(exchange._alarm, 'wait', fail)
-        exchange._alarm.ring()
+        monkeypatch.setattr(exchange._wake, 'wait', fail)
+        exchange._wake.ring()
         wait_until(lambda: not exchange._thread.is_alive())
         ends_safely(one, client, recorder)
 

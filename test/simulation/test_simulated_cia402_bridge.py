@@ -119,11 +119,11 @@ class Cable:
 
     def control(self, action: ControlAction, patience: float = 5.0) -> tuple[bool, str]:
         """Ask the first drive for a control action; let time pass until it has its outcome."""
-        users, request = self.sessions[0].users, ControlRequest(action)
-        refusal = users.control_refusal(action)
+        services, request = self.sessions[0].services, ControlRequest(action)
+        refusal = services.control_refusal(action)
         if refusal:
             return False, str(refusal)
-        users.submit(request, self.now)
+        services.submit(request, self.now)
         self._collect()
         limit = self.now + patience
         while True:
@@ -135,7 +135,7 @@ class Cable:
 
     def outcome(self, request: Any) -> list[object]:
         """Submit a request to the first drive; let time pass until it has its outcome."""
-        self.sessions[0].users.submit(request, self.now)
+        self.sessions[0].services.submit(request, self.now)
         self._collect()
         for _ in range(200):
             for event in self.events:
@@ -147,7 +147,7 @@ class Cable:
     def command(self, value: float, seconds: float = 0.2) -> None:
         """Have somebody publish a setpoint for the first drive for some time."""
         for _ in range(max(round(seconds / 0.1), 1)):
-            outcome = self.sessions[0].users.command(0, value, self.now)
+            outcome = self.sessions[0].services.command(0, value, self.now)
             assert outcome in (CommandOutcome.ACCEPTED, CommandOutcome.ARMED), outcome
             self._collect()
             self.run(0.1)
@@ -489,8 +489,8 @@ def happens(cable: Cable, what: str) -> None:
     """Let something happen to the first drive, its bus or its users, who wait for nothing."""
     session = cable.sessions[0]
     if what in ACTIONS:
-        if not session.users.control_refusal(ACTIONS[what]):
-            session.users.submit(ControlRequest(ACTIONS[what]), cable.now)
+        if not session.services.control_refusal(ACTIONS[what]):
+            session.services.submit(ControlRequest(ACTIONS[what]), cable.now)
     elif what == 'bus down':
         session.bus_down(cable.now, 'unplugged')
     elif what == 'bus up':
@@ -545,7 +545,7 @@ def test_whatever_happens_what_ran_has_stopped_in_the_end(
     cable.command(600.0)
     for what, seconds in story:
         if what in speeds:
-            cable.sessions[0].users.command(0, speeds[what], cable.now)
+            cable.sessions[0].services.command(0, speeds[what], cable.now)
         else:
             happens(cable, what)
         cable.run(seconds)

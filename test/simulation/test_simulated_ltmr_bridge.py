@@ -82,7 +82,7 @@ class Line:
         self.events += [(round(self.now, 6), event) for event in self.session.take_events()]
 
     def submit(self, request: Request) -> None:
-        self.session.users.submit(request, self.now)
+        self.session.services.submit(request, self.now)
         self._collect()
 
     def outcome(self, request: Request, patience: float = 20.0) -> list[object]:
@@ -105,8 +105,8 @@ class Line:
     def control(self, action: ControlAction, patience: float = 20.0) -> tuple[bool, str]:
         """Ask for a control action; let time pass until it has its outcome."""
         request = ControlRequest(action)
-        assert not self.session.users.control_refusal(action)
-        self.session.users.submit(request, self.now)
+        assert not self.session.services.control_refusal(action)
+        self.session.services.submit(request, self.now)
         self._collect()
         limit = self.now + patience
         while True:
@@ -344,7 +344,7 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
         if what == 'fault':
             line.fault(value)
         elif what == 'control':
-            line.session.users.submit(ControlRequest(value), line.now)
+            line.session.services.submit(ControlRequest(value), line.now)
             line._collect()
         else:
             request: Any = read(RATIO)

@@ -41,15 +41,15 @@ class ScriptedPort(EndPoint):
         self.sent: list[Frame] = []
         self.send_failure: Exception | None = None
         self.closed = False
-        self._alarm = clock.alarm()
+        self._wake = clock.wake_event()
 
     def put(self, item: Frame | Exception) -> None:
         self.incoming.append(item)
-        self._alarm.ring()
+        self._wake.ring()
 
     def receive(self, timeout: float) -> Frame | None:
         if not self.incoming:
-            self._alarm.wait(self._clock.now() + timeout)
+            self._wake.wait(self._clock.now() + timeout)
         if not self.incoming:
             return None
         item = self.incoming.popleft()

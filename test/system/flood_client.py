@@ -16,11 +16,11 @@ import json
 import sys
 import time
 
-from acquaintance import acquaint
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 import rclpy
 from rclpy.qos import qos_profile_parameters, QoSProfile
+from service_handshake import shake_hands
 from std_msgs.msg import Float64
 
 #: s after which an answer will not come any more
@@ -37,7 +37,7 @@ def until(node, condition, patience=PATIENCE):
 def service(node, kind, name):
     client = node.create_client(kind, name, qos_profile=qos_profile_parameters)
     client.wait_for_service(PATIENCE)
-    acquaint(node, name, lambda condition, seconds: until(node, condition, seconds))
+    shake_hands(node, name, lambda condition, seconds: until(node, condition, seconds))
     return client
 
 

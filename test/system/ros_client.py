@@ -14,7 +14,6 @@ import re
 import sys
 import threading
 
-from acquaintance import acquaint
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
@@ -22,6 +21,7 @@ from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomic
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
+from service_handshake import shake_hands
 from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
 from waiting import clock
@@ -167,7 +167,7 @@ class Client:
                     raise Failed(f'waited {timeout:g} s for any answer of the node of {name}')
                 self.spin(0.02)
             return condition()
-        acquaint(self.node, name, wait)
+        shake_hands(self.node, name, wait)
         future = service.call_async(request)
         self.until(future.done, timeout, f'the answer of {name}')
         return future.result()

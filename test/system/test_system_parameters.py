@@ -13,7 +13,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.cli.main import main as drive_can
-from drive_can_bridge.transport.places import DeviceLock
+from drive_can_bridge.transport.bus_identity import DeviceLock
 
 #: nothing here may depend on how busy the machine is
 PATIENT: dict[str, Any] = {'missed_limit': 100, 'parameter_timeout': 10.0}

@@ -14,7 +14,7 @@ import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
-from drive_can_bridge.transport.places import DeviceLock
+from drive_can_bridge.transport.bus_identity import DeviceLock
 from drive_can_bridge.transport.port import open_port
 
 #: opens a port like anybody, tells, and keeps it until it is killed
@@ -31,7 +31,7 @@ sys.stdin.read()
 STRANGER = """
 import os, sys
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.transport.places import DeviceLock
+from drive_can_bridge.transport.bus_identity import DeviceLock
 if os.getuid() == 0:
     os.setgroups([])
     os.setuid(65534)

@@ -23,18 +23,18 @@ class HeldPort:
     def __init__(self, clock: Clock) -> None:
         self.witness: Callable[[can.Message], None] | None = None
         self.steps: deque[list[can.Message] | Exception | None] = deque()
-        self._alarm = clock.alarm()
+        self._wake = clock.wake_event()
 
     def put(self, *steps: list[can.Message] | Exception | None) -> None:
         """Give it something to do, and wait until it has begun with the last of it."""
         self.steps.extend(steps)
-        self._alarm.ring()
+        self._wake.ring()
         wait_for(lambda: not self.steps, 'the tap')
 
     def receive(self, _timeout: float) -> None:
         """Take what comes next: messages, the end of the time, or of the bus."""
         while not self.steps:
-            self._alarm.wait()
+            self._wake.wait()
         step = self.steps.popleft()
         if isinstance(step, Exception):
             raise step

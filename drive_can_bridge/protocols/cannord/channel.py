@@ -25,7 +25,7 @@ from drive_can_bridge.protocols.cannord.parameter_frame import (
     ParameterFrame, ParameterLayout, Response, Task,
 )
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.courier import Courier
+from drive_can_bridge.protocols.transactor import Transactor
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ SILENT = Reply(None)
 NOT_SENT = Reply(None, sent=False)
 
 
-class TaskCourier(Courier[Ask, Reply]):
+class TaskTransactor(Transactor[Ask, Reply]):
     """
     Hands tasks to the inverter, and tells which response belongs to them.
 

@@ -179,7 +179,7 @@ class Group:
         """Record that an inverter is offline."""
         if session.active:      # else the bridge ends: what it reported last is to be told
             self.control.member_lost(session.configuration.name)
-            self._leader.gate.follow()
+            self._leader.interlock.follow()
 
     def end(self, reason: Sentence, now: float) -> None:
         """Record that all are stopped: that, and no member that goes, takes the enable back."""

@@ -25,7 +25,7 @@ from drive_can_bridge.core.requests import (
 )
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.cannord.procedures import TaskAccess
-from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.channel import Priority
 
 TIMEOUT_NUMBER = 513
 #: periods that the time-out should last at least: one frame lost, the next one late
@@ -77,8 +77,8 @@ class TimeoutWatch:
     def look(self, now: float) -> None:
         """Read it, unless that is under way, or nobody answered lately."""
         if self._parameter is not None and now >= self._ask_at and (
-                self._access.channel.is_idle(Lane.OWN)):
-            self._access.serve(ReadRequest((self._parameter,)), self._take, now, Lane.OWN)
+                self._access.channel.is_idle(Priority.OWN)):
+            self._access.serve(ReadRequest((self._parameter,)), self._take, now, Priority.OWN)
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         """Look again when somebody has written it."""

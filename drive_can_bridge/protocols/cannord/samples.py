@@ -91,5 +91,5 @@ class Samples:
 
     def _publish(self, sample: ProcessDataReceived) -> None:
         self._last = (*sample.raws, *self._last[len(sample.raws):])
-        self._session.gate.measured(sample.raws)
+        self._session.interlock.measured(sample.raws)
         self._session.report.note(sample)

@@ -23,6 +23,7 @@ from functools import partial
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
@@ -32,22 +33,18 @@ from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
-from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskCourier
+from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskTransactor
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.group import Group, Member
-from drive_can_bridge.protocols.cannord.identifiers import (
-    broadcasts, identifier, MessageObject,
-)
+from drive_can_bridge.protocols.cannord.identifiers import broadcasts, identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import decode_main, EXTRA_LENGTH
 from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cannord.states import (
-    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
-)
+    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER)
 
 
 _SILENCE = 'no answer to process data'
@@ -94,10 +91,10 @@ class CannordSession(Session):
                 for kind in MessageObject)
         self._swap: bool = options.swap_setpoints_2_3
         self._samples = Samples(self)
-        self._courier = TaskCourier(
+        self._transactor = TaskTransactor(
             ParameterLayout(options.value_order, options.index_byte), self.outbox,
             task_identifier, extended=self._extended, retry=self.retry)
-        self._channel = TaskChannel(self._courier)
+        self._channel = TaskChannel(self._transactor)
         access = procedures.TaskAccess(
             self._channel, self.retry, samples=self._samples, persist=options.persist_writes,
             signed=procedures.signed_cells(drive.profile.parameters.values()))
@@ -105,7 +102,7 @@ class CannordSession(Session):
         self._masters = request_identifier, task_identifier
         self._broadcasts = broadcasts(drive.station, extended=self._extended)
         self._timeout = TimeoutWatch(drive, access, self.report)
-        self.users = Users(self, access)
+        self.services = DriveServices(self, access)
         self._answers = Answers(self, silence=_SILENCE, advice=_ADVICE, in_turn=not group.alone)
         group.join(Member(self, request_identifier, self._answers, self._samples))
         self._cycles = self._answers if self._led else group.exchange
@@ -187,7 +184,7 @@ class CannordSession(Session):
                 self.report.reject(sentences.not_of_this_drive(str(frame)))
         except Unasked as error:
             self.report.unasked(sentences.malformed(str(error)), self._channel.late(
-                now - age, partial(self._courier.answers, data)), now)
+                now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
 

@@ -36,8 +36,8 @@ from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.courier import Courier
 from drive_can_bridge.protocols.placement import SentWrites
+from drive_can_bridge.protocols.transactor import Transactor
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -122,7 +122,7 @@ Reply = Union[Answered, Refused, Silence]
 Procedure = Generator[Step, Reply, Any]
 
 
-class MailboxCourier(Courier[Step, Reply]):
+class MailboxTransactor(Transactor[Step, Reply]):
     """
     One exchange at a time. Late answers have the wrong toggle.
 

@@ -84,15 +84,15 @@ class Rounds:
         if found:
             self._take_status(self._words)
         elif self._status is not None and self._status_among(self._words) is None:
-            self._session.gate.status(None, now)
+            self._session.interlock.status(None, now)
             self._session.control_changed(now)
 
     def _take_status(self, words: dict[Address, int]) -> None:
-        now, gate = self._channel.now, self._session.gate
+        now, interlock = self._channel.now, self._session.interlock
         raw = self._status_among(words)
         if raw is not None:
-            gate.status(raw, now)
-        gate.follow()
+            interlock.status(raw, now)
+        interlock.follow()
         self._writers.write_control(now, known=self.blank or raw is not None)
 
     def _status_among(self, words: dict[Address, int]) -> int | None:

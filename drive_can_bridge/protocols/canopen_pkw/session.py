@@ -33,6 +33,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, Noted
 from drive_can_bridge.core.frame import Frame
@@ -41,20 +42,16 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
-from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
-from drive_can_bridge.protocols.canopen.node import (
-    Change, Node, START_PERIOD, START_SPACING,
-)
+from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxCourier, Procedure,
-)
+    MailboxChannel, MailboxTransactor, Procedure)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
-from drive_can_bridge.protocols.channel import Lane
+from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
@@ -75,13 +72,13 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._started_at = -math.inf    # by NMT, the last time
-        self._channel = MailboxChannel(MailboxCourier(
+        self._channel = MailboxChannel(MailboxTransactor(
             self._send, order=options.abort_code_order, retry=self.retry,
             sent=SentWrites(self.sent, placement)))
         self._writers = Writers(self, self._channel)
         self._rounds = Rounds(self, self._channel, self._writers)
         self._exchange = PolledExchange(self, self, self._channel)
-        self.users = Users(
+        self.services = DriveServices(
             self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self._course = Life(self._channel)
         self.look_after(channel=self._channel)
@@ -213,9 +210,9 @@ class PkwSession(Session):
     def _close(self, reason: Sentence, failure: Sentence, now: float) -> None:
         """Handle a node that takes no PDOs: none that was sent is answered any more."""
         self.lose(reason, now)
-        self.users.fail_all(failure)
+        self.services.fail_all(failure)
         # a stop takes its course: however often a node starts anew, they do not pile up
-        if self._channel.is_idle(Lane.STOP):
+        if self._channel.is_idle(Priority.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
 

@@ -35,7 +35,7 @@ from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
-from drive_can_bridge.protocols.channel import Lane, STOP_PATIENCE
+from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
 from drive_can_bridge.protocols.polling import TOLERANCE
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
 from drive_can_bridge.protocols.stop_again import StopAgain
@@ -87,8 +87,8 @@ class Writers:
 
     def cancel(self) -> None:
         """Leave alone what is under way, but for a stop."""
-        self._channel.cancel(Lane.SETPOINTS)
-        self._channel.cancel(Lane.CONTROL)
+        self._channel.cancel(Priority.SETPOINTS)
+        self._channel.cancel(Priority.CONTROL)
 
     # -- while it is online -----------------------------------------------------------------------
 
@@ -114,8 +114,8 @@ class Writers:
             return
         self._output.look([setpoint.raw for setpoint in items], now, hold=[
             index for index, setpoint in enumerate(items) if not setpoint.known])
-        if self._output.waiting and self._channel.is_idle(Lane.SETPOINTS):
-            self._channel.run(self._write_setpoints(), lambda _: None, now, Lane.SETPOINTS)
+        if self._output.waiting and self._channel.is_idle(Priority.SETPOINTS):
+            self._channel.run(self._write_setpoints(), lambda _: None, now, Priority.SETPOINTS)
 
     def write_all_setpoints(self, now: float) -> None:
         """Write all setpoints at once, whether they have changed or not; others make room."""
@@ -129,7 +129,7 @@ class Writers:
 
         Others make room for those, once a round: a slow drive has to be read, too.
         """
-        expired = self._session.gate.expire(now)
+        expired = self._session.interlock.expire(now)
         if expired and not self._made_room:
             self._made_room = True
             self._channel.make_room(now)
@@ -251,9 +251,9 @@ class Writers:
             return
         if control.stopping and word != output.word:    # once for each stop
             self._channel.make_room(now)
-        if self._channel.is_idle(Lane.CONTROL):
+        if self._channel.is_idle(Priority.CONTROL):
             self._channel.run(
-                self._write_word(parameter, control), lambda _: None, now, Lane.CONTROL)
+                self._write_word(parameter, control), lambda _: None, now, Priority.CONTROL)
 
     def _write_word(self, parameter: Parameter, control: ControlMachine,
                     ) -> Generator[Step, Reply, None]:
@@ -355,7 +355,7 @@ class Writers:
         """
         writes, patience = self._stop.writes(), self._session.retry.timeout
         if not again:
-            self._channel.cancel(Lane.STOP)
+            self._channel.cancel(Priority.STOP)
             self._channel.make_room(now)
         timeout = min(patience, STOP_PATIENCE if again else (
             self.stop_time / (STOP_ATTEMPTS * max(1, len(writes)))))

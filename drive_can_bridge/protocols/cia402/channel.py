@@ -16,8 +16,8 @@ from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.courier import Courier
 from drive_can_bridge.protocols.telegrams import Direction
+from drive_can_bridge.protocols.transactor import Transactor
 
 #: bytes of an object that are read at most
 LENGTH_MAX = 256
@@ -62,7 +62,7 @@ class Reply(NamedTuple):
 SILENT, NOT_SENT, DONE = Reply(), Reply(sent=False), Reply(b'')
 
 
-class SdoCourier(Courier[Ask, Reply]):
+class SdoTransactor(Transactor[Ask, Reply]):
     """
     Does one transfer at a time.
 

@@ -76,7 +76,7 @@ class Homing:
     def begin(self, request: ControlRequest, now: float) -> None:
         """Begin; answered by exactly one ``ControlCompleted``."""
         self._request, self._failure = request, NOTHING
-        self._session.gate.hold(True)
+        self._session.interlock.hold(True)
         self._rules.homing_bits = 0
         self._deadline = now + self._timeout
         self._go(Step.LOWERING)
@@ -192,4 +192,4 @@ class Homing:
         self._rules.homing_bits = None
         self._deadline = math.inf
         self._go(Step.NONE)
-        self._session.gate.hold(False)
+        self._session.interlock.hold(False)

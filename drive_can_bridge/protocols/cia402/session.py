@@ -20,11 +20,11 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
-)
+    ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.process_image import ProcessImage
@@ -33,28 +33,24 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
-from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
-    Change, Node, START_PAUSE, START_PERIOD, START_SPACING,
-)
-from drive_can_bridge.protocols.channel import Channel, Lane
+    Change, Node, START_PAUSE, START_PERIOD, START_SPACING)
+from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERIOD, Outcome
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoCourier
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoTransactor
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
-    cells, MAP, SdoAccess, write_until_answered,
-)
+    cells, MAP, SdoAccess, write_until_answered)
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
-)
+    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
@@ -124,9 +120,9 @@ class Cia402Session(Session):
             roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
-        self._courier = SdoCourier(drive.station, self.outbox, self.retry)
-        self._channel: SdoChannel = Channel(self._courier)
-        self.users = Users(self, SdoAccess(self._channel, self.retry))
+        self._transactor = SdoTransactor(drive.station, self.outbox, self.retry)
+        self._channel: SdoChannel = Channel(self._transactor)
+        self.services = DriveServices(self, SdoAccess(self._channel, self.retry))
         self._stop: SafeStop[Ask, Reply] = SafeStop(
             self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
             word=CONTROL_PARAMETER)
@@ -170,7 +166,7 @@ class Cia402Session(Session):
 
     def begin(self, now: float) -> None:
         self.exchange.stop()
-        self._channel.cancel(Lane.OWN)
+        self._channel.cancel(Priority.OWN)
         self._course.stop()
         self._forget_state()
         self._node.begin(now)
@@ -350,7 +346,7 @@ class Cia402Session(Session):
                 self._node.take_emergency(data, self.report)
         except Unasked as error:
             self.report.unasked(sentences.malformed(str(error)), self._channel.late(
-                now - age, partial(self._courier.answers, data)), now)
+                now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
 
@@ -388,10 +384,10 @@ class Cia402Session(Session):
             self.duty.happened(Happened.ANSWERED)
         if self._handover is not None:
             self._handover.look(raws[0], now)
-        self.gate.status(raws[0], now)
+        self.interlock.status(raws[0], now)
         self._look_at_state(now)
         self.control_changed(now)
-        self.gate.measured(raws)
+        self.interlock.measured(raws)
         self._homing.sampled(raws[0], raws, now)
         self.report.note(ProcessDataReceived(raws, received_at))
         exchange.wait_out(now)
@@ -403,7 +399,7 @@ class Cia402Session(Session):
         if change is Change.RESTARTED:
             self.report.note(Noted(sentences.booted()))
             reason = sentences.device_restarted()
-            self.users.fail_all(sentences.no_answer_because(reason))
+            self.services.fail_all(sentences.no_answer_because(reason))
             self._channel.clear()
             self._stop.forget()
             self._close(reason, now)
@@ -557,7 +553,7 @@ class Cia402Session(Session):
             self.stop_left()
             return
         self._channel.run(self._bring_up.release(self._stop.answer_time),
-                          lambda _: self.stop_left(), now, Lane.STOP)
+                          lambda _: self.stop_left(), now, Priority.STOP)
 
     # -- state ------------------------------------------------------------------------------------
 

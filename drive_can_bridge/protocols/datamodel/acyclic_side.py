@@ -10,6 +10,7 @@ from functools import partial
 import math
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
@@ -18,22 +19,18 @@ from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.users import Users
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterCourier, Read, Reply, Step, Words, Write,
-)
+    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.setpoint_writer import ControlByNumber
 from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import (
-    SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite,
-)
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite
 from drive_can_bridge.protocols.stop_again import StopAgain
 
 
@@ -43,7 +40,7 @@ class AcyclicSide:
 
     :param codec: of the frames.
     :param quarantine: given where the exchange itself goes through the channel.
-    :ivar channel: everything acyclic goes through it, by the ``courier``.
+    :ivar channel: everything acyclic goes through it, by the ``transactor``.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
     :ivar status_slot: of the status word in ``cyclic_response``, or None.
@@ -60,11 +57,11 @@ class AcyclicSide:
         self.numbers = Numbers(drive)
         self._session = session
         self._decode = codec.decode
-        self.courier = ParameterCourier(
+        self.transactor = ParameterTransactor(
             codec, send=session.outbox.put, sent=SentWrites(session.sent, self.numbers),
             retry=session.retry, eeprom_gap=options.eeprom_write_gap, quarantine=quarantine)
-        self.channel: AcyclicChannel = Channel(self.courier)
-        session.users = Users(session, procedures.ParameterAccess(
+        self.channel: AcyclicChannel = Channel(self.transactor)
+        session.services = DriveServices(session, procedures.ParameterAccess(
             self.channel, session.retry, self.numbers, verify=drive.verify_writes,
             together=codec.together))
         word = control_word(drive, controlled=session.control is not None)
@@ -73,16 +70,16 @@ class AcyclicSide:
         self.status_slot = _slot(drive.cyclic_response, status)
         word = word if self.control_slot is None else None
         # where rounds are read, it does not come by itself in the end
-        at_end = status if self.courier.anonymous or self.status_slot is None else None
+        at_end = status if self.transactor.anonymous or self.status_slot is None else None
         status = status if self.status_slot is None else None
         wears = word is not None and word.storage is not Storage.RAM
-        polled = self.courier.anonymous     # else setpoints go by cycles
+        polled = self.transactor.anonymous     # else setpoints go by cycles
         self.output = AcyclicOutput(
             session.control, Judged(stop_spacing(drive.period), wears),
             len(drive.cyclic_request) if polled else 0, slot=self.control_slot if polled else None,
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
-            ControlByNumber(session, session.control, self.channel, self.courier, self.numbers,
+            ControlByNumber(session, session.control, self.channel, self.transactor, self.numbers,
                             self.output, word=word, status=status))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
@@ -106,7 +103,7 @@ class AcyclicSide:
         """Take an answer: to the outstanding read, or to nothing."""
         session, self.shows_up = self._session, True
         try:
-            asked = self.courier.outstanding
+            asked = self.transactor.outstanding
             words = self._decode(frame, None if asked is None else asked.key)
         except Unasked as error:
             late = self.channel.late(now, partial(self._answers, frame))
@@ -156,9 +153,9 @@ class AcyclicSide:
         :param setpoints: as for :meth:`begin_stop`.
         """
         answer, count = self.stop.answer_time, len(self._stop_writes(setpoints))
-        if not self.courier.anonymous:
+        if not self.transactor.anonymous:
             return (STOP_ATTEMPTS * count + 1) * answer
-        silence = self.courier.silence
+        silence = self.transactor.silence
         asked_before = self._session.retry.timeout + silence
         return asked_before + STOP_ATTEMPTS * (count * answer + silence) + answer + silence
 
@@ -181,7 +178,7 @@ class AcyclicSide:
         writes.sort(key=lambda each: each[1].eeprom)
         stop.running = True     # before the first of them leaves
         for _, write in writes:
-            self.courier.write_now(write, lambda sent, then: None, now)
+            self.transactor.write_now(write, lambda sent, then: None, now)
         stop.begin(confirm(writes, stop.answer_time), now, setpoints=setpoints, again=again)
 
     def _stop_writes(self, setpoints: bool) -> list[StopWrite]:

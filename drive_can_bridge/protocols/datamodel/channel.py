@@ -11,8 +11,8 @@ step                result sent back
 =================== ==================================================================
 
 As nobody answers writes, some of them are no exchange. A control word goes before all procedures,
-and takes the place of one that has not left yet (:meth:`~ParameterCourier.write_first`). What
-stops a drive waits for nothing but the spacing of frames (:meth:`~ParameterCourier.write_now`).
+and takes the place of one that has not left yet (:meth:`~ParameterTransactor.write_first`). What
+stops a drive waits for nothing but the spacing of frames (:meth:`~ParameterTransactor.write_now`).
 
 Pace: at least 20 ms lie between two EEPROM writes to a station and between such a write and the
 next read (manual, "Scrittura di un parametro": "almeno 20msec"); a frame leaves only while no
@@ -32,9 +32,9 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.courier import ANYTHING, Courier
 from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polling import Chunk
+from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
@@ -111,7 +111,7 @@ class AcyclicCodec(Protocol):
         """
 
 
-class ParameterCourier(Courier[Step, Reply]):
+class ParameterTransactor(Transactor[Step, Reply]):
     """
     Sends reads and writes, paced.
 

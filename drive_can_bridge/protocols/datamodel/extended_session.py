@@ -180,7 +180,8 @@ class ExtendedSession(Session):
                     continue
             yield look_at
         # a drive that was told to run has to be told ``disable``, whatever is known of its axes
-        if not (self.setpoints.ever_known and not self.gate.mute) and not self.setpoints.known:
+        if not self.setpoints.known and (
+                not self.setpoints.ever_known or self.interlock.position_unknown):
             yield from self._find_axes(math.inf)
             now = self._channel.now
         self._start_cycling(now)
@@ -232,7 +233,7 @@ class ExtendedSession(Session):
         do = self.duty.happened(Happened.MAPS_DIFFER)
         self.lose(sentences.mapping_differs(text), now)
         # a request map that is right still takes neutral cycles, unless it is to be rewritten
-        by_cycles = do is Do.STOP and routed and not self.gate.mute
+        by_cycles = do is Do.STOP and routed and not self.interlock.position_unknown
         if do is not Do.NOTHING:
             self._side.begin_stop(now, setpoints=not by_cycles)
         if not by_cycles:
@@ -325,7 +326,7 @@ class ExtendedSession(Session):
         self.lose(reason, now)
         if do is not Do.NOTHING:    # setpoints that heard cycles go neutral with the next
             self._side.begin_stop(now, setpoints=do is Do.STOP_BY_NUMBER)
-        if self.gate.mute:
+        if self.interlock.position_unknown:
             self.start_over(now)
         elif self._verify:  # it may still be listening, before it is left alone
             self._exchange.run_out(self._exchange.timer.due)
@@ -365,9 +366,9 @@ class ExtendedSession(Session):
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:
-            self.gate.status(raws[slot] if slot < len(raws) else None, now)
+            self.interlock.status(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
-        self.gate.measured(raws)
+        self.interlock.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
         self._exchange.wait_out(now)

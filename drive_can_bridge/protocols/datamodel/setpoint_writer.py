@@ -23,7 +23,7 @@ from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterCourier, Procedure, Reply, Step, Write,
+    ParameterTransactor, Procedure, Reply, Step, Write,
 )
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.life import Life, Script
@@ -45,12 +45,12 @@ class ControlByNumber:
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: Channel[Step, Reply],
-                 courier: ParameterCourier, numbers: Numbers, output: AcyclicOutput, *,
+                 transactor: ParameterTransactor, numbers: Numbers, output: AcyclicOutput, *,
                  word: Parameter | None, status: Parameter | None) -> None:
         self._session = session
         self._control = control
         self._channel = channel
-        self._courier = courier
+        self._transactor = transactor
         self._word = word
         self._status = status
         self._numbers = numbers
@@ -80,7 +80,7 @@ class ControlByNumber:
         if self._word is None or word == output.word and not output.word_due(now):
             return
         output.word_begun(word)
-        write = self._courier.write_now if control.stopping else self._courier.write_first
+        write = self._transactor.write_now if control.stopping else self._transactor.write_first
         write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)
 
@@ -117,7 +117,7 @@ class ControlByNumber:
             yield now
             raw = yield self._read(status)
             now = self._channel.now
-            self._session.gate.status(raw, now)
+            self._session.interlock.status(raw, now)
             self._session.control_changed(now)
             now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
 
@@ -134,12 +134,12 @@ class SetpointWriter:
     :ivar word_written_at: when the control word left last.
     """
 
-    def __init__(self, session: Session, exchange: PolledExchange, courier: ParameterCourier,
+    def __init__(self, session: Session, exchange: PolledExchange, transactor: ParameterTransactor,
                  numbers: Numbers, output: AcyclicOutput, *, slot: int | None) -> None:
         self.word_written_at = -math.inf
         self._session = session
         self._exchange = exchange
-        self._courier = courier
+        self._transactor = transactor
         self._numbers = numbers
         self._slot = slot
         self._parameters = session.configuration.cyclic_request
@@ -157,7 +157,7 @@ class SetpointWriter:
         :param known: the status was read just now, or there is none. A word that starts the drive
             is repeated only then: one that was off meanwhile, unseen, must not start by that.
         """
-        self._session.gate.expire(now)      # nothing is handed out that is too old
+        self._session.interlock.expire(now)      # nothing is handed out that is too old
         control, slot, output = self._session.control, self._slot, self._output
         stopping = control is not None and control.stopping
         starts = control is not None and not (control.at_rest or stopping)
@@ -184,15 +184,15 @@ class SetpointWriter:
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
-        if not self._output.waiting or now < self._courier.free_at:
+        if not self._output.waiting or now < self._transactor.free_at:
             return
-        self._session.gate.expire(now)
+        self._session.interlock.expire(now)
         index = self._output.next()
         parameter, raw = self._parameters[index], self._raws()[index]
         # now: a neutral value that follows the axis may be another one when the frame leaves
         runs = raw != self._raws(neutral=True)[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
-        self._courier.write(
+        self._transactor.write(
             Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
                   eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
@@ -221,7 +221,7 @@ class SetpointWriter:
     def next_timer(self) -> float:
         """Return when :meth:`handle_timer` wants to be called; infinity: never."""
         again_at = math.inf if self._slot is None else self._output.next_timer()
-        return min(again_at, self._courier.free_at) if self._output.waiting else again_at
+        return min(again_at, self._transactor.free_at) if self._output.waiting else again_at
 
     def _raws(self, *, neutral: bool = False) -> list[int]:
         items, control = self._session.setpoints.items, self._session.control

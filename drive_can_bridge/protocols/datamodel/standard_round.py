@@ -7,7 +7,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.sentences import NOTHING
-from drive_can_bridge.protocols.datamodel.channel import ParameterCourier, Procedure, Read
+from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Procedure, Read
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.polling import Chunk, round_time
@@ -49,11 +49,11 @@ class StandardRound:
     :ivar status_asked_at: when the status was asked for last.
     """
 
-    def __init__(self, drive: DriveConfiguration, courier: ParameterCourier,
+    def __init__(self, drive: DriveConfiguration, transactor: ParameterTransactor,
                  status_slot: int | None) -> None:
         self.gap = NOTHING
         self.status_asked_at = -math.inf
-        self._courier = courier
+        self._transactor = transactor
         self._parameters = drive.cyclic_response
         self._numbers = Numbers(drive).numbers(drive.cyclic_response)
         self._reads = reads(drive)
@@ -70,7 +70,7 @@ class StandardRound:
                             sentences.one_read_unanswered(self._names(chunk)))
                 return None
             if chunk is self._status_read:
-                self.status_asked_at = self._courier.asked_at
+                self.status_asked_at = self._transactor.asked_at
             found.update(zip(chunk.addresses, words))
         return tuple(parameter.raw_from_word(found[number])
                      for parameter, number in zip(self._parameters, self._numbers))

@@ -46,11 +46,11 @@ class StandardSession(Session):
         self._request_identifier = request
         self._identifiers = request, standard.identifier(
             options.response_id_base, drive.station)
-        self._round = StandardRound(drive, self._side.courier, self._status_slot)
+        self._round = StandardRound(drive, self._side.transactor, self._status_slot)
         self._exchange = PolledExchange(self, self, self._channel)
         self._timer = self._exchange.timer
         self._writer = SetpointWriter(
-            self, self._exchange, self._side.courier, self._side.numbers, self._side.output,
+            self, self._exchange, self._side.transactor, self._side.numbers, self._side.output,
             slot=self._side.control_slot)
         self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
@@ -73,7 +73,7 @@ class StandardSession(Session):
         return self._side.longest_stop()
 
     def time_lost(self, now: float) -> None:
-        self._expected = self._expected or self._side.courier.outstanding is not None
+        self._expected = self._expected or self._side.transactor.outstanding is not None
         self._exchange.disregard()
         self._channel.time_lost(now)
         if self.stage is Stage.RUNNING:
@@ -101,14 +101,14 @@ class StandardSession(Session):
         super().fall_silent()
 
     def _clear_acyclic(self) -> None:
-        self._expected = self._expected or self._side.courier.outstanding is not None
+        self._expected = self._expected or self._side.transactor.outstanding is not None
         self._side.clear()
         self._exchange.stop()
 
     # -- the beat ---------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if self.gate.expire(now):
+        if self.interlock.expire(now):
             self._writer.look(now, unanswered=self._exchange.reading)
         if now >= self._timer.due:
             self._tick(now)
@@ -158,8 +158,8 @@ class StandardSession(Session):
         self._side.found(now)
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
-        courier = self._side.courier
-        if not found and courier.asked_at > courier.wrote_at:
+        transactor = self._side.transactor
+        if not found and transactor.asked_at > transactor.wrote_at:
             self.neutral_stop.answered()
             self.duty.happened(Happened.ANSWERED)
         if self.control is None:
@@ -169,7 +169,7 @@ class StandardSession(Session):
         if self._status_slot is not None and asked_at > self._writer.word_written_at:
             # an answer that has waited here for a process that stood still is no news
             known = now - asked_at <= self.retry.timeout + TOLERANCE
-            self.gate.status(raws[self._status_slot], now)
+            self.interlock.status(raws[self._status_slot], now)
             self.control_changed(now)
         if known and self._side.control_slot is not None:
             self._writer.write_word(now, known=True)
@@ -200,9 +200,9 @@ class StandardSession(Session):
             self._side.foreign_master(frame)
             return
         self._side.again.heard(now)
-        courier = self._side.courier
+        transactor = self._side.transactor
         # it may have come before the question
-        if courier.outstanding is None or now - age < courier.asked_at:
+        if transactor.outstanding is None or now - age < transactor.asked_at:
             self._channel.disturbed(now)
             late = self._channel.late(now - age)
             if late is not None or not self._expected:

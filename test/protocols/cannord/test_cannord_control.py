@@ -223,9 +223,9 @@ def test_stop_disables() -> None:
 def test_refused_while_offline_or_inactive() -> None:
     talk = online()
     talk.until(10.2)
-    assert talk.session.users.control_refusal(ENABLE) == 'drive offline'
+    assert talk.session.services.control_refusal(ENABLE) == 'drive offline'
     talk.deactivate(10.2)
-    assert talk.session.users.control_refusal(ENABLE) == 'bridge inactive'
+    assert talk.session.services.control_refusal(ENABLE) == 'bridge inactive'
 
 
 # -- asked again for a stop -----------------------------------------------------------------------

@@ -108,8 +108,8 @@ class Bus:
         return [(name, event) for name, event in found if isinstance(event, kinds)]
 
     def asks(self, action: ControlAction, name: str = 'lift') -> None:
-        assert not self.session(name).users.control_refusal(action)
-        self.session(name).users.submit(ControlRequest(action), self.now)
+        assert not self.session(name).services.control_refusal(action)
+        self.session(name).services.submit(ControlRequest(action), self.now)
         self.pump()
 
     def outcomes(self, name: str = 'lift') -> list[tuple[str, bool, str]]:
@@ -211,9 +211,9 @@ def test_setpoints_and_extra_values_of_all() -> None:
         bus.hears(f'{number:03X}#0000000000')
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     for index in range(5):
-        lift.users.command(index, 0.0, bus.now)
-    lift.users.command(0, 50.0, bus.now)
-    lift.users.command(4, -50.0, bus.now)
+        lift.services.command(index, 0.0, bus.now)
+    lift.services.command(0, 50.0, bus.now)
+    lift.services.command(4, -50.0, bus.now)
     assert [text for _, text in bus.live(0.02)] == [
         '400#7F04004000000000', '400#000000E000', '002#7F04004000000000', '002#000000E000']
 
@@ -269,26 +269,26 @@ def test_the_leader_commands_all() -> None:
     bus = enabled()
     lift = bus.session('lift')
     assert lift.state is DriveState.NOT_ARMED
-    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
-    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.services.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
     assert [session.state for session in bus.sessions] == [DriveState.ONLINE] * 3
     assert sorted(text for _, text in bus.live(0.06)) == [
         '002#7F040020', '004#7F040020', '006#7F040020', *['400#7F040020'] * 3]
-    assert bus.session('hoist').users.write_refusal(FREQUENCY) == (
+    assert bus.session('hoist').services.write_refusal(FREQUENCY) == (
         says('sent_by_group', leader='lift', name='frequency_setpoint'))
-    assert bus.session('hoist').users.write_refusal(OFFSET) == ''
+    assert bus.session('hoist').services.write_refusal(OFFSET) == ''
 
 
 def test_a_member_that_comes_back_disarms_all() -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.users.command(0, 0.0, bus.now)
-    lift.users.command(0, 25.0, bus.now)
+    lift.services.command(0, 0.0, bus.now)
+    lift.services.command(0, 25.0, bus.now)
     del bus.answers[3]
     bus.live(0.2)
     assert not bus.session('turn').online
-    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
-    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert lift.services.command(0, 25.0, bus.now) is CommandOutcome.DISABLED
     bus.answers[3] = RUNNING
     bus.live(0.07)
     assert bus.session('turn').online
@@ -299,7 +299,7 @@ def test_a_member_that_comes_back_disarms_all() -> None:
 
 def test_parameters_are_everybodys_own() -> None:
     bus = three()
-    bus.session('hoist').users.submit(read(OFFSET), bus.now)
+    bus.session('hoist').services.submit(read(OFFSET), bus.now)
     assert bus.pump() == ['204#9B11000000000000']
     bus.hears('205#9B11000000000700')
     (name, event), = bus.events(RequestCompleted)
@@ -495,7 +495,7 @@ def test_a_member_that_drops_out_by_itself_stops_all() -> None:
 def test_a_member_that_is_lost_stops_all(station: int) -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.users.command(0, 0.0, bus.now)
+    lift.services.command(0, 0.0, bus.now)
     del bus.answers[station]
     bus.live(0.22)
     assert not bus.session(NAMES[station - 1]).online
@@ -684,7 +684,7 @@ def test_stop_of_a_member_while_the_bridge_ends() -> None:
 
 def test_members_name_their_leader() -> None:
     bus = three()
-    texts = [bus.session('hoist').users.control_refusal(action) for action in ControlAction
+    texts = [bus.session('hoist').services.control_refusal(action) for action in ControlAction
              if action is not ControlAction.HOME]
     assert texts == [says('group_is_led', leader='lift', service='enable'), '', '',
                      says('group_is_led', leader='lift', service='reset_fault')]
@@ -698,7 +698,7 @@ def test_refused_when_nobody_is_there() -> None:
     bus = Bus(*members())
     bus.answers = {}
     bus.live(0.5)
-    assert bus.session('lift').users.control_refusal(ENABLE) == 'drive offline'
+    assert bus.session('lift').services.control_refusal(ENABLE) == 'drive offline'
 
 
 # -- stops ----------------------------------------------------------------------------------------
@@ -708,8 +708,8 @@ def driven(**options: Any) -> Bus:
     """Return a group that runs at 25 Hz."""
     bus = enabled(**options)
     lift = bus.session('lift')
-    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
-    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
+    assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.services.command(0, 25.0, bus.now) is CommandOutcome.ACCEPTED
     assert '400#7F040020' in [text for _, text in bus.live(0.06)]
     bus.events()
     return bus
@@ -728,12 +728,12 @@ def test_commands_count_from_the_last_operation_enabled_on() -> None:
     bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
     bus.live(0.1)
     assert [session.state for session in bus.sessions] == [DriveState.DISABLED] * 3
-    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
+    assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
     bus.answers[3] = RUNNING
     bus.live(0.06)
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
-    assert lift.users.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
-    assert lift.users.command(0, 0.0, bus.now) is CommandOutcome.ARMED
+    assert lift.services.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
+    assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.ARMED
 
 
 def test_a_member_that_comes_back_running_arms_nobody() -> None:
@@ -743,7 +743,7 @@ def test_a_member_that_comes_back_running_arms_nobody() -> None:
     assert bus.session('lift').state is DriveState.DISABLED
     bus.answers[2] = RUNNING
     bus.live(0.1)
-    assert bus.session('lift').users.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
+    assert bus.session('lift').services.command(0, 0.0, bus.now) is CommandOutcome.DISABLED
     assert words(bus.live(0.02)) == ['7E04']
 
 
@@ -756,8 +756,8 @@ def test_stop_of_a_slow_group_is_brought_forward() -> None:
     bus.live(0.3)           # 10.65
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
     lift = bus.session('lift')
-    lift.users.command(0, 0.0, bus.now)
-    lift.users.command(0, 25.0, bus.now)
+    lift.services.command(0, 0.0, bus.now)
+    lift.services.command(0, 25.0, bus.now)
     assert (10.7, '400#7F040020') in bus.live(0.08)     # 10.73
     bus.asks(QUICK_STOP)
     when, text = bus.live(0.01)[0]
@@ -938,8 +938,8 @@ def test_stop_reaches_everybody() -> None:
 def test_enabled_group_is_disabled_by_the_stop() -> None:
     bus = enabled()
     lift = bus.session('lift')
-    lift.users.command(0, 0.0, bus.now)
-    lift.users.command(0, 50.0, bus.now)
+    lift.services.command(0, 0.0, bus.now)
+    lift.services.command(0, 50.0, bus.now)
     for session in bus.sessions:
         session.deactivate(bus.now)
     assert {text.split('#')[1] for _, text in bus.live(1.0)} == {'7E040000'}

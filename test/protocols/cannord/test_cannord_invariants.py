@@ -291,7 +291,7 @@ class SessionMachine(AnyOrder):
         # the status in an answer that nobody asked for does not count
         self.observer.faulted = self.session.state is DriveState.FAULT
         try:
-            outcome = self.session.users.command(index, value, self.now)
+            outcome = self.session.services.command(index, value, self.now)
         except ValueRefused:
             assert not 0 <= value <= 25 or value is True
             return
@@ -345,7 +345,7 @@ def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str,
             Frame(3 << shift, bytes.fromhex('310B000000000000'), extended), 1.001)
         assert session.online
     if state == 'asking':
-        session.users.submit(ReadRequest((OFFSET, POSITION, FLAG, FAULT_NUMBER)), 1.001)
+        session.services.submit(ReadRequest((OFFSET, POSITION, FLAG, FAULT_NUMBER)), 1.001)
     if state == 'stopping':
         session.deactivate(1.001)
     for place, (identifier, data, is_extended) in enumerate(frames):

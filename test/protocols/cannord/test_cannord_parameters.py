@@ -346,7 +346,7 @@ def test_process_data_are_read_without_a_frame() -> None:
 
 def test_process_data_are_not_written() -> None:
     talk = online(request=SETPOINTS[:1], response=VALUES[:1])
-    refusal = talk.session.users.write_refusal
+    refusal = talk.session.services.write_refusal
     assert refusal(FREQUENCY) == says('sent_cyclically', name='frequency_setpoint')
     assert refusal(SETPOINTS[1]) == 'exists in process data only'
     assert refusal(ACCELERATION) == ''

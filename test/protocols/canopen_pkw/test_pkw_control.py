@@ -128,7 +128,7 @@ def test_enabling_while_tripped_is_refused() -> None:
 
 def test_offline_drive_is_not_enabled() -> None:
     talk = started(control=CONTROL)
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'drive offline'
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- lost answers ---------------------------------------------------------------------------------
@@ -406,4 +406,4 @@ def test_users_do_not_write_the_word(name: str) -> None:
     parameter = drive.profile.parameters.get(name) or FAMILIES['canopen_pkw'].raw_parameter(
         drive, name)
     assert parameter is not None
-    assert talk.session.users.write_refusal(parameter) == 'use ~/enable'
+    assert talk.session.services.write_refusal(parameter) == 'use ~/enable'

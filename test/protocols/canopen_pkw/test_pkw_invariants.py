@@ -303,7 +303,7 @@ class SessionMachine(AnyOrder):
     @rule(index=st.integers(0, 1), raw=st.sampled_from([0, 0, 1, 5, 7]))
     def command(self, index: int, raw: int) -> None:
         self.observer.faulted = self.session.state is DriveState.FAULT
-        outcome = self.session.users.command(index, raw * 0.1 if index == 0 else raw, self.now)
+        outcome = self.session.services.command(index, raw * 0.1 if index == 0 else raw, self.now)
         # a double has one raw step
         self.observer.commanded(index, raw, outcome, self.now, neutral=raw <= 1 - index)
         self.look()
@@ -311,7 +311,7 @@ class SessionMachine(AnyOrder):
     @rule(value=st.sampled_from([math.nan, -1.0, 1e9, True]))
     def bad_command(self, value: float) -> None:
         with pytest.raises(ValueRefused):
-            self.session.users.command(0, value, self.now)
+            self.session.services.command(0, value, self.now)
 
     @rule()
     def users_turn_the_key(self) -> None:
@@ -389,7 +389,7 @@ def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str,
         assert session.online
         session.receive_frame(frame('485#C002002A00000000'), 1.08)
     if state == 'asking':
-        session.users.submit(read(FLC), 1.09)
+        session.services.submit(read(FLC), 1.09)
     if state == 'stopping':
         session.deactivate(1.09)
     now = 1.1

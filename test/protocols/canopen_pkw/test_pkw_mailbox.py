@@ -7,7 +7,7 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxCourier, Read, Refused, Reply, Silence, Write,
+    Answered, MailboxTransactor, Read, Refused, Reply, Silence, Write,
 )
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout
 
@@ -21,7 +21,8 @@ class Box:
 
     def __init__(self, order: str = 'auto', timeout: float = 0.5) -> None:
         self.sent: list[str] = []
-        self.box = MailboxCourier(self.send, order=order, retry=RetryPolicy(timeout, attempts=1))
+        self.box = MailboxTransactor(
+            self.send, order=order, retry=RetryPolicy(timeout, attempts=1))
         self.left: Left = lambda sent, now: None
 
     def send(self, message: pkw.Message, left: Left) -> None:

@@ -327,7 +327,7 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
     assert not raw('x2004.6', table=bare).writable
     talk = online(table=bare, response=bare[:2], request=(bare[10],))
     assert SPEED.name == bare[10].name
-    assert talk.session.users.write_refusal(raw('x2008.0B', table=bare)) == (
+    assert talk.session.services.write_refusal(raw('x2008.0B', table=bare)) == (
         'sent cyclically: publish ~/command/speed')
 
 
@@ -342,7 +342,7 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
 ])
 def test_write_refusals(name: str, refusal: str) -> None:
     talk = online(request=(SPEED,))
-    assert talk.session.users.write_refusal(raw(name)) == refusal
+    assert talk.session.services.write_refusal(raw(name)) == refusal
 
 
 def test_anybody_may_read_anything() -> None:

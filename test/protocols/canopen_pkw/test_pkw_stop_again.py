@@ -203,7 +203,7 @@ def test_services_refuse_while_it_is_offline() -> None:
     talk = silent(runs_in_two_reads(), 14.0)
     talk.served(14.5, half)
     for action in (ControlAction.DISABLE, ControlAction.QUICK_STOP):
-        assert talk.session.users.control_refusal(action) == 'drive offline'
+        assert talk.session.services.control_refusal(action) == 'drive offline'
 
 
 def test_complete_round_finds_it_as_ever() -> None:

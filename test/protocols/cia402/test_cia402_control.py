@@ -76,7 +76,7 @@ class TestTheWay:
         axis.deliver(axis.talk.asks(ENABLE, axis.now))
         while '205#0F0000000000' not in axis.take():
             axis.live(0.001)
-        axis.mute = True
+        axis.position_unknown = True
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
         axis.live(0.015)
         assert axis.words() == ['0700']
@@ -141,7 +141,7 @@ class TestWhatKeepsItFromEnabling:
         axis.drive.becomes(axis.drive.FAULT)
         axis.says('085#3081110000000000')
         axis.live(0.1)
-        assert axis.session.users.control_refusal(ENABLE) == says('bridge_missed')
+        assert axis.session.services.control_refusal(ENABLE) == says('bridge_missed')
         assert axis.asks(ControlAction.RESET_FAULT) == [
             ('reset_fault', True, 'ready to switch on')]
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
@@ -210,7 +210,7 @@ class TestQuickStop:
         axis = Axis().enabled()
         axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
         axis.live(0.0095)
-        axis.mute = True
+        axis.position_unknown = True
         axis.live(0.01)
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
         axis.take()

@@ -172,7 +172,7 @@ class TestHandover:
 
 def home(axis: Axis, wait: float = 0.6) -> list[tuple[str, bool, str]]:
     axis.talk.now = axis.now
-    axis.session.users.submit(ControlRequest(ControlAction.HOME), axis.now)
+    axis.session.services.submit(ControlRequest(ControlAction.HOME), axis.now)
     axis.deliver(axis.talk.sent())
     axis.live(wait)
     return axis.talk.control_outcomes()

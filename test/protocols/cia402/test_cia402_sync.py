@@ -68,7 +68,7 @@ class Bus:
                     self.pump(place)
 
     def asks(self, place: int, action: ControlAction) -> None:
-        self.sessions[place].users.submit(ControlRequest(action), self.now)
+        self.sessions[place].services.submit(ControlRequest(action), self.now)
         self.pump(place)
 
     def rounds(self) -> list[list[str]]:
@@ -258,12 +258,12 @@ class TestEvent:
     def test_missed_is_a_period_and_a_half_without_a_set(self) -> None:
         axis = self.meet()
         before = axis.session.statistics.missed
-        axis.mute = True
+        axis.position_unknown = True
         axis.live(0.044)
         assert axis.session.statistics.missed - before in (2, 3)
         axis.live(0.1)
         assert not axis.session.online
-        axis.mute = False
+        axis.position_unknown = False
         axis.live(1.0)
         assert axis.session.online
 

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The acyclic channel alone: lanes, pace, repetitions."""
+"""The acyclic channel alone: priorities, pace, repetitions."""
 
 import math
 
@@ -8,9 +8,9 @@ import pytest
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.retry import RetryPolicy
-from drive_can_bridge.protocols.channel import Channel, Lane
+from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterCourier, Procedure, Read, Words, Write,
+    ParameterTransactor, Procedure, Read, Words, Write,
 )
 
 
@@ -39,10 +39,10 @@ class Line:
     def __init__(self, *, timeout: float = 0.1, attempts: int = 2, gap: float = 0.02,
                  quarantine: float | None = None) -> None:
         self.outbox = Outbox()
-        self.courier = ParameterCourier(
+        self.transactor = ParameterTransactor(
             Texts(), send=self.outbox.put, retry=RetryPolicy(timeout, attempts), eeprom_gap=gap,
             quarantine=quarantine)
-        self.channel = Channel(self.courier)
+        self.channel = Channel(self.transactor)
         self.results: list[object] = []
 
     def sent(self, now: float | None = None) -> list[str]:
@@ -54,8 +54,9 @@ class Line:
             self.outbox.left(self.channel.now if now is None else now)
         return found
 
-    def reads(self, *numbers: int, lane: Lane = Lane.OWN, now: float = 1.0) -> list[str]:
-        self.channel.run(self.reading(numbers), self.results.append, now, lane)
+    def reads(self, *numbers: int, priority: Priority = Priority.OWN,
+              now: float = 1.0) -> list[str]:
+        self.channel.run(self.reading(numbers), self.results.append, now, priority)
         return self.sent()
 
     @staticmethod
@@ -65,9 +66,9 @@ class Line:
             found.append((yield Read(number)))
         return found
 
-    def writes(self, *steps: tuple[int, bool], lane: Lane = Lane.OWN, now: float = 1.0,
+    def writes(self, *steps: tuple[int, bool], priority: Priority = Priority.OWN, now: float = 1.0,
                ) -> list[str]:
-        self.channel.run(self.writing(steps), self.results.append, now, lane)
+        self.channel.run(self.writing(steps), self.results.append, now, priority)
         return self.sent()
 
     @staticmethod
@@ -89,7 +90,7 @@ def test_nothing_to_do() -> None:
     line = Line()
     assert line.channel.next_timer() == math.inf
     assert line.at(1.0) == []
-    assert line.courier.outstanding is None
+    assert line.transactor.outstanding is None
     assert line.channel.now == 1.0
 
 
@@ -102,8 +103,8 @@ def test_procedure_that_wants_nothing_ends_at_once() -> None:
 
 def test_lanes_take_turns_after_every_step() -> None:
     line = Line()
-    assert line.reads(1, 2, 3, lane=Lane.USERS) == ['1?']
-    assert line.reads(11, 12, lane=Lane.OWN) == []
+    assert line.reads(1, 2, 3, priority=Priority.USERS) == ['1?']
+    assert line.reads(11, 12, priority=Priority.OWN) == []
     assert line.answer(0, 1.01) == ['11?']
     assert line.answer(0, 1.02) == ['2?']
     assert line.answer(0, 1.03) == ['12?']
@@ -114,7 +115,7 @@ def test_lanes_take_turns_after_every_step() -> None:
 
 def test_lanes_take_turns_between_attempts() -> None:
     line = Line(attempts=3)
-    line.reads(1, lane=Lane.USERS)
+    line.reads(1, priority=Priority.USERS)
     line.reads(11, now=1.05)
     assert line.at(1.1) == ['11?']
     assert line.answer(0, 1.11) == ['1?']
@@ -140,9 +141,9 @@ def test_attempts_of_one_read_may_differ() -> None:
 def test_write_first_overtakes_and_replaces() -> None:
     line = Line()
     done: list[str] = []
-    line.reads(1, 2, lane=Lane.USERS)
-    line.courier.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
-    line.courier.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
+    line.reads(1, 2, priority=Priority.USERS)
+    line.transactor.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
+    line.transactor.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
     assert line.sent() == []
     assert line.answer(0, 1.03) == ['53!']
     assert done == ['two']
@@ -152,7 +153,7 @@ def test_write_first_overtakes_and_replaces() -> None:
 def test_write_first_waits_for_its_eeprom() -> None:
     line = Line()
     line.writes((30, True))
-    line.courier.write_first(Write(52, (1,), True), nobody, 1.001)
+    line.transactor.write_first(Write(52, (1,), True), nobody, 1.001)
     assert line.channel.next_timer() == pytest.approx(1.02)
     assert line.at(1.0199) == []
     assert line.at(1.0201) == ['52!']
@@ -162,12 +163,12 @@ def test_what_stops_a_drive_waits_for_spacing_only() -> None:
     line = Line()
     assert line.reads(1) == ['1?']          # not answered yet
     line.channel.hold(5.0)
-    line.courier.write_now(Write(52, (0,), False), nobody, 1.01)
-    line.courier.write_now(Write(50, (0,), False), nobody, 1.01)
+    line.transactor.write_now(Write(52, (0,), False), nobody, 1.01)
+    line.transactor.write_now(Write(50, (0,), False), nobody, 1.01)
     assert line.sent() == ['52!']
     assert line.channel.next_timer() == pytest.approx(1.011)
     assert line.at(1.0111) == ['50!']
-    assert line.courier.outstanding is not None
+    assert line.transactor.outstanding is not None
 
 
 @pytest.mark.parametrize('gap, left_at', [(0.02, 1.02), (60.0, 1.03)])
@@ -175,7 +176,7 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
         gap: float, left_at: float) -> None:
     line = Line(gap=gap)
     line.writes((30, True))
-    line.courier.write_now(Write(52, (0,), True), nobody, 1.005)
+    line.transactor.write_now(Write(52, (0,), True), nobody, 1.005)
     assert line.at(left_at - 0.0001) == []
     assert line.at(left_at + 0.0001) == ['52!']
 
@@ -183,8 +184,8 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
 def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
     line = Line()
     assert line.reads(1) == ['1?']
-    line.courier.write_first(Write(52, (1,), False), nobody, 1.001)
-    line.courier.write_now(Write(52, (0,), False), nobody, 1.002)
+    line.transactor.write_first(Write(52, (1,), False), nobody, 1.001)
+    line.transactor.write_now(Write(52, (0,), False), nobody, 1.002)
     assert line.sent() == ['52!']
     assert line.answer(0, 1.01) == []
 
@@ -192,8 +193,8 @@ def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
 def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> None:
     line = Line()
     for word in (9, 2, 0):
-        line.courier.write_now(Write(52, (word,), False), nobody, 1.0)
-    line.courier.write_now(Write(50, (0,), False), nobody, 1.0)
+        line.transactor.write_now(Write(52, (word,), False), nobody, 1.0)
+    line.transactor.write_now(Write(50, (0,), False), nobody, 1.0)
     left = []
     for now in (1.0, 1.001, 1.002, 1.003):
         line.channel.advance(now)
@@ -205,9 +206,9 @@ def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> Non
 def test_the_confirmation_of_a_stop_goes_before_everything_and_is_not_held() -> None:
     line = Line()
     line.channel.hold(5.0)
-    line.reads(1, lane=Lane.USERS)
+    line.reads(1, priority=Priority.USERS)
     line.reads(2)
-    assert line.reads(3, lane=Lane.STOP) == ['3?']
+    assert line.reads(3, priority=Priority.STOP) == ['3?']
     assert line.answer(7, 1.01) == []
     assert line.results == [[(7,)]]
 
@@ -234,9 +235,9 @@ def test_what_is_sent_called_back_may_write_again() -> None:
 
     def again(sent: bool, now: float) -> None:
         assert sent
-        line.courier.write_first(Write(53, (0,), False), nobody, now)
+        line.transactor.write_first(Write(53, (0,), False), nobody, now)
 
-    line.courier.write_first(Write(52, (0,), False), again, 1.0)
+    line.transactor.write_first(Write(52, (0,), False), again, 1.0)
     assert line.sent() == ['52!']
     assert line.at(1.001) == ['53!']
 
@@ -257,10 +258,10 @@ def test_hold_and_release() -> None:
 def test_clear_forgets_everything_but_the_eeprom() -> None:
     line = Line()
     line.writes((30, True))
-    line.reads(1, lane=Lane.USERS)
-    line.reads(2, lane=Lane.USERS)
+    line.reads(1, priority=Priority.USERS)
+    line.reads(2, priority=Priority.USERS)
     line.reads(3)
-    line.courier.write_first(Write(52, (1,), False), lambda: None, 1.0)
+    line.transactor.write_first(Write(52, (1,), False), lambda: None, 1.0)
     assert line.channel.waiting_users == 1
     line.channel.clear()
     assert line.channel.next_timer() == math.inf
@@ -274,9 +275,9 @@ def test_clear_forgets_everything_but_the_eeprom() -> None:
 
 def test_two_waiting_users() -> None:
     line = Line()
-    line.reads(1, lane=Lane.USERS)
-    line.reads(2, lane=Lane.USERS)
-    line.reads(3, lane=Lane.USERS)
+    line.reads(1, priority=Priority.USERS)
+    line.reads(2, priority=Priority.USERS)
+    line.reads(3, priority=Priority.USERS)
     assert line.channel.waiting_users == 2
     line.answer(0, 1.01)
     assert line.channel.waiting_users == 1
@@ -308,7 +309,7 @@ def test_a_stall_ends_a_read_whose_answer_would_not_say_what_it_answers() -> Non
 def test_a_round_is_interrupted_once_at_most() -> None:
     line = Line(quarantine=0.1)
     line.reads(1, 2, 3)
-    line.reads(11, 12, lane=Lane.USERS)
+    line.reads(11, 12, priority=Priority.USERS)
     sent = ['1?']
     for step in range(1, 5):
         line.answer(0, 1.0 + 0.01 * step)
@@ -320,7 +321,7 @@ def test_users_are_owed_a_step_after_each_round() -> None:
     line = Line(quarantine=0.1)
     line.reads(1)
     line.answer(0, 1.01)
-    line.reads(11, 12, 13, lane=Lane.USERS, now=1.011)
+    line.reads(11, 12, 13, priority=Priority.USERS, now=1.011)
     line.reads(2, 3, now=1.012)
     line.reads(4, now=1.012)
     sent = []
@@ -333,18 +334,18 @@ def test_users_are_owed_a_step_after_each_round() -> None:
 def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     line = Line(quarantine=0.1)
     line.reads(1)
-    line.courier.write_first(Write(52, (1,), False), nobody, 1.01)
+    line.transactor.write_first(Write(52, (1,), False), nobody, 1.01)
     assert line.sent() == ['52!']
-    line.courier.write_first(Write(52, (0,), False), nobody, 1.0105)
+    line.transactor.write_first(Write(52, (0,), False), nobody, 1.0105)
     assert line.channel.next_timer() == pytest.approx(1.011)
     assert line.at(1.011) == ['52!']
-    assert line.courier.outstanding is not None
+    assert line.transactor.outstanding is not None
     assert line.channel.next_timer() == pytest.approx(1.1)
 
 
 def test_a_round_waits_for_one_attempt_and_its_silence_at_most() -> None:
     line = Line(quarantine=0.1, attempts=3)
-    line.reads(11, lane=Lane.USERS)
+    line.reads(11, priority=Priority.USERS)
     line.reads(1, now=1.01)
     assert line.at(1.1) == []
     assert line.at(1.2001) == ['1?']

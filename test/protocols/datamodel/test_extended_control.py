@@ -228,15 +228,15 @@ def test_time_out_of_a_request() -> None:
 
 def test_refusals() -> None:
     plain = online()
-    assert plain.session.users.control_refusal(ControlAction.ENABLE) == (
+    assert plain.session.services.control_refusal(ControlAction.ENABLE) == (
         says('no_control_section'))
     assert plain.control_outcomes() == []
     talk = Conversation(drive(control=CONTROL))
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
     talk.activate(2.0)
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'bus down'
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'bus down'
     talk.bus_up(3.0)
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == 'drive offline'
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- written --------------------------------------------------------------------------------------
@@ -596,7 +596,7 @@ def test_no_status_is_read_behind_the_disable_of_a_lost_drive() -> None:
 def test_no_status_is_looked_at_behind_a_word_that_leaves_when_the_end_has_begun() -> None:
     talk = apart()
     looks(talk, 10.6, '0001')
-    talk.session.users.submit(ControlRequest(ControlAction.ENABLE), 10.601)
+    talk.session.services.submit(ControlRequest(ControlAction.ENABLE), 10.601)
     assert ENABLE in map(str, talk.session.take_frames())
     talk.session.deactivate(10.602)
     talk.session.frames_left(10.603)

@@ -92,16 +92,16 @@ def short(talk: Conversation, number: int, status: int) -> str:
 def test_axis_whose_position_is_missing_may_be_anywhere() -> None:
     talk = standing()
     assert short(talk, 2, 1) == request(0, 70)
-    refusal = talk.session.users.control_refusal(ControlAction.ENABLE)
+    refusal = talk.session.services.control_refusal(ControlAction.ENABLE)
     assert refusal == (says(
         'would_jump', why=says('position_not_told', known=False, measured='actual_position',
         name='position_setpoint')))
     # moved by hand meanwhile
     assert cycle(talk, 3, 1, 90) == request(0, 70), 'beside disable'
-    assert talk.session.users.control_refusal(ControlAction.ENABLE).startswith(
+    assert talk.session.services.control_refusal(ControlAction.ENABLE).startswith(
         'it would jump')
     assert cycle(talk, 4, 1, 90) == request(0, 90)
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == ''
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == ''
 
 
 def test_axis_that_is_driven_stays_latched_without_its_position() -> None:
@@ -347,13 +347,13 @@ def test_enable_waits_for_the_position() -> None:
     assert not talk.session.online
     talk.hears('103FFFF0#00010000', 10.081)     # too short for the position
     assert talk.session.online
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == (
         says(
             'would_jump', why=says('position_not_told', known=False, measured='actual_position',
             name='position_setpoint')))
     assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 70)
     talk.hears('103FFFF0#0001000000210000', 10.102)
-    assert talk.session.users.control_refusal(ControlAction.ENABLE) == (
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == (
         says(
             'would_jump', why=says('position_not_told', known=True, measured='actual_position',
             name='position_setpoint')))

@@ -212,7 +212,7 @@ class AxisMachine(AnyOrder):
         if near:
             value = (setpoint.neutral + near) / 10
         try:
-            outcome = self.session.users.command(0, value, self.now)
+            outcome = self.session.services.command(0, value, self.now)
         except ValueRefused:
             return
         if outcome is CommandOutcome.ARMED:

@@ -264,7 +264,7 @@ class SessionMachine(AnyOrder):
     @rule(index=st.integers(0, 1), value=st.sampled_from([0.0, 0.1, 5.0, 5, math.nan, 1e6, True]))
     def command(self, index: int, value: float) -> None:
         try:
-            outcome = self.session.users.command(index, value, self.now)
+            outcome = self.session.services.command(index, value, self.now)
         except ValueRefused:
             assert not 0 <= value <= 5 or value is True
             return

@@ -145,7 +145,7 @@ def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
         for _, text in talk.until(now):
             if text == ASK_REQUEST_MAP:
                 looks.append(answered)
-        outstanding = talk.session._side.courier.outstanding
+        outstanding = talk.session._side.transactor.outstanding
         if outstanding is not None and outstanding.number >= 300:
             sent = talk.hears(f'10{0x200001 | outstanding.number << 4:06X}#0001', now)
             answered += 1
@@ -421,7 +421,7 @@ def test_every_request_is_answered_by_itself() -> None:
 
 def test_what_may_not_be_written() -> None:
     talk = online(control=CONTROL)
-    refusal = talk.session.users.write_refusal
+    refusal = talk.session.services.write_refusal
     assert refusal(SPEED) == says('sent_cyclically', name='speed_setpoint')
     assert refusal(LIMIT) == says('sent_cyclically', name='torque_limit')
     assert refusal(WORD) == 'use ~/enable'
@@ -440,8 +440,8 @@ def test_moved_maps_are_guarded_too() -> None:
     talk = Conversation(drive(request_map_base=300, response_map_base=310, parameter_offset=-1))
     talk.bus_up(9.0)
     talk.activate(10.0)
-    refused = [number for number in range(100, 400)
-               if talk.session.users.write_refusal(parameter(f'p{number}', number, listed=False))]
+    refused = [number for number in range(100, 400) if talk.session.services.write_refusal(
+        parameter(f'p{number}', number, listed=False))]
     assert refused == [300, 301, 302, 303, 310, 311, 312, 313]
 
 

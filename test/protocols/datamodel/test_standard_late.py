@@ -90,7 +90,7 @@ def test_no_answer_is_ever_taken_for_another(seed: int) -> None:
             session.handle_timer(now)
         if open_requests < 3 and chance.random() < 0.3:
             open_requests += 1
-            session.users.submit(ReadRequest(tuple(
+            session.services.submit(ReadRequest(tuple(
                 chance.sample(ASKED, chance.randint(1, 4)))), now)
         for frame in session.take_frames():
             partner.hear(frame, now)

@@ -490,9 +490,9 @@ def test_users_get_one_step_a_round_however_long_it_is() -> None:
 
 def test_mapping_parameters_are_left_alone_here_too() -> None:
     talk = online()
-    assert talk.session.users.write_refusal(parameter('map', 124)) == (
+    assert talk.session.services.write_refusal(parameter('map', 124)) == (
         says('mapping_parameter'))
-    assert talk.session.users.write_refusal(ORDER) == ''
+    assert talk.session.services.write_refusal(ORDER) == ''
 
 
 # -- stopping -------------------------------------------------------------------------------------

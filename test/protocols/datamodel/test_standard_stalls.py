@@ -136,7 +136,7 @@ def test_no_answer_is_taken_for_another_by_somebody_who_stumbles(seed: int) -> N
         for place in range(len(buffered) + 1):
             if open_requests < 3 and chance.random() < 0.3:
                 open_requests += 1
-                session.users.submit(ReadRequest(tuple(
+                session.services.submit(ReadRequest(tuple(
                     chance.sample(ASKED, chance.randint(1, 4)))), now)
             for sent in session.take_frames():
                 partner.hear(sent, now)

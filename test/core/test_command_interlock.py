@@ -5,7 +5,7 @@ from builders import CONTROL, SPEED, STATUS
 import pytest
 from saying import says
 
-from drive_can_bridge.core.command_gate import CommandGate
+from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_state import DriveState
@@ -18,7 +18,7 @@ READY, ENABLED, FAULT = 1, 3, 8
 
 
 class Stand:
-    """A gate, and what stands around it."""
+    """A interlock, and what stands around it."""
 
     def __init__(self, *, controlled: bool = True, led: bool = False) -> None:
         self.active = self.online = True
@@ -26,7 +26,7 @@ class Stand:
         self.control = ControlMachine(CONTROL, timeout=2.0) if controlled else None
         self.leader = ControlMachine(CONTROL, timeout=2.0) if led else None
         self.report = Reporter(DriveStatistics(), '')
-        self.gate = CommandGate(
+        self.interlock = CommandInterlock(
             self, self.setpoints, self.control, (STATUS,), self.report, self.leader)
 
     def enable(self, machine: ControlMachine | None) -> None:
@@ -35,7 +35,7 @@ class Stand:
         for status in (READY, ENABLED):
             machine.word_sent(1.0)
             machine.status_received(status, 1.0)
-        self.gate.follow()
+        self.interlock.follow()
 
     def command(self, value: float) -> CommandOutcome:
         return self.setpoints.command(0, value, 1.0)
@@ -44,17 +44,17 @@ class Stand:
 def test_states_of_a_drive_with_control() -> None:
     stand = Stand()
     stand.online = False
-    assert stand.gate.state is DriveState.OFFLINE
+    assert stand.interlock.state is DriveState.OFFLINE
     stand.online = True
-    assert stand.gate.state is DriveState.DISABLED
+    assert stand.interlock.state is DriveState.DISABLED
     stand.enable(stand.control)
-    assert stand.gate.state is DriveState.NOT_ARMED
+    assert stand.interlock.state is DriveState.NOT_ARMED
     assert stand.command(5.0) is CommandOutcome.ARMED
-    assert stand.gate.state is DriveState.ONLINE
+    assert stand.interlock.state is DriveState.ONLINE
     assert stand.control is not None
     stand.control.status_received(FAULT, 1.0)
-    stand.gate.follow()
-    assert stand.gate.state is DriveState.FAULT
+    stand.interlock.follow()
+    assert stand.interlock.state is DriveState.FAULT
     assert stand.setpoints.at_rest, 'a fault takes commands back'
 
 
@@ -62,22 +62,22 @@ def test_a_drive_without_control_takes_commands_while_it_is_there() -> None:
     stand = Stand(controlled=False)
     for active, online in ((False, True), (True, False)):
         stand.active, stand.online = active, online
-        stand.gate.follow()
+        stand.interlock.follow()
         assert stand.command(5.0) is CommandOutcome.NOT_ARMED
     stand.active = stand.online = True
-    stand.gate.follow()
+    stand.interlock.follow()
     assert stand.command(5.0) is CommandOutcome.ARMED
-    stand.gate.withdraw('lost', 1.0)
+    stand.interlock.withdraw('lost', 1.0)
     assert stand.setpoints.at_rest
-    assert not stand.gate.mute, 'it has no axis that would go anywhere'
+    assert not stand.interlock.position_unknown, 'it has no axis that would go anywhere'
 
 
 def test_a_drive_that_is_led_operates_with_its_leader() -> None:
     stand = Stand(led=True)
     stand.enable(stand.control)
-    assert stand.gate.state is DriveState.DISABLED
+    assert stand.interlock.state is DriveState.DISABLED
     stand.enable(stand.leader)
-    assert stand.gate.state is DriveState.NOT_ARMED
+    assert stand.interlock.state is DriveState.NOT_ARMED
 
 
 @pytest.mark.parametrize('active', [True, False])
@@ -85,7 +85,7 @@ def test_what_the_machine_notes_is_a_warning_unless_the_bridge_stops(active: boo
     stand = Stand()
     stand.enable(stand.control)
     stand.active = active
-    stand.gate.withdraw('bridge inactive', 2.0)
+    stand.interlock.withdraw('bridge inactive', 2.0)
     assert stand.report.take() == [Noted(
         says('enable_withdrawn', whom='the drive'),
         warning=active)]
@@ -93,9 +93,9 @@ def test_what_the_machine_notes_is_a_warning_unless_the_bridge_stops(active: boo
 
 def test_commands_that_nobody_repeats_go_neutral_and_are_told_of() -> None:
     stand = Stand(controlled=False)
-    stand.gate.follow()
+    stand.interlock.follow()
     stand.command(5.0)
-    assert not stand.gate.expire(1.5)
-    assert stand.gate.expire(1.6)
+    assert not stand.interlock.expire(1.5)
+    assert stand.interlock.expire(1.6)
     assert stand.setpoints.at_rest
     assert stand.report.take() == [SetpointsExpired(('speed_setpoint',))]

@@ -32,11 +32,11 @@ _TIOCGEXCL = 0x80045440
 _LOCKS = Path('/proc/locks')
 
 
-class Place(NamedTuple):
+class BusIdentity(NamedTuple):
     """
     A bus on this host.
 
-    :param names: the same for the same bus: two places with a name in common are one.
+    :param names: the same for the same bus: two with a name in common are one.
     :param port: name of its serial port, which one process at a time can use; '' for adapters
         that several can.
     """
@@ -45,16 +45,16 @@ class Place(NamedTuple):
     port: str = ''
 
 
-def place_of(bus: BusConfiguration) -> Place:
-    """Say where a bus is."""
+def identity_of(bus: BusConfiguration) -> BusIdentity:
+    """Say which bus is meant."""
     channel = str(bus.channel)
     if bus.interface in SERIAL_INTERFACES:
-        return Place(_port_names(channel, device_of(bus)), channel)
+        return BusIdentity(_port_names(channel, device_of(bus)), channel)
     words = [bus.interface, channel]
     if bus.interface == 'virtual':      # of one process only
         words.append(str(os.getpid()))
     words += [f'{key}={bus.options[key]}' for key in _DISTINGUISHING if key in bus.options]
-    return Place(('/'.join(words),))
+    return BusIdentity(('/'.join(words),))
 
 
 def device_of(bus: BusConfiguration) -> str | None:

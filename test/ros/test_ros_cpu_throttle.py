@@ -5,7 +5,7 @@ import time
 
 from clocks import REAL
 
-from drive_can_bridge.ros.threads import Pace
+from drive_can_bridge.ros.threads import CpuThrottle
 
 
 def busy(seconds: float) -> None:
@@ -17,8 +17,8 @@ def busy(seconds: float) -> None:
 
 def test_who_computes_without_end_gets_its_share() -> None:
     begun = time.monotonic()
-    pace = Pace(0.25, REAL, in_hand=0.002)
+    throttle = CpuThrottle(0.25, REAL, in_hand=0.002)
     for _ in range(20):
         busy(0.002)
-        pace.keep()
+        throttle.keep()
     assert time.monotonic() - begun >= (20 * 0.002 - 0.002) / 0.25

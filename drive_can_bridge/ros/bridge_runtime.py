@@ -196,7 +196,7 @@ def _tell(occasions: Occasions, drive: DriveNode, event: Event) -> None:
         occasions.forget(drive.name)
 
 
-class Fleet:
+class BridgeRuntime:
     """
     The buses of a configuration, and their drives (a ``BusListener`` of each exchange).
 

@@ -19,7 +19,7 @@ from rclpy.qos import qos_profile_parameters
 PATIENCE = 2.0
 
 
-def acquaint(node, service, wait, host=''):
+def shake_hands(node, service, wait, host=''):
     """
     Return when the process that offers a service knows all clients of a node.
 

@@ -10,7 +10,7 @@ import pytest
 from waiting import wait_for
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.transport.places import place_of
+from drive_can_bridge.transport.bus_identity import identity_of
 
 
 def bus(interface: str, channel: str | int, **options: Any) -> BusConfiguration:
@@ -18,7 +18,7 @@ def bus(interface: str, channel: str | int, **options: Any) -> BusConfiguration:
 
 
 def same(first: BusConfiguration, second: BusConfiguration) -> bool:
-    return bool(set(place_of(first).names) & set(place_of(second).names))
+    return bool(set(identity_of(first).names) & set(identity_of(second).names))
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_port_by_another_name_is_the_same(terminal: str, tmp_path: Path) -> No
                  f'/dev/../{terminal.removeprefix("/")}'):
         assert same(bus('slcan', terminal), bus('slcan', name)), name
     assert same(bus('slcan', str(link)), bus('robotell', str(further)))
-    assert place_of(bus('slcan', str(link))).port == str(link)
+    assert identity_of(bus('slcan', str(link))).port == str(link)
 
 
 def test_other_ports_are_others(terminal: str, tmp_path: Path) -> None:
@@ -53,11 +53,11 @@ def test_other_ports_are_others(terminal: str, tmp_path: Path) -> None:
 def test_a_port_that_is_not_plugged_in_goes_by_its_name(tmp_path: Path) -> None:
     missing = str(tmp_path / 'ttyACM7')
     assert same(bus('slcan', missing), bus('slcan', missing))
-    before = set(place_of(bus('slcan', missing)).names)
+    before = set(identity_of(bus('slcan', missing)).names)
     near, far = os.openpty()
     try:
         Path(missing).symlink_to(os.ttyname(far))
-        assert before & set(place_of(bus('slcan', missing)).names)
+        assert before & set(identity_of(bus('slcan', missing)).names)
     finally:
         os.close(near)
         os.close(far)
@@ -66,17 +66,17 @@ def test_a_port_that_is_not_plugged_in_goes_by_its_name(tmp_path: Path) -> None:
 def test_the_number_of_a_terminal_that_has_gone_belongs_to_another() -> None:
     near, far = os.openpty()
     name = os.ttyname(far)
-    before = place_of(bus('slcan', name)).names
+    before = identity_of(bus('slcan', name)).names
     os.write(near, b'x')
-    assert place_of(bus('slcan', name)).names == before
+    assert identity_of(bus('slcan', name)).names == before
     os.close(near)
     os.close(far)
 
     def is_another() -> bool:
         near, far = os.openpty()
         try:    # the clock of the kernel has to have ticked
-            return os.ttyname(far) == name and not set(place_of(bus('slcan', name)).names) & set(
-                before)
+            return os.ttyname(far) == name and set(
+                identity_of(bus('slcan', name)).names).isdisjoint(before)
         finally:
             os.close(near)
             os.close(far)
@@ -89,9 +89,9 @@ def test_buses_that_are_not_serial() -> None:
     assert not same(bus('socketcan', 'can0'), bus('virtual', 'can0'))
     assert same(bus('kvaser', 0), bus('kvaser', '0'))
     assert not same(bus('udp_multicast', '239.0.0.1', port=1), bus('udp_multicast', '239.0.0.1'))
-    assert not place_of(bus('socketcan', 'can0')).port
+    assert not identity_of(bus('socketcan', 'can0')).port
 
 
 def test_a_virtual_bus_is_of_one_process() -> None:
     assert same(bus('virtual', 'x'), bus('virtual', 'x'))
-    assert str(os.getpid()) in place_of(bus('virtual', 'x')).names[0]
+    assert str(os.getpid()) in identity_of(bus('virtual', 'x')).names[0]

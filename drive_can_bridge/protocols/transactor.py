@@ -2,8 +2,8 @@
 """
 What does one acyclic exchange at a time, as a family does it; :mod:`.channel` does the rest.
 
-A courier knows the frames of its family, what answers what, how long answers take, and how frames
-are paced. It knows nothing of procedures, lanes, repetitions and quarantine.
+A transactor knows the frames of its family, what answers what, how long answers take, and how
+frames are paced. It knows nothing of procedures, priorities, repetitions and quarantine.
 """
 
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ StepT = TypeVar('StepT')
 ReplyT = TypeVar('ReplyT')
 
 
-class Courier(ABC, Generic[StepT, ReplyT]):
+class Transactor(ABC, Generic[StepT, ReplyT]):
     """
     Does one exchange at a time, as a family does it.
 

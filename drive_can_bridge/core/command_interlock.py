@@ -28,7 +28,7 @@ class Presence(Protocol):
     online: bool
 
 
-class CommandGate:
+class CommandInterlock:
     """
     The setpoints of one drive, behind its control word.
 
@@ -65,7 +65,7 @@ class CommandGate:
         return DriveState.NOT_ARMED if self._setpoints.waiting else DriveState.ONLINE
 
     @property
-    def mute(self) -> bool:
+    def position_unknown(self) -> bool:
         """Nothing may be sent: where the axis is, nobody knows, and it would go there."""
         return self._control is None and not self._setpoints.known
 

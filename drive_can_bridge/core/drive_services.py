@@ -79,7 +79,7 @@ class Conversation(Protocol):
         """Say why a control action cannot be asked for, where something else is usually said."""
 
 
-class Users:
+class DriveServices:
     """
     The users' side of one session.
 

@@ -5,34 +5,34 @@ from builders import drive
 from exchange_builders import Bench
 import pytest
 
-from drive_can_bridge.exchange.exchange import spread
+from drive_can_bridge.exchange.exchange import stagger
 
 
 def test_one_drive_has_the_bus_for_itself() -> None:
-    assert spread([0.02]) == [0.0]
+    assert stagger([0.02]) == [0.0]
 
 
 def test_drives_are_spread_over_their_period() -> None:
-    assert spread([0.02] * 4) == pytest.approx([0.0, 0.005, 0.01, 0.015])
+    assert stagger([0.02] * 4) == pytest.approx([0.0, 0.005, 0.01, 0.015])
 
 
 def test_no_finer_than_a_slot() -> None:
     # fifteen drives every 5 ms: three slots of five
-    phases = spread([0.005] * 15)
-    assert phases == pytest.approx([0.0] * 5 + [0.005 / 3] * 5 + [0.01 / 3] * 5)
-    assert len(set(phases)) == 3  # equal ones exactly: they are served together
+    turns = stagger([0.005] * 15)
+    assert turns == pytest.approx([0.0] * 5 + [0.005 / 3] * 5 + [0.01 / 3] * 5)
+    assert len(set(turns)) == 3  # equal ones exactly: they are served together
 
 
 def test_each_period_for_itself() -> None:
-    assert spread([0.01, 0.1, 0.01, 0.1]) == pytest.approx([0.0, 0.0, 0.005, 0.05])
+    assert stagger([0.01, 0.1, 0.01, 0.1]) == pytest.approx([0.0, 0.0, 0.005, 0.05])
 
 
 def test_periods_below_a_slot() -> None:
-    assert spread([0.0005, 0.0005]) == [0.0, 0.0]
+    assert stagger([0.0005, 0.0005]) == [0.0, 0.0]
 
 
 def test_nobody() -> None:
-    assert spread([]) == []
+    assert stagger([]) == []
 
 
 def test_exchange_gives_every_drive_its_turn() -> None:

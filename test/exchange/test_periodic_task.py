@@ -6,38 +6,38 @@ import threading
 
 import pytest
 
-from drive_can_bridge.exchange.exchange import Errand
+from drive_can_bridge.exchange.exchange import PeriodicTask
 
 
 def test_once_a_period_and_a_little_early_where_a_thread_is_awake() -> None:
     done: list[float] = []
-    errand = Errand(done.append)
-    assert errand.run(5.0) == math.inf
-    errand.begin(1.0, now=10.0)
-    assert errand.run(10.0) == 11.0
-    assert errand.run(10.8) == 11.0
+    periodic_task = PeriodicTask(done.append)
+    assert periodic_task.run(5.0) == math.inf
+    periodic_task.begin(1.0, now=10.0)
+    assert periodic_task.run(10.0) == 11.0
+    assert periodic_task.run(10.8) == 11.0
     assert not done
-    assert errand.run(10.95) == 12.0    # the beat is kept
-    assert errand.run(11.5) == 12.0
-    assert errand.run(12.3) == 13.0
+    assert periodic_task.run(10.95) == 12.0    # the beat is kept
+    assert periodic_task.run(11.5) == 12.0
+    assert periodic_task.run(12.3) == 13.0
     assert done == [10.95, 12.3]
 
 
 def test_it_is_due_at_the_moment_from_which_it_may_come() -> None:
     done: list[float] = []
-    errand = Errand(done.append)
-    errand.begin(2.0, now=0.0)
-    assert errand.run(1.75) == 2.0
-    assert errand.run(1.8) == 4.0       # a tenth of a period early
+    periodic_task = PeriodicTask(done.append)
+    periodic_task.begin(2.0, now=0.0)
+    assert periodic_task.run(1.75) == 2.0
+    assert periodic_task.run(1.8) == 4.0       # a tenth of a period early
     assert done == [1.8]
 
 
 def test_what_was_missed_is_left_out() -> None:
     done: list[float] = []
-    errand = Errand(done.append)
-    errand.begin(1.0, now=0.0)
-    assert errand.run(7.5) == 8.5
-    assert errand.run(7.6) == 8.5
+    periodic_task = PeriodicTask(done.append)
+    periodic_task.begin(1.0, now=0.0)
+    assert periodic_task.run(7.5) == 8.5
+    assert periodic_task.run(7.6) == 8.5
     assert done == [7.5]
 
 
@@ -50,17 +50,17 @@ def test_no_thread_waits_for_another() -> None:
         done.append(now)
         begun.set()
         go_on.wait(10.0)
-    errand = Errand(action)
-    errand.begin(1.0, now=0.0)
-    other = threading.Thread(target=errand.run, args=(1.0,))
+    periodic_task = PeriodicTask(action)
+    periodic_task.begin(1.0, now=0.0)
+    other = threading.Thread(target=periodic_task.run, args=(1.0,))
     other.start()
     assert begun.wait(10.0)
-    assert errand.run(2.0) == 3.0
+    assert periodic_task.run(2.0) == 3.0
     assert done == [1.0]
     ended = threading.Event()
 
     def end() -> None:
-        errand.end()
+        periodic_task.end()
         ended.set()
     ending = threading.Thread(target=end)
     ending.start()
@@ -69,5 +69,5 @@ def test_no_thread_waits_for_another() -> None:
     other.join(10.0)
     ending.join(10.0)
     assert ended.is_set()
-    assert errand.run(100.0) == math.inf
+    assert periodic_task.run(100.0) == math.inf
     assert done == [1.0]
