@@ -227,8 +227,7 @@ class ControlMachine:
         if action is ControlAction.QUICK_STOP and action not in self._known:
             action = ControlAction.DISABLE
         if action not in self._known and self._nothing_to_do(action):
-            self._answers.complete(
-                request, True, sentences.state_reached(self.state))
+            self._answers.complete(request, True, sentences.state_reached(self.state))
             return
         refusal = self._refusal(action)
         if refusal is not None:
@@ -238,8 +237,7 @@ class ControlMachine:
         if under_way is None or MEETINGS[action, under_way.action] is not Meeting.JOINS:
             if action is ControlAction.RESET_FAULT and self._nothing_to_do(action) and (
                     under_way is None or under_way.action in _STOPS):
-                self._answers.complete(
-                request, True, sentences.state_reached(self.state))
+                self._answers.complete(request, True, sentences.state_reached(self.state))
                 return
             may_run = self._may_run
             if under_way is not None:

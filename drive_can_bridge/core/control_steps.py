@@ -46,6 +46,9 @@ class Step(NamedTuple):
     """
     One step of a request.
 
+    A quick stop of a drive that runs begins with its own word, an enable with the word that is
+    there, and everything else with ``disable``.
+
     :ivar request: what is under way.
     :ivar word: what the current control word is for.
     :ivar when: all of it has to be seen.

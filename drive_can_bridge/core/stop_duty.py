@@ -68,7 +68,7 @@ class Happened(Enum):
     SHOWED_UP = 'an offline drive gives a sign of life'
     ENDS = 'the activation ends'
     LEFT_ALONE = 'nothing more will be sent: the end, or a lost bus'
-    SAID = 'the activation has ended with the word that it may still be running'
+    SAID = 'the activation has ended, and a stop that failed in it was told'
     ACTIVATED = 'an activation begins'
 
 
@@ -76,9 +76,11 @@ class Do(IntEnum):
     """What a session has to do; the last of them where channels differ."""
 
     NOTHING = 0
-    #: by cycles where the request map is known to agree, else by number
+    #: by cycles where the request map is known to agree, else by number; a stop by number that is
+    #: not confirmed is told
     STOP = 1
-    #: it has not heard cycles; where there are no numbers: say that it may still be running
+    #: not by cycles: it has not heard them; families without numbers say at once that it may still
+    #: be running
     STOP_BY_NUMBER = 2
     #: say that it may still be running
     WARN = 3
@@ -152,7 +154,7 @@ ROWS: tuple[Row, ...] = (
     Row((_RUNS,), Happened.SILENT, _RUNS_UNHEARD, Do.NOTHING, _SILENT),
     Row((_STOP_SENT,), Happened.SILENT, _UNHEARD, Do.NOTHING, _SILENT),
     Row(_ANY, Happened.LOST, None, Do.STOP, _WHATEVER),
-    Row(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),
+    Row(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),  # neutral cycles go on
     Row((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
     # what the session turns to is told to stop before
     Row((_STOP_SENT,), Happened.MISROUTED, _RUNS, Do.NOTHING, _ROUTE),
