@@ -44,7 +44,7 @@ _LOOKS = 5
 _POWERS = (-3, -4, -5, -6, -2, -1, 0)
 _RUNNING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
-Script = Generator[Ask, Reply, Any]
+Procedure = Generator[Ask, Reply, Any]
 
 
 class Found(Enum):
@@ -104,7 +104,7 @@ class BringUp:
         self.options: dict[int, int] = {}
         self.nmt_at = -math.inf
 
-    def run(self) -> Script:
+    def run(self) -> Procedure:
         """Do it; returns an :class:`Outcome`."""
         reply = yield Ask(states.STATUS_WORD)
         if _silent(reply):
@@ -148,7 +148,7 @@ class BringUp:
         return NOTHING if reply.abort is None else sentences.object_refused(
             _place(index, subindex), abort_codes.describe(reply.abort))
 
-    def _must(self, index: int, subindex: int, value: int, length: int) -> Script:
+    def _must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
         refusal = yield from self._put(index, subindex, value, length)
         if refusal:
             raise _differs(refusal)
@@ -208,7 +208,7 @@ class BringUp:
         return not status & states.TARGET_REACHED and (
             yield from self._read(states.VELOCITY)) != 0
 
-    def _learn(self) -> Script:
+    def _learn(self) -> Procedure:
         """Read what the drive does at a stop."""
         for index in (states.QUICK_STOP_OPTION, states.SHUTDOWN_OPTION, states.DISABLE_OPTION):
             value = yield from self._read(index, signed=True)
@@ -218,7 +218,7 @@ class BringUp:
                 self.options[index] = value
         self._rules.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
-    def _heartbeat(self) -> Script:
+    def _heartbeat(self) -> Procedure:
         """Have the drive produce heartbeats."""
         node, interval = self._node, round(1000 * self._options.heartbeat_producer)
         node.heartbeat_timeout = self._options.heartbeat_timeout
@@ -229,7 +229,7 @@ class BringUp:
             node.heartbeat_timeout = 0.0
             self.tell(sentences.no_heartbeat_producer())
 
-    def _start(self) -> Script:
+    def _start(self) -> Procedure:
         """Have the node take PDOs, or wait until somebody else does."""
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
@@ -253,7 +253,7 @@ class BringUp:
         self.nmt_at = max(self.nmt_at, self._channel.now)
         self._session.outbox.put(network.encode_nmt(command, self._drive.station))
 
-    def _find_axes(self) -> Script:
+    def _find_axes(self) -> Procedure:
         """Read where axes are that stay where they are, until setpoints can carry it."""
         setpoints = self._session.setpoints
         while True:
@@ -270,14 +270,14 @@ class BringUp:
             self._session.report.advice = setpoints.untold_text
             yield Ask(pause=5 * LOOK_PERIOD)
 
-    def _choose_mode(self) -> Script:
+    def _choose_mode(self) -> Procedure:
         number, name = self._mode.number, self._options.mode
         offered = yield from self._read(states.MODES_OFFERED)
         if offered is not None and not offered >> number - 1 & 1:
             raise _differs(sentences.mode_not_offered(name, number, offered))
         yield from self._must(states.MODE, 0, number, 1)
 
-    def _interpolation_time(self) -> Script:
+    def _interpolation_time(self) -> Procedure:
         """Write 60C2h, where the drive has it."""
         index, period = states.INTERPOLATION_TIME, self._drive.period
         value = yield from self._read(index, 1)
@@ -297,7 +297,7 @@ class BringUp:
 
     # -- who watches the bridge -------------------------------------------------------------------
 
-    def _watch_bridge(self) -> Script:
+    def _watch_bridge(self) -> Procedure:
         """Have the drive stop by itself when the bridge dies."""
         interval, mapping = self._options.bridge_heartbeat, self._options.mapping
         if mapping == 'assume':
@@ -345,7 +345,7 @@ class BringUp:
                 return place
         return None
 
-    def release(self, timeout: float) -> Script:
+    def release(self, timeout: float) -> Procedure:
         """Have the drive watch the bridge no more, behind an ordered stop."""
         slot, self.watch = self.watch, None
         if slot is not None:
@@ -353,7 +353,7 @@ class BringUp:
 
     # -- how PDOs travel --------------------------------------------------------------------------
 
-    def _exchange(self) -> Script:
+    def _exchange(self) -> Procedure:
         """Compare the set-up of PDOs and SYNC, and write what differs, if that is wanted."""
         if self._options.mapping == 'configure' and self._options.nmt_start:
             self._nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
@@ -379,7 +379,7 @@ class BringUp:
         if not options.nmt_start and self._node.state is not NmtState.PRE_OPERATIONAL:
             raise _differs(sentences.not_pre_operational(text))
 
-    def _sync(self) -> Script:
+    def _sync(self) -> Procedure:
         identifier = yield from self._read(SYNC_COB_ID)
         if identifier is not None and identifier & (
                 _PRODUCES_SYNC | pdo.LONG_IDENTIFIER | pdo.LONG_IDENTIFIER - 1
@@ -396,7 +396,7 @@ class BringUp:
         if (counter or 0) > 1:
             raise _differs(sentences.object_differs(_place(SYNC_COUNTER), str(counter), '0'))
 
-    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Script:
+    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Procedure:
         """Compare one PDO; write it where it differs, and compare again."""
         difference, identifier = yield from self._compare(wanted, transmit=transmit)
         if difference:
@@ -492,7 +492,7 @@ class BringUp:
         yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
         return NOTHING
 
-    def _close(self, first: int, used: Iterable[Pdo]) -> Script:
+    def _close(self, first: int, used: Iterable[Pdo]) -> Procedure:
         """Make PDOs invalid that are not needed."""
         needed = {each.number for each in used}
         for number in range(1, pdo.PDO_MAX + 1):
