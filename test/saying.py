@@ -26,6 +26,16 @@ class says:  # noqa: N801  reads as a function: assert reason == says('no_answer
         return f'says({self.code!r}{fields})'
 
 
+def status_word(raw: int) -> says:
+    """Return what the field ``status`` of a sentence about one drive equals."""
+    return says('status_word', raw=raw)
+
+
+def may_run(why: str, **fields: Any) -> says:
+    """Return what the worry about a drive that may still be running equals, by its reason."""
+    return says('may_still_be_running', why=says(why, **fields))
+
+
 def codes(sentences: Any) -> list[str]:
     """Return the codes of sentences, or of events that have one as text or reason."""
     return [getattr(getattr(each, 'text', getattr(each, 'reason', each)), 'code', '')

@@ -342,6 +342,22 @@ def would_jump(why: str) -> str:
 
 
 @sentence
+def status_word(raw: int) -> str:
+    return f'status word {raw:04X}h'
+
+
+@sentence
+def status_words(raws: Mapping[str, int | None]) -> str:
+    words = (f'{name} {"unknown" if raw is None else f"{raw:04X}h"}' for name, raw in raws.items())
+    return f'status words: {", ".join(words)}'
+
+
+@sentence
+def no_status_word() -> str:
+    return 'no status word'
+
+
+@sentence
 def state_reached(state: str) -> str:
     return state
 

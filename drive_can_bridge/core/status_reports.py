@@ -164,14 +164,13 @@ class StatusReports:
     # -- in words ---------------------------------------------------------------------------------
 
     @property
-    def text(self) -> str:
+    def text(self) -> Sentence:
         """The last status words."""
-        if not self._members:
-            raw = self.telling
-            return 'no status word' if raw is None else f'status word {raw:04X}h'
-        words = [f'{name} {"unknown" if member.raw is None else f"{member.raw:04X}h"}'
-                 for name, member in self._present.items()]
-        return f'status words: {", ".join(words)}' if words else 'no status word'
+        if self._members and self._present:
+            return sentences.status_words(
+                {name: member.raw for name, member in self._present.items()})
+        raw = self.telling
+        return sentences.no_status_word() if raw is None else sentences.status_word(raw)
 
     def states(self, state_of: Callable[[int], str]) -> str:
         """Return the common state of all, or the states of all by name."""

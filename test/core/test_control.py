@@ -8,8 +8,9 @@ import math
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import pytest
-from saying import says
+from saying import says, status_word
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
@@ -166,7 +167,7 @@ def test_running_on_under_disable_is_told_once() -> None:
         cycle(control, ENABLED, 1.0 + 0.1 * step + 0.01)
         assert control.disregard == (
             says(
-                'disregards', action='disable', state='enabled', status='status word 0003h',
+                'disregards', action='disable', state='enabled', status=status_word(ENABLED),
                 word=0))
     assert control.take_notes() == [control.disregard]
     cycle(control, READY, 6.0)
@@ -226,9 +227,9 @@ def test_a_refused_word_ends_what_is_under_way(action: ControlAction, word: int)
     assert control.word == word
     control.word_refused(word ^ 0x4000, 'not meant', 1.1)
     assert outcomes(control) == []
-    control.word_refused(word, 'refused by the drive: 08000021h', 1.1)
-    assert outcomes(control) == [
-        (action, False, f'control word {word:04X}h refused by the drive: 08000021h')]
+    reason = sentences.refused_by_drive(0x08000021, '08000021h')
+    control.word_refused(word, reason, 1.1)
+    assert outcomes(control) == [(action, False, says('word_refused', word=word, reason=reason))]
     assert control.word == OFF
     assert not control.pending
 
@@ -419,7 +420,7 @@ def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
     control.request(ControlRequest(ENABLE), 2.01)
     cycle(control, READY, 2.02)
     assert outcomes(control) == [
-        (ENABLE, False, says('dropped_out', status='status word 0001h'))]
+        (ENABLE, False, says('dropped_out', status=status_word(READY)))]
     assert control.word == OFF
 
 
@@ -441,21 +442,17 @@ def test_enable_is_refused_while_faulted() -> None:
     assert (control.word, control.pending) == (OFF, False)
 
 
-@pytest.mark.parametrize(('steps', 'text'), [
-    (((NOT_READY, 0.02),),
-     'stuck in state not ready (status word 0000h)'),
-    (((READY, 0.02), (READY, 0.04)),
-     'stuck in state ready (status word 0001h)'),
-    (((ENABLED, 0.02),),
-     'stuck in state enabled (status word 0003h); it does not follow control word 0000h'),
-    (((READY, 0.02),),
-     'stuck in state ready (status word 0001h); control word 0001h could not be sent'),
-    (((None, 0.02),),
-     'stuck in state unknown (no status word); no status word since control word 0000h'),
-    ((), 'stuck in state unknown (no status word); control word 0000h could not be sent'),
+@pytest.mark.parametrize(('steps', 'state', 'status', 'remarks'), [
+    (((NOT_READY, 0.02),), 'not ready', status_word(NOT_READY), []),
+    (((READY, 0.02), (READY, 0.04)), 'ready', status_word(READY), []),
+    (((ENABLED, 0.02),), 'enabled', status_word(ENABLED), [says('word_not_followed', word=OFF)]),
+    (((READY, 0.02),), 'ready', status_word(READY), [says('word_not_sent', word=RUN)]),
+    (((None, 0.02),), 'unknown', says('no_status_word'), [says('no_status_since', word=OFF)]),
+    ((), 'unknown', says('no_status_word'), [says('word_not_sent', word=OFF)]),
 ])
 def test_enable_that_is_not_confirmed_is_withdrawn(
-        steps: tuple[tuple[int | None, float], ...], text: str) -> None:
+        steps: tuple[tuple[int | None, float], ...], state: str, status: says,
+        remarks: list[says]) -> None:
     control = machine()
     control.request(ControlRequest(ENABLE), 0.0)
     for raw, now in steps:
@@ -463,7 +460,8 @@ def test_enable_that_is_not_confirmed_is_withdrawn(
     control.handle_timer(1.999)
     assert control.pending
     control.handle_timer(2.0)
-    assert outcomes(control) == [(ENABLE, False, f'no confirmation in 2 s: {text}')]
+    assert outcomes(control) == [(ENABLE, False, says(
+        'stuck', timeout=2.0, state=state, status=status, remarks=remarks))]
     assert (control.word, control.pending) == (OFF, False)
     assert control.next_timer() == math.inf
     cycle(control, READY, 2.1)
@@ -491,7 +489,7 @@ def test_word_that_leaves_after_the_deadline_is_not_taken_for_the_next_one() -> 
     assert (control.word, control.word_due) == (OFF, True)
     (_, success, message), = outcomes(control)
     assert not success
-    assert message.endswith('no status word since control word 0001h')
+    assert message == says('stuck', remarks=[says('no_status_since', word=RUN)])
 
 
 def test_request_after_the_deadline_does_not_find_the_old_one() -> None:
@@ -526,8 +524,8 @@ def test_fault_while_enabling_ends_it(before: tuple[tuple[int, float], ...]) -> 
         cycle(control, raw, now)
     control.status_received(FAULT, 0.03)
     assert outcomes(control) == [
-        (ENABLE, False, says('fault_while_enabling', status='status word 0008h'))]
-    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
+        (ENABLE, False, says('fault_while_enabling', status=status_word(FAULT)))]
+    assert control.take_notes() == [says('fault_came', ran=False, status=status_word(FAULT))]
     assert (control.word, control.fault, control.pending) == (OFF, True, False)
 
 
@@ -536,7 +534,7 @@ def test_fault_while_enabled_puts_the_word_back() -> None:
     cycle(control, FAULT | ENABLED, 1.0)
     assert (control.word, control.state, control.fault) == (OFF, 'fault', True)
     assert control.take_notes() == [
-        says('fault_came', ran=True, status='status word 000Bh')]
+        says('fault_came', ran=True, status=status_word(FAULT | ENABLED))]
     cycle(control, READY, 1.02)
     cycle(control, ENABLED, 1.04)
     assert control.word == OFF
@@ -547,14 +545,14 @@ def test_fault_is_noted_once_when_it_comes_and_once_when_it_goes() -> None:
     control = machine()
     for now, raw in enumerate((READY, FAULT, FAULT, None, FAULT | READY)):
         cycle(control, raw, float(now))
-    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
+    assert control.take_notes() == [says('fault_came', ran=False, status=status_word(FAULT))]
     assert control.state == 'fault'
     cycle(control, READY, 10.0)
     cycle(control, READY, 11.0)
-    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
+    assert control.take_notes() == [says('fault_gone', status=status_word(READY))]
     assert not control.fault
     cycle(control, FAULT, 12.0)
-    assert control.take_notes() == [says('fault_came', ran=False, status='status word 0008h')]
+    assert control.take_notes() == [says('fault_came', ran=False, status=status_word(FAULT))]
 
 
 def test_drive_that_drops_out_is_not_started_again() -> None:
@@ -562,7 +560,7 @@ def test_drive_that_drops_out_is_not_started_again() -> None:
     cycle(control, READY, 1.0)
     assert (control.word, control.pending) == (OFF, False)
     assert control.take_notes() == [
-        says('dropped_out_for_good', status='status word 0001h')]
+        says('dropped_out_for_good', status=status_word(READY))]
     cycle(control, ENABLED, 1.02)
     assert control.word == OFF
     assert control.take_notes() == []
@@ -621,7 +619,7 @@ def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
     assert outcomes(control) == [(
         DISABLE, False, says(
             'stuck', remarks=[says('word_not_followed', word=0)], state='enabled',
-            status='status word 0003h', timeout=2.0))]
+            status=status_word(ENABLED), timeout=2.0))]
     assert control.word == OFF
 
 
@@ -742,7 +740,7 @@ def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
     assert outcomes(control) == [(
         QUICK_STOP, False, says(
             'stuck', remarks=[says('word_not_followed', word=2), says('now_disable')],
-            state='enabled', status='status word 0003h', timeout=2.0))]
+            state='enabled', status=status_word(ENABLED), timeout=2.0))]
     assert (control.word, control.pending) == (OFF, False)
 
 
@@ -758,7 +756,7 @@ def braking() -> ControlMachine:
     assert outcomes(control) == [(
         QUICK_STOP, False, says(
             'stuck', remarks=[says('word_not_followed', word=2), says('word_stays')],
-            state='enabled', status='status word 0043h', timeout=2.0))]
+            state='enabled', status=status_word(BRAKES), timeout=2.0))]
     return control
 
 
@@ -767,8 +765,8 @@ def test_quick_stop_goes_on_while_the_drive_says_that_it_brakes() -> None:
     control = braking()
     assert (control.word, control.pending, control.next_timer()) == (STOP, True, 5.0)
     cycle(control, BRAKES, 3.1)
-    assert control.disregard.startswith(
-        'still enabled (status word 0043h) although its control word is quick_stop (0002h)')
+    assert control.disregard == says(
+        'disregards', state='enabled', status=status_word(BRAKES), action='quick_stop', word=STOP)
     control.request(ControlRequest(ENABLE), 3.2)
     assert outcomes(control)[0][:2] == (ENABLE, False)
     cycle(control, BRAKES, 5.1)
@@ -915,7 +913,7 @@ def test_no_start_cuts_a_stop_short(stop: ControlAction, start: ControlAction) -
     word = control.word
     control.request(ControlRequest(start), 1.01)
     assert outcomes(control) == [(
-        start, False, f'{stop.value} under way: try {start.value} again when it has ended')]
+        start, False, says('stop_under_way', stop=stop.value, action=start.value))]
     assert control.word == word
     cycle(control, READY, 1.02)
     assert outcomes(control) == [(stop, True, 'ready')]
@@ -946,7 +944,7 @@ def test_reset_pulses_then_disables_and_waits_for_the_status() -> None:
     assert control.take_completed() == []
     cycle(control, READY, 0.14)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
-    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
+    assert control.take_notes() == [says('fault_gone', status=status_word(READY))]
     assert (control.word, control.pending) == (OFF, False)
     control.request(ControlRequest(ENABLE), 0.15)
     assert control.word == RUN
@@ -991,7 +989,7 @@ def test_reset_that_does_not_help_fails_and_disables() -> None:
     assert [cycle(control, FAULT, 0.1 * n) for n in range(1, 5)] == [RESET] * 3 + [OFF]
     control.handle_timer(2.0)
     assert outcomes(control) == [
-        (RESET_FAULT, False, says('fault_present', status='status word 0008h', timeout=2.0))]
+        (RESET_FAULT, False, says('fault_present', status=status_word(FAULT), timeout=2.0))]
     assert (control.word, control.fault, control.pending) == (OFF, True, False)
 
 
@@ -1002,7 +1000,7 @@ def test_reset_that_could_not_be_sent_says_so() -> None:
     assert outcomes(control) == [(
         RESET_FAULT, False, says(
             'stuck', remarks=[says('word_not_sent', word=128)], state='fault',
-            status='status word 0008h', timeout=2.0))]
+            status=status_word(FAULT), timeout=2.0))]
 
 
 def test_word_that_was_not_acknowledged_says_so() -> None:
@@ -1012,7 +1010,7 @@ def test_word_that_was_not_acknowledged_says_so() -> None:
     control.request(ControlRequest(RESET_FAULT), 0.0)
     control.handle_timer(2.0)
     (_, _, text), = outcomes(control)
-    assert text.endswith('; control word 0080h was not acknowledged')
+    assert text == says('stuck', remarks=[says('word_not_acknowledged', word=RESET)])
 
 
 def test_each_reset_is_one_rising_edge() -> None:
@@ -1144,7 +1142,7 @@ def test_withdraw_fails_a_reset_and_remembers_the_fault() -> None:
     cycle(control, FAULT, 3.0)
     assert control.take_notes() == []
     cycle(control, READY, 4.0)
-    assert control.take_notes() == [says('fault_gone', status='status word 0001h')]
+    assert control.take_notes() == [says('fault_gone', status=status_word(READY))]
 
 
 def test_withdraw_forgets_that_there_was_no_fault() -> None:
@@ -1160,7 +1158,7 @@ def test_withdraw_after_the_deadline_names_the_deadline() -> None:
     control.request(ControlRequest(ENABLE), 0.0)
     control.withdraw('drive offline', 2.0)
     (_, _, message), = outcomes(control)
-    assert message.startswith('no confirmation in 2 s')
+    assert message == says('stuck', timeout=2.0)
 
 
 def test_status_from_before_a_withdrawal_confirms_nothing() -> None:

@@ -9,6 +9,7 @@ from builders import (
 )
 from hypothesis import given, strategies as st
 import pytest
+from saying import says
 
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ParameterType, ValueKind
@@ -39,7 +40,7 @@ def test_every_word_survives(entry: Parameter, word: int) -> None:
     try:
         assert entry.raw_from_value(entry.value_from_raw(raw)) == raw
     except ValueRefused as error:
-        assert 'out of range' in str(error)
+        assert error.sentence == says('out_of_range')
 
 
 @pytest.mark.parametrize('entry, kind', [

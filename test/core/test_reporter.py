@@ -15,13 +15,13 @@ from drive_can_bridge.core.statistics import DriveStatistics
 def test_events_in_order_and_once() -> None:
     statistics = DriveStatistics()
     report = Reporter(statistics, 'not activated')
-    report.warn('look at it')
+    report.warn('careful')
     report.reject('too short')
     report.note(Noted('just so'))
     report.expired(Setpoints((SPEED,), timeout=0.5, rearm_immediate=True).items)
     assert statistics.rejected == 1
     assert report.take() == [
-        Noted('look at it', warning=True), FrameRejected('too short'), Noted('just so'),
+        Noted('careful', warning=True), FrameRejected('too short'), Noted('just so'),
         SetpointsExpired(('speed_setpoint',))]
     assert report.take() == []
 

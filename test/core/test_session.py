@@ -28,7 +28,7 @@ class Idle(Session):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.done: list[str] = []
+        self.done: list[tuple[str, ...]] = []
         self.services = DriveServices(self, self.Server(self))
 
     class Server:
@@ -45,7 +45,7 @@ class Idle(Session):
             self._session.waiting += 1
 
         def cancel(self) -> None:
-            self._session.done.append('cancel')
+            self._session.done.append(('cancel',))
 
     def prepare_stop(self, now: float) -> bool:
         return False
@@ -54,17 +54,20 @@ class Idle(Session):
         raise NotImplementedError
 
     def begin(self, now: float) -> None:
-        self.done.append(f'begin at {now:g}, {self.report.advice}')
+        self.done.append((f'begin at {now:g}', self.report.advice))
         self.online = True
 
     def fall_silent(self) -> None:
-        self.done.append(f'idle: {self.report.advice}')
+        self.done.append(('idle', self.report.advice))
 
     def lost(self, now: float, *, was_online: bool) -> None:
-        self.done.append(f'lost: {self.report.advice}')
+        self.done.append(('lost', self.report.advice))
 
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         self.outbox.put(frame)
+
+
+DOWN = says('bus_is_down', bus='main', reason='unplugged')
 
 
 def session(**options: object) -> Idle:
@@ -81,7 +84,7 @@ def test_begins_when_bus_and_activity_are_there_in_any_order() -> None:
         for now, call in enumerate(order):
             assert made.done == []
             getattr(made, call)(float(now))
-        assert made.done == ['begin at 1, being looked for']
+        assert made.done == [('begin at 1', says('looked_for'))]
         assert not made.ever_online
 
 
@@ -92,8 +95,8 @@ def test_loss_of_the_bus() -> None:
     made.receive_frame(Frame(1, b'', False), 3.0)
     made.done.clear()
     made.bus_down(4.0, 'unplugged')
-    assert made.done == ['cancel', 'lost: bus main is down', 'idle: bus main is down']
-    assert made.take_events() == [StationLost(says('bus_is_down', bus='main', reason='unplugged'))]
+    assert made.done == [('cancel',), ('lost', DOWN), ('idle', DOWN)]
+    assert made.take_events() == [StationLost(DOWN)]
     assert made.take_frames() == []
     made.services.submit(read(GAIN), 5.0)
     assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
@@ -224,10 +227,10 @@ class Acting:
         self._log.append(f'{self._name} stops')
 
     def clear(self) -> None:
-        self._log.append(f'{self._name} is cleared')
+        self._log.append(f'{self._name} cleared')
 
     def time_lost(self, now: float) -> None:
-        self._log.append(f'{self._name} lost time')
+        self._log.append(f'{self._name} stood')
 
 
 class Parts(Session):
@@ -292,11 +295,11 @@ def test_a_stop_forgets_what_is_under_way_and_its_end_everything() -> None:
     made = with_parts()
     assert not made.stopped
     made.deactivate(1.0)
-    assert made.log == ['channel is cleared', 'stop']
+    assert made.log == ['channel cleared', 'stop']
     assert not made.stopped
     made.log.clear()
     made.stop_ended()
-    assert made.log == ['channel is cleared', 'first stops', 'second stops']
+    assert made.log == ['channel cleared', 'first stops', 'second stops']
     assert made.stopped
     made.log.clear()
     made.deactivate(2.0)
@@ -314,13 +317,13 @@ def test_a_stall_begins_anew_but_lets_a_stop_go_on() -> None:
     made = with_parts()
     made.online = True
     made.time_lost(5.0)
-    assert made.log == ['channel lost time', 'begin']
+    assert made.log == ['channel stood', 'begin']
     assert made.take_events() == [StationLost(says('bridge_stood_still'))]
     made.deactivate(6.0)
     made.log.clear()
     made.time_lost(8.0)
-    assert made.log == ['channel lost time']
+    assert made.log == ['channel stood']
     made.give_up(9.0)
     made.log.clear()
     made.time_lost(10.0)
-    assert made.log == ['channel lost time']
+    assert made.log == ['channel stood']

@@ -2,9 +2,11 @@
 """Control word and status word of one inverter: every way through the states."""
 
 from builders import Conversation
-from cannord_session_builders import enabled, exchange, FAULT, online, READY, RUNNING, TICK
+from cannord_session_builders import (
+    enabled, exchange, FAULT, online, READY, RUNNING, STANDING, TICK,
+)
 import pytest
-from saying import says
+from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -45,7 +47,7 @@ def test_control_begins_with_ready() -> None:
     assert talk.session.control is not None
     assert talk.session.control.state == 'switch-on disabled'
     assert words(talk, 10.02, DISABLED, READY) == ['7E04', '7E04']
-    assert talk.session.control.state == 'ready to switch on'
+    assert talk.session.control.state == STANDING
 
 
 def test_walk_from_switch_on_disabled() -> None:
@@ -69,7 +71,7 @@ def test_enable_sticks_and_says_where_and_why() -> None:
     assert talk.control_outcomes() == [(
         'enable', False, says(
             'stuck', remarks=[says('quick_stop_active')], state='switch-on disabled',
-            status='status word 0D50h', timeout=2.0))]
+            status=status_word(0x0D50), timeout=2.0))]
 
 
 @pytest.mark.parametrize(('status', 'what'), [
@@ -85,7 +87,7 @@ def test_disable_waits_until_the_output_is_off() -> None:
     assert words(talk, 10.08, RUNNING, RAMPING_DOWN) == ['7E04', '7E04']
     assert talk.control_outcomes() == []
     assert words(talk, 10.12, READY) == ['7E04']
-    assert talk.control_outcomes() == [('disable', True, 'ready to switch on')]
+    assert talk.control_outcomes() == [('disable', True, STANDING)]
 
 
 def test_quick_stop_holds_its_word_until_the_drive_stands() -> None:
@@ -106,7 +108,7 @@ def test_quick_stop_while_disabled_succeeds() -> None:
     talk = online()
     exchange(talk, 10.02)
     talk.asks(QUICK_STOP, 10.03)
-    assert talk.control_outcomes() == [('quick_stop', True, 'ready to switch on')]
+    assert talk.control_outcomes() == [('quick_stop', True, STANDING)]
     assert words(talk, 10.04, READY) == ['7E04']
 
 
@@ -122,7 +124,7 @@ def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     talk.hears(FAULT, 10.065)
     assert talk.session.state is DriveState.FAULT
     assert talk.events(Noted) == [
-        Noted(says('fault_came', ran=True, status='status word 0B38h'), warning=True)]
+        Noted(says('fault_came', ran=True, status=status_word(0x0B38)), warning=True)]
     assert words(talk, 10.08, FAULT) == ['7E04']
     talk.asks(ENABLE, 10.09)
     assert talk.control_outcomes() == [('enable', False, says('reset_first'))]
@@ -133,7 +135,7 @@ def test_a_fault_ends_an_enable() -> None:
     talk.asks(ENABLE, 10.003)
     assert words(talk, 10.02, READY, FAULT, FAULT) == ['7F04', '7F04', '7E04']
     assert talk.control_outcomes() == [
-        ('enable', False, says('fault_while_enabling', status='status word 0B38h'))]
+        ('enable', False, says('fault_while_enabling', status=status_word(0x0B38)))]
 
 
 def test_reset_is_a_rising_edge() -> None:
@@ -152,7 +154,7 @@ def test_reset_while_the_cause_is_there() -> None:
     assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', '7E04']
     assert talk.until(10.104)[0][1] == '002#7E040000'
     assert talk.control_outcomes() == [
-        ('reset_fault', False, says('fault_present', status='status word 0B38h', timeout=0.1))]
+        ('reset_fault', False, says('fault_present', status=status_word(0x0B38), timeout=0.1))]
     assert words(talk, 10.12, FAULT) == ['7E04']
     talk.asks(RESET_FAULT, 10.13)      # with an edge of its own
     assert words(talk, 10.14, FAULT, DISABLED, DISABLED, DISABLED) == [
@@ -166,7 +168,7 @@ def test_reset_waits_for_the_end_of_the_fault_reaction() -> None:
     talk.asks(RESET_FAULT, 10.003)
     assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT, DISABLED, DISABLED, READY) == [
         '7E04', '7E04', '7E04', 'FE04', 'FE04', 'FE04', '7E04']
-    assert talk.control_outcomes() == [('reset_fault', True, 'ready to switch on')]
+    assert talk.control_outcomes() == [('reset_fault', True, STANDING)]
 
 
 def test_reset_pulse_hurries_where_the_period_is_long() -> None:
@@ -190,7 +192,7 @@ def test_a_drive_that_drops_out_by_itself_is_not_started_again(status: str, stat
     talk = running()
     assert words(talk, 10.08, status, RUNNING) == ['7F04', '7E04']
     note, = talk.events(Noted)
-    assert 'no longer enabled, by itself' in note.text
+    assert note.text == says('dropped_out_for_good')
     assert words(talk, 10.12, status) == ['7E04']
     assert talk.session.control is not None
     assert talk.session.control.state == state

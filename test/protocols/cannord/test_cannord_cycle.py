@@ -7,10 +7,11 @@ from typing import Any
 from builders import Conversation, frame
 from cannord_session_builders import (
     ACTUAL, commanded, CURRENT, ENABLED, enabled, exchange, FAULT, FREQUENCY, INPUTS, inverter,
-    online, READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
+    online, READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, STANDING, started, THIRD,
+    VALUES,
 )
 import pytest
-from saying import says
+from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -31,7 +32,7 @@ def test_first_exchange() -> None:
     assert talk.session.offline_advice == ''
     assert talk.session.state is DriveState.DISABLED
     assert talk.session.control is not None
-    assert talk.session.control.state == 'ready to switch on'
+    assert talk.session.control.state == STANDING
     assert talk.session.next_timer() == pytest.approx(10.02)
 
 
@@ -191,7 +192,7 @@ def test_extra_values_that_do_not_come() -> None:
     assert talk.samples() == []
     talk.until(10.041)
     assert talk.samples() == [(0x0F37, 0x400, 0x300, 0x200)]
-    assert 'values 4 and 5 do not arrive' in talk.session.warning
+    assert talk.session.warning == says('extra_values_missing')
     assert talk.session.statistics.missed == 0
     talk.hears('003#370F000400030002', 10.042)
     talk.hears('003#0100020000', 10.043)
@@ -262,11 +263,11 @@ def test_long_answer_to_a_short_request() -> None:
 
 @pytest.mark.parametrize('size', [0, 1, 2, 3, 6, 7])
 def test_malformed_answers(size: int) -> None:
+    what = f'{size} data bytes: process data have 4 or 8'
     talk = online()
     talk.until(10.021)
     talk.hears('003#' + '31' * size, 10.022)
-    assert talk.events() == [
-        FrameRejected(f'{size} data bytes: process data have 4 or 8')]
+    assert talk.events() == [FrameRejected(says('malformed', what=what))]
     talk.hears(READY, 10.023)
     assert talk.samples() == [(0x0B31, 0)]
 
@@ -301,9 +302,9 @@ def test_foreign_broadcasts(options: dict[str, object], obeyed: list[str],
         talk.hears(text, 10.003)
     station = options.get('station', 1)
     assert talk.events() == [
-        *(ForeignMasterSeen(f'another master sends broadcasts, which station {station} obeys if '
-                            f'it is set to listen (P509): {text}') for text in obeyed),
-        *(FrameRejected(f'{text}: not of this drive') for text in others)]
+        *(ForeignMasterSeen(says('other_master_broadcasts', station=station, frame=text))
+          for text in obeyed),
+        *(FrameRejected(says('not_of_this_drive', frame=text)) for text in others)]
 
 
 # -- faults told unasked --------------------------------------------------------------------------
@@ -313,7 +314,7 @@ def test_a_fault_told_unasked_is_a_sample_at_once() -> None:
     talk = online()
     talk.hears('003#380B0010', 10.011)
     assert talk.events() == [
-        Noted(says('fault_came', ran=False, status='status word 0B38h'), warning=True),
+        Noted(says('fault_came', ran=False, status=status_word(0x0B38)), warning=True),
         ProcessDataReceived((0x0B38, 0x1000), 10.011)]
     assert talk.session.state is DriveState.FAULT
     statistics = talk.session.statistics
@@ -369,7 +370,7 @@ def test_silence_is_offline_and_cycling_goes_on() -> None:
     assert talk.events(StationLost) == []
     assert talk.until(10.101) == [(10.1, '002#7E040000')]
     lost, = talk.events(StationLost)
-    assert lost.reason == says('silent_for_cycles', cycles=3, what='no answer to process data')
+    assert lost.reason == says('silent_for_cycles', cycles=3)
     assert 'P509' in talk.session.offline_advice
     assert talk.session.statistics.missed == 3
     assert talk.commands(0, 0.0, 10.11) is CommandOutcome.NOT_ARMED

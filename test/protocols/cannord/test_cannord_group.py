@@ -8,7 +8,7 @@ from typing import Any
 
 from builders import drive, frame, read
 from cannord_session_builders import (
-    ACTUAL, CURRENT, FREQUENCY, inverter, OFFSET, PARAMETERS, SETPOINTS, VALUES,
+    ACTUAL, CURRENT, FREQUENCY, inverter, OFFSET, PARAMETERS, SETPOINTS, STANDING, VALUES,
 )
 from clocks import HandClock
 import pytest
@@ -138,6 +138,11 @@ def words(sent: list[tuple[float, str]]) -> list[str]:
     return [text[4:8] for _, text in sent if text.startswith('400#')]
 
 
+def words_of(**raws: int) -> says:
+    """Return what the field ``status`` of a sentence about the group equals."""
+    return says('status_words', raws=raws)
+
+
 # -- on the wire ----------------------------------------------------------------------------------
 
 
@@ -174,8 +179,8 @@ def test_the_lowest_station_leads_whatever_the_order() -> None:
     assert [session.configuration.name for session in bus.sessions] == ['turn', 'lift', 'hoist']
     assert [len(session.setpoints.items) for session in bus.sessions] == [0, 1, 0]
     bus.live(0.07)
-    assert bus.session('lift').facts() == {'broadcast': 'leads hoist, turn'}
-    assert bus.session('turn').facts() == {'broadcast': 'led by lift'}
+    facts = {name: bus.session(name).facts()['broadcast'] for name in ('lift', 'turn')}
+    assert facts == {'lift': 'leads hoist, turn', 'turn': 'led by lift'}
     assert bus.session('lift').enabled_by == 'lift'
     assert bus.session('turn').enabled_by == 'lift'
 
@@ -240,7 +245,7 @@ def test_each_counts_its_own_answers() -> None:
     bus.live(0.05)       # asked at 10.2: missed 20 ms later
     assert bus.events(StationLost) == [
         ('hoist', StationLost(says(
-            'silent_for_cycles', cycles=3, what='no answer to process data')))]
+            'silent_for_cycles', cycles=3)))]
     assert [session.statistics.missed for session in bus.sessions] == [0, 3, 0]
     assert [session.state for session in bus.sessions] == [
         DriveState.DISABLED, DriveState.OFFLINE, DriveState.DISABLED]
@@ -334,13 +339,13 @@ def test_enable_waits_for_the_last_one_to_be_ready() -> None:
     assert set(words(bus.live(0.19))) == {'7E04'}
     control = bus.session('lift').control
     assert control is not None
-    assert control.state == (
-        'lift: ready to switch on, hoist: switch-on disabled, turn: ready to switch on')
+    each = 'lift: ready to switch on, hoist: switch-on disabled, turn: ready to switch on'
+    assert control.state == each
     bus.live(0.02)
     (action, success, message), = bus.outcomes()
     assert (action, success) == ('enable', False)
-    assert 'stuck in state lift: ready to switch on, hoist: switch-on disabled' in message
-    assert 'status words: lift 0B31h, hoist 0B70h, turn 0B31h' in message
+    assert message == says(
+        'stuck', state=each, status=words_of(lift=0x0B31, hoist=0x0B70, turn=0x0B31))
 
 
 def test_only_answers_since_the_last_word_count() -> None:
@@ -352,7 +357,7 @@ def test_only_answers_since_the_last_word_count() -> None:
     assert words(bus.live(0.04)) == ['7E04'] * 2      # two of three have answered that
     assert bus.outcomes() == []
     bus.live(0.02)
-    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+    assert bus.outcomes() == [('disable', True, STANDING)]
 
 
 def test_enable_needs_all_of_them() -> None:
@@ -363,7 +368,7 @@ def test_enable_needs_all_of_them() -> None:
     assert bus.outcomes() == [('enable', False, 'turn offline')]
     bus.asks(DISABLE)
     bus.live(0.06)
-    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+    assert bus.outcomes() == [('disable', True, STANDING)]
 
 
 def enabled(**options: Any) -> Bus:
@@ -427,7 +432,7 @@ def test_a_lost_leader_makes_old_answers_worthless() -> None:
     bus.asks(DISABLE)       # hoist has answered since, turn has not
     assert bus.outcomes() == []
     bus.live(0.02)
-    assert bus.outcomes() == [('disable', True, 'ready to switch on')]
+    assert bus.outcomes() == [('disable', True, STANDING)]
 
 
 def test_what_a_lost_member_said_explains_nothing() -> None:
@@ -440,7 +445,7 @@ def test_what_a_lost_member_said_explains_nothing() -> None:
     bus.live(0.22)
     (_, success, message), = bus.outcomes()
     assert not success
-    assert message.endswith('it does not follow control word 047Eh')
+    assert message.fields['remarks'] == [says('word_not_followed', word=0x047E)]
 
 
 def test_a_fault_leaves_with_the_member_that_has_it() -> None:
@@ -455,7 +460,7 @@ def test_a_fault_leaves_with_the_member_that_has_it() -> None:
     assert [event.text for name, event in bus.events(Noted) if name == 'lift'] == [
         says(
             'fault_came', ran=False,
-            status='status words: lift 0B31h, hoist 0B38h, turn 0B31h')], 'nobody said it is gone'
+            status=words_of(lift=0x0B31, hoist=0x0B38, turn=0x0B31))], 'nobody said it is gone'
     bus.asks(RESET_FAULT)
     assert [success for _, success, _ in bus.outcomes()] == [True]
 
@@ -467,7 +472,8 @@ def test_a_fault_that_stays_is_not_laid_to_the_inputs_of_another_member() -> Non
     bus.asks(RESET_FAULT)
     bus.live(0.42)
     assert bus.outcomes() == [('reset_fault', False, says(
-        'fault_present', status='status words: lift 0B50h, hoist 0B38h, turn 0B31h', timeout=0.4))]
+        'fault_present', timeout=0.4,
+        status=words_of(lift=0x0B50, hoist=0x0B38, turn=0x0B31)))]
 
 
 def test_quick_stop_of_all() -> None:
@@ -529,7 +535,7 @@ def test_a_member_that_ran_and_is_lost_has_not_confirmed_a_stop(action: ControlA
     bus.live(0.2)
     bus.asks(action)
     bus.live(0.1)
-    assert bus.outcomes() == [(action.value, True, 'ready to switch on')]
+    assert bus.outcomes() == [(action.value, True, STANDING)]
 
 
 def test_end_while_a_member_that_ran_is_lost() -> None:
@@ -653,7 +659,7 @@ def test_whoever_stops_a_member_stops_all(name: str, action: ControlAction, word
     bus.answers = dict.fromkeys((1, 2, 3), READY)
     bus.live(0.3)
     assert bus.outcomes() == []
-    assert bus.outcomes(name) == [(action.value, True, 'ready to switch on')]
+    assert bus.outcomes(name) == [(action.value, True, STANDING)]
     assert set(words(bus.live(0.1))) == {'7E04'}
 
 
@@ -690,7 +696,7 @@ def test_members_name_their_leader() -> None:
                      says('group_is_led', leader='lift', service='reset_fault')]
     control = bus.session('hoist').control
     assert control is not None
-    assert control.state == 'ready to switch on'
+    assert control.state == STANDING
     assert bus.session('hoist').state is DriveState.DISABLED
 
 
@@ -994,32 +1000,19 @@ def test_differences(options: dict[str, Any], text: str) -> None:
     assert found.startswith(text)
 
 
-def test_the_same_word_means_the_same_everywhere() -> None:
-    faster = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
-                   request=(replace(FREQUENCY, scale=100 / 16384),),
-                   table=PARAMETERS)
-    (name, found), = complaints(*members(1), faster)
-    assert name == 'turn'
-    assert found.startswith("cyclic_request: 'frequency_setpoint' has another type, scale")
-
-
-@pytest.mark.parametrize('limit', [{'maximum': 10.0}, {'minimum': -10.0}, {'neutral': 5.0}])
-def test_the_same_words_are_allowed_everywhere(limit: dict[str, float]) -> None:
+@pytest.mark.parametrize(('change', 'differs'), [
+    ({'scale': 100 / 16384}, 'type, scale'),
+    *[({key: value}, 'minimum, maximum or neutral than for drive lift')
+      for key, value in (('maximum', 10.0), ('minimum', -10.0), ('neutral', 5.0))],
+    ({'neutral': 0.0, 'limit': True}, 'limit')])
+def test_the_same_word_means_and_is_allowed_the_same_everywhere(
+        change: dict[str, Any], differs: str) -> None:
     """What the leader may be told, all are told."""
-    careful = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
-                    request=(replace(FREQUENCY, **limit),), table=PARAMETERS)
-    (name, found), = complaints(*members(1), careful)
-    assert name == 'turn'
-    assert found.startswith("cyclic_request: 'frequency_setpoint' has another minimum, maximum or "
-                            'neutral than for drive lift')
-
-
-def test_a_limit_is_one_for_all() -> None:
-    bounded = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
-                    request=(replace(FREQUENCY, neutral=0.0, limit=True),), table=PARAMETERS)
-    (name, found), = complaints(*members(1), bounded)
-    assert name == 'turn'
-    assert found.startswith("cyclic_request: 'frequency_setpoint' has another limit")
+    other = drive('cannord', name='turn', station=3, broadcast='group', response=(ACTUAL,),
+                  request=(replace(FREQUENCY, **change),), table=PARAMETERS)
+    (name, found), = complaints(*members(1), other)
+    start = f"cyclic_request: 'frequency_setpoint' has another {differs}"
+    assert (name, found[:len(start)]) == ('turn', start)
 
 
 def test_members_that_have_not_answered_yet_do_not_run_on() -> None:
@@ -1033,4 +1026,4 @@ def test_members_that_have_not_answered_yet_do_not_run_on() -> None:
         assert control.disregard == ''
     for step in range(10, 20):
         control.status_received(0x0F37, 0.1 + 0.5 * step, 'b')
-    assert 'although its control word is disable (047Eh)' in control.disregard
+    assert control.disregard == says('disregards', action='disable', word=0x047E)

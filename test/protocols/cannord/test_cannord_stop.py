@@ -7,10 +7,10 @@ import math
 from builders import Conversation, read, write
 from cannord_session_builders import (
     ACTUAL, commanded, ENABLED, enabled, exchange, FREQUENCY, inverter, MONITORING, OFFSET, online,
-    READY, READY_FRAME, RUNNING, SETPOINTS, TICK, VALUES,
+    READY, READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
 )
 import pytest
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -126,7 +126,7 @@ def test_end_while_a_drive_that_ran_is_lost() -> None:
     talk.deactivate(11.01)
     assert [text for _, text in talk.until(12.0)][-3:] == [READY_FRAME] * 3
     assert talk.session.stopped
-    assert warnings(talk)[-1].endswith('it may still be running')
+    assert warnings(talk)[-1] == says('may_still_be_running')
 
 
 def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:
@@ -281,7 +281,7 @@ def test_refused_disable_goes_on() -> None:
     assert talk.control_outcomes() == []
     talk.refusing = lambda text: False
     assert exchange(talk, 10.08) == READY_FRAME
-    assert talk.control_outcomes() == [('disable', True, 'ready to switch on')]
+    assert talk.control_outcomes() == [('disable', True, STANDING)]
 
 
 def test_refused_write_was_not_sent() -> None:
@@ -472,5 +472,4 @@ def test_bus_that_is_lost_before_silent_neutral_cycles_count_as_unheard() -> Non
     assert not talk.session.online
     assert warnings(talk) == []
     talk.bus_down(10.135)
-    assert warnings(talk) == [
-        'the bus was lost before it could be told to stop: it may still be running']
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]

@@ -10,7 +10,7 @@ from pkw_builders import (
     RUNS_1, START, started, STILL_0, TABLE, TRIPPED_0, WORD,
 )
 import pytest
-from saying import says
+from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -68,7 +68,7 @@ def test_reset_of_a_trip() -> None:
     talk.hears(TRIPPED_0, 10.091)
     assert talk.session.state is DriveState.FAULT
     assert talk.events(Noted) == [Noted(says(
-        'fault_came', ran=False, status='status word 0044h'), warning=True)]
+        'fault_came', ran=False, status=status_word(0x0044)), warning=True)]
     assert talk.asks(ControlAction.RESET_FAULT, 10.095) == ['505#C00200AA08000000']
     assert talk.hears('485#C00200AA00000000', 10.096) == [DISABLE_0], 'one acknowledged write'
     assert talk.hears(DISABLED_0, 10.097) == []

@@ -26,7 +26,7 @@ class Box:
         self.left: Left = lambda sent, now: None
 
     def send(self, message: pkw.Message, left: Left) -> None:
-        self.sent.append(pkw.encode(message, Layout.WORD_LE).hex(' ').upper())
+        self.sent.append(pkw.encode(message, Layout.WORD_LE).hex().upper())
         self.left = left
 
     def take(self) -> list[str]:
@@ -45,97 +45,97 @@ class Box:
 def _box() -> Box:
     """Return a mailbox that has just read register 455 with toggle 1."""
     box = Box()
-    assert box.begin(READ, 0.0) == ['00 00 00 00 00 00 00 00']
-    assert box.hears('00 00 00 00 00 00 00 00', 0.01) is True
-    assert box.take() == ['C7 01 00 A5 00 00 00 00']
-    assert box.hears('C7 01 00 A5 83 20 00 00', 0.02) == Answered((0x2083, 0))
+    assert box.begin(READ, 0.0) == ['0000000000000000']
+    assert box.hears('0000000000000000', 0.01) is True
+    assert box.take() == ['C70100A500000000']
+    assert box.hears('C70100A583200000', 0.02) == Answered((0x2083, 0))
     return box
 
 
 def test_function_zero_goes_first_and_the_toggle_alternates(box: Box) -> None:
     for second, function in enumerate(('25', 'A5', '25', 'A5')):
-        assert box.begin(READ, 1.0 + second) == [f'C7 01 00 {function} 00 00 00 00']
-        assert box.hears(f'C7 01 00 {function} 83 20 FF FF', 1.1 + second) == Answered(
+        assert box.begin(READ, 1.0 + second) == [f'C70100{function}00000000']
+        assert box.hears(f'C70100{function}8320FFFF', 1.1 + second) == Answered(
             (0x2083, 0xFFFF))
     assert box.take() == []
     assert not box.box.busy
 
 
 def test_function_zero_is_answered_with_either_toggle_and_any_content() -> None:
-    for answer in ('00 00 00 00 00 00 00 00', 'C7 01 00 80 83 20 00 00'):
+    for answer in ('0000000000000000', 'C701008083200000'):
         box = Box()
         box.begin(READ, 0.0)
         assert box.hears(answer, 0.01) is True
-        assert box.take() == ['C7 01 00 A5 00 00 00 00']
+        assert box.take() == ['C70100A500000000']
 
 
 @pytest.mark.parametrize('wrong', [
-    'C7 01 00 A5 83 20 00 00',     # toggle
-    'C7 01 00 26 83 20 00 00',     # function
-    'C7 01 00 55 83 20 00 00',     # function
-    'C8 01 00 25 83 20 00 00',     # register
-    'C7 02 00 25 83 20 00 00',     # register
-    'C7 01 00 CE 02 00 01 06',     # refusal with the other toggle
-    'C8 01 00 4E 02 00 01 06',     # refusal of another register
-    '00 00 00 00 00 00 00 00',     # function 00h
+    'C70100A583200000',     # toggle
+    'C701002683200000',     # function
+    'C701005583200000',     # function
+    'C801002583200000',     # register
+    'C702002583200000',     # register
+    'C70100CE02000106',     # refusal with the other toggle
+    'C801004E02000106',     # refusal of another register
+    '0000000000000000',     # function 00h
 ])
 def test_responses_that_do_not_fit(box: Box, wrong: str) -> None:
     box.begin(READ, 1.0)
     assert box.hears(wrong, 1.1) is False
     assert box.box.busy
-    assert box.hears('C7 01 00 25 83 20 00 00', 1.2) == Answered((0x2083, 0))
+    assert box.hears('C701002583200000', 1.2) == Answered((0x2083, 0))
 
 
 @pytest.mark.parametrize('wrong', [
-    '04 20 07 35 83 20 00 00', '04 20 06 B5 83 20 00 00', '05 20 06 35 83 20 00 00',
-    '04 20 07 4E 11 00 09 06',
+    '0420073583200000', '042006B583200000', '0520063583200000',
+    '0420074E11000906',
 ])
 def test_sub_index_has_to_fit(box: Box, wrong: str) -> None:
-    assert box.begin(Read(OBJECT), 1.0) == ['04 20 06 35 00 00 00 00']
+    assert box.begin(Read(OBJECT), 1.0) == ['0420063500000000']
     assert box.hears(wrong, 1.1) is False
-    assert box.hears('04 20 06 35 83 20 00 00', 1.2) == Answered((0x2083, 0))
+    assert box.hears('0420063583200000', 1.2) == Answered((0x2083, 0))
 
 
 def test_low_byte_of_a_register_response_does_not_matter(box: Box) -> None:
     box.begin(READ, 1.0)
-    assert box.hears('C7 01 99 25 83 20 00 00', 1.1) == Answered((0x2083, 0))
+    assert box.hears('C701992583200000', 1.1) == Answered((0x2083, 0))
 
 
 def test_nothing_is_expected_while_nothing_was_asked(box: Box) -> None:
-    assert box.hears('C7 01 00 A5 83 20 00 00', 1.0) is False
+    assert box.hears('C70100A583200000', 1.0) is False
     assert box.box.handle_timer(100.0) is False
 
 
 def test_all_eight_functions(box: Box) -> None:
     steps: list[tuple[Read | Write, str]] = [
-        (Read(REGISTER), 'C7 01 00 25 00 00 00 00'),
-        (Read(REGISTER, 2), 'C7 01 00 A6 00 00 00 00'),
-        (Write(Address(704), (1,)), 'C0 02 00 2A 01 00 00 00'),
-        (Write(Address(704), (8, 0x1234)), 'C0 02 00 AB 08 00 34 12'),
-        (Read(OBJECT), '04 20 06 35 00 00 00 00'),
-        (Read(OBJECT, 2), '04 20 06 B6 00 00 00 00'),
-        (Write(Address(0x2008, 5), (1,)), '08 20 05 3A 01 00 00 00'),
-        (Write(Address(0x2008, 5), (8, 0x1234)), '08 20 05 BB 08 00 34 12'),
+        (Read(REGISTER), 'C701002500000000'),
+        (Read(REGISTER, 2), 'C70100A600000000'),
+        (Write(Address(704), (1,)), 'C002002A01000000'),
+        (Write(Address(704), (8, 0x1234)), 'C00200AB08003412'),
+        (Read(OBJECT), '0420063500000000'),
+        (Read(OBJECT, 2), '042006B600000000'),
+        (Write(Address(0x2008, 5), (1,)), '0820053A01000000'),
+        (Write(Address(0x2008, 5), (8, 0x1234)), '082005BB08003412'),
     ]
     for step, request in steps:
         assert box.begin(step, 1.0) == [request]
-        assert box.hears(f'{request[:11]} 00 00 00 00', 1.1) == Answered((0, 0))
+        assert box.hears(f'{request[:8]}00000000', 1.1) == Answered((0, 0))
 
 
 @pytest.mark.parametrize('data, order, code', [
-    ('02 00 01 06', 'auto', 0x06010002), ('01 06 02 00', 'auto', 0x06010002),
-    ('02 00 01 06', 'low_first', 0x06010002), ('02 00 01 06', 'high_first', 0x00020601),
-    ('01 06 02 00', 'high_first', 0x06010002), ('08 00 00 00', 'auto', 8),
-    ('00 00 08 00', 'auto', 8), ('99 00 09 06', 'auto', 0x06090099),
-    ('09 06 99 00', 'auto', 0x06090099), ('34 12 78 56', 'auto', 0x56781234),
-    ('00 00 00 00', 'auto', 0),
+    ('02000106', 'auto', 0x06010002), ('01060200', 'auto', 0x06010002),
+    ('02000106', 'low_first', 0x06010002), ('02000106', 'high_first', 0x00020601),
+    ('01060200', 'high_first', 0x06010002), ('08000000', 'auto', 8),
+    ('00000800', 'auto', 8), ('99000906', 'auto', 0x06090099),
+    ('09069900', 'auto', 0x06090099), ('34127856', 'auto', 0x56781234),
+    ('00000000', 'auto', 0),
 ])
 def test_refusals(data: str, order: str, code: int) -> None:
     box = Box(order=order)
     box.begin(Write(REGISTER, (0x1234,)), 0.0)
-    box.hears('00 00 00 00 00 00 00 00', 0.01)
-    assert box.take()[-1] == 'C7 01 00 AA 34 12 00 00'
-    assert box.hears(f'C7 01 00 CE {data}', 0.02) == Refused(code)
+    box.hears('0000000000000000', 0.01)
+    assert box.take()[-1] == 'C70100AA34120000'
+    assert box.hears(f'C70100CE{data}', 0.02) == Refused(code)
 
 
 def test_after_silence_function_zero_goes_first_again(box: Box) -> None:
@@ -143,19 +143,19 @@ def test_after_silence_function_zero_goes_first_again(box: Box) -> None:
     assert box.box.deadline == 1.5
     assert box.box.handle_timer(1.499) is False
     assert box.box.handle_timer(1.5) == Silence(sent=True)
-    assert box.begin(READ, 2.0) == ['00 00 00 00 00 00 00 00']
+    assert box.begin(READ, 2.0) == ['0000000000000000']
     # the late answer of the request before is no answer any more
-    assert box.hears('C7 01 00 25 83 20 00 00', 2.01) is False
-    assert box.hears('00 00 00 00 00 00 00 00', 2.02) is True
-    assert box.take() == ['C7 01 00 A5 00 00 00 00']
-    assert box.hears('C7 01 00 25 83 20 00 00', 2.03) is False
-    assert box.hears('C7 01 00 A5 83 20 00 00', 2.04) == Answered((0x2083, 0))
+    assert box.hears('C701002583200000', 2.01) is False
+    assert box.hears('0000000000000000', 2.02) is True
+    assert box.take() == ['C70100A500000000']
+    assert box.hears('C701002583200000', 2.03) is False
+    assert box.hears('C70100A583200000', 2.04) == Answered((0x2083, 0))
 
 
 def test_refusals_synchronise_as_well(box: Box) -> None:
     box.begin(READ, 1.0)
-    assert box.hears('C7 01 00 4E 00 00 02 06', 1.1) == Refused(0x06020000)
-    assert box.begin(READ, 2.0) == ['C7 01 00 A5 00 00 00 00']
+    assert box.hears('C701004E00000206', 1.1) == Refused(0x06020000)
+    assert box.begin(READ, 2.0) == ['C70100A500000000']
 
 
 def test_device_that_does_not_answer_function_zero_is_read_all_the_same() -> None:
@@ -165,10 +165,10 @@ def test_device_that_does_not_answer_function_zero_is_read_all_the_same() -> Non
     box.take()
     assert box.box.deadline == 0.1
     assert box.box.handle_timer(0.1) is False
-    assert box.take() == ['C7 01 00 A5 00 00 00 00']
-    assert box.hears('00 00 00 00 00 00 00 00', 0.2) is False
-    assert box.hears('C7 01 00 A5 83 20 00 00', 0.3) == Answered((0x2083, 0))
-    assert box.begin(READ, 1.0) == ['C7 01 00 25 00 00 00 00']
+    assert box.take() == ['C70100A500000000']
+    assert box.hears('0000000000000000', 0.2) is False
+    assert box.hears('C70100A583200000', 0.3) == Answered((0x2083, 0))
+    assert box.begin(READ, 1.0) == ['C701002500000000']
 
 
 def test_two_silences_in_a_row_invert_the_toggle() -> None:
@@ -179,19 +179,19 @@ def test_two_silences_in_a_row_invert_the_toggle() -> None:
         assert box.box.handle_timer(start + 0.1) is False
         sent += box.take()
         assert box.box.handle_timer(start + 0.6) == Silence(sent=True)
-    assert [text[9:11] for text in sent] == ['00', 'A5', '00', '25', '00', 'A5']
+    assert [text[6:8] for text in sent] == ['00', 'A5', '00', '25', '00', 'A5']
 
 
 def test_write_is_not_sent_when_nobody_knows_the_function_byte() -> None:
     box = Box()
-    assert box.begin(Write(REGISTER, (1,)), 0.0) == ['00 00 00 00 00 00 00 00']
+    assert box.begin(Write(REGISTER, (1,)), 0.0) == ['0000000000000000']
     assert box.box.handle_timer(0.1) == Silence(sent=False)
     assert box.take() == []
     assert not box.box.busy
 
 
 def test_lost_answer_of_a_write_is_silence(box: Box) -> None:
-    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C7 01 00 2A 01 00 00 00']
+    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
     assert box.box.handle_timer(1.5) == Silence(sent=True)
     assert box.take() == []
 
@@ -199,15 +199,15 @@ def test_lost_answer_of_a_write_is_silence(box: Box) -> None:
 def test_blind_write_goes_at_once_with_its_own_time_out() -> None:
     box = Box()
     assert box.begin(Write(REGISTER, (1,), blind=True, timeout=0.05), 0.0) == [
-        'C7 01 00 AA 01 00 00 00']
+        'C70100AA01000000']
     assert box.box.deadline == 0.05
     assert box.box.handle_timer(0.05) == Silence(sent=True)
-    assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C7 01 00 2A 01 00 00 00']
+    assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C701002A01000000']
 
 
 @pytest.mark.parametrize('step', [Write(REGISTER, (1,)), Write(REGISTER, (1,), blind=True)])
 def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
-    assert box.begin(step, 1.0) == ['C7 01 00 2A 01 00 00 00']
+    assert box.begin(step, 1.0) == ['C701002A01000000']
     box.left(False, 1.0)
     if not step.blind:
         assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
@@ -215,11 +215,11 @@ def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
         assert box.box.handle_timer(1.009) is False
         assert box.box.deadline == pytest.approx(1.01)
         assert box.box.handle_timer(1.01) is False
-        assert box.take() == ['C7 01 00 2A 01 00 00 00']
+        assert box.take() == ['C701002A01000000']
         box.left(False, 1.01)
         assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
     # the device has not seen it: nothing has to be synchronised, and its toggle is still new
-    assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']
+    assert box.begin(READ, 2.0) == ['C701002500000000']
 
 
 def test_refused_write_that_has_to_make_room_ends(box: Box) -> None:
@@ -235,7 +235,7 @@ def test_read_that_the_bus_refuses_ends_when_its_time_is_over(box: Box) -> None:
     assert box.box.handle_timer(1.499) is False
     assert box.box.deadline == 1.5
     assert box.box.handle_timer(1.5) == Silence(sent=False, refused=True)
-    assert box.begin(READ, 2.0) == ['C7 01 00 25 00 00 00 00']
+    assert box.begin(READ, 2.0) == ['C701002500000000']
 
 
 def test_short_time_out_counts_for_function_zero_too() -> None:
@@ -248,8 +248,8 @@ def test_forgetting_ends_the_exchange_and_the_synchronisation(box: Box) -> None:
     box.begin(READ, 1.0)
     box.box.forget()
     assert not box.box.busy
-    assert box.hears('C7 01 00 25 83 20 00 00', 1.1) is False
-    assert box.begin(READ, 2.0) == ['00 00 00 00 00 00 00 00']
+    assert box.hears('C701002583200000', 1.1) is False
+    assert box.begin(READ, 2.0) == ['0000000000000000']
 
 
 def test_one_exchange_at_a_time(box: Box) -> None:

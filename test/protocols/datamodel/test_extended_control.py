@@ -11,7 +11,7 @@ from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, TICK, ZEROS,
 )
 import pytest
-from saying import says
+from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
@@ -141,7 +141,7 @@ def test_fault_ends_it() -> None:
     exchange(talk, 10.06, FAULT)
     assert talk.session.state is DriveState.FAULT
     assert [note.text for note in talk.events(Noted)] == [
-        says('fault_came', ran=True, status='status word 0008h')]
+        says('fault_came', ran=True, status=status_word(0x0008))]
     assert exchange(talk, 10.08, READY) == NEUTRAL
     assert exchange(talk, 10.1, READY) == NEUTRAL
 
