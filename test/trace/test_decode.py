@@ -1,0 +1,151 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What is understood of frames, in lines of text (decode.yaml)."""
+
+from typing import Any
+
+from builders import drive, INT16, INT32, parameter, RO
+from hypothesis import given, strategies as st
+import pytest
+from trace_builders import Witness
+from transcripts import replayed, stories
+
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import ParameterType, Storage
+from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.statistics import Statistic
+from drive_can_bridge.protocols.observer import Verdict
+from drive_can_bridge.trace.lines import Only
+
+STORIES = stories(__file__, 'decode.yaml')
+
+FREQUENCY = parameter('frequency_setpoint', None, type=INT16, scale=100 / 16384, unit='%')
+ACTUAL_FREQUENCY = parameter('actual_frequency', None, type=INT16, scale=100 / 16384, unit='%',
+                             access=RO)
+RAMP = parameter('acceleration_time', 102, scale=0.01, unit='s', storage=Storage.RAM)
+RAMP_2 = parameter('acceleration_time_set_2', 102, scale=0.01, unit='s', subindex=1)
+FAULT = parameter('fault_code', 700, subindex=0, access=RO)
+PLACE = parameter('position', 613, type=ParameterType.UINT32, subindex=0x15)
+FIVE = [parameter(f'setpoint_{place}', None, type=INT16) for place in range(1, 6)]
+ACTUAL_FIVE = [parameter(f'actual_{place}', None, type=INT16, access=RO) for place in range(1, 6)]
+
+TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32, unit='rpm')
+VELOCITY = parameter('actual_velocity', None, index=0x606C, subindex=0, type=INT32, access=RO,
+                     unit='rpm')
+POSITION = parameter('position', None, index=0x6064, subindex=0, type=INT32, access=RO)
+
+STATUS = parameter('system_status', 455, access=RO, bits=(('ready', 0), ('on', 1)))
+CURRENT = parameter('average_current', 500, type=ParameterType.UINT32, scale=0.01, unit='A',
+                    access=RO)
+COMMAND = parameter('command', 704)
+
+
+def inverter(name: str = 'mixer', station: int = 100, **options: Any) -> DriveConfiguration:
+    return drive('cannord', name=name, station=station,
+                 table=(FREQUENCY, ACTUAL_FREQUENCY, RAMP, RAMP_2, FAULT, PLACE),
+                 request=(FREQUENCY,), response=(ACTUAL_FREQUENCY,), **options)
+
+
+def axis(**options: Any) -> DriveConfiguration:
+    keys = {'response': (VELOCITY,), 'period': 0.01, 'mode': 'csv', **options}
+    return drive('cia402', name='axis', station=4, parameter_timeout=0.1,
+                 table=(TARGET, VELOCITY, POSITION), request=(TARGET,), **keys)
+
+
+def starter(*response: Any, **options: Any) -> DriveConfiguration:
+    return drive('canopen_pkw', name='pump', station=5, parameter_timeout=0.5,
+                 table=(COMMAND, *response), request=(), response=response, **options)
+
+
+WITH_POSITION = axis(response=(VELOCITY, POSITION), response_pdos=(1, 3))
+POLLED = drive('datamodel_standard')
+DRIVES = {
+    'conveyor': drive(),
+    'conveyor_with_time': drive(parameter_timeout=0.1),
+    'polled': POLLED,
+    'mixer': inverter(),
+    'mixer_with_five': drive('cannord', name='mixer', station=100, table=(*FIVE, *ACTUAL_FIVE),
+                             request=FIVE, response=ACTUAL_FIVE, extra_setpoints=True),
+    'first': inverter('first', 0),
+    'second': inverter('second', 1),
+    'first_of_group': inverter('first', 0, broadcast='group'),
+    'second_of_group': inverter('second', 1, broadcast='group'),
+    'alone': inverter('alone', 1),
+    'leader': inverter('leader', 0, broadcast='group'),
+    'axis': axis(),
+    'axis_with_position': WITH_POSITION,
+    'axis_by_event': axis(mode='pv', transmission='event', period=0.02),
+    'pump': starter(STATUS, CURRENT),
+    'pump_with_second': starter(STATUS, parameter('second', 456)),
+    'pump_with_other': starter(STATUS, parameter('other', 500)),
+    'pump_word_be': starter(STATUS, CURRENT, layout='word_be'),
+}
+
+
+class Story:
+    """Does the steps of a transcript."""
+
+    def step(self, step: str) -> list[str]:
+        first, *words = step.split()
+        if first == 'watch':
+            names, _, only = ' '.join(words).partition(' only ')
+            self.witness = Witness(*(DRIVES[name] for name in names.split()),
+                                   only={Only(each) for each in only.split()})
+            return []
+        if first == 'count':
+            observed = self.witness.observed(words[0])
+            found = {name: getattr(observed, name) for name in words[1:]}
+            return [', '.join(
+                f'{name} {round(value.mean, 6) if isinstance(value, Statistic) else value}'
+                for name, value in found.items())]
+        if first == 'strays':
+            return [str(self.witness.tracer.buses['main'].strays)]
+        if not words:
+            return self.witness.waits(float(first))
+        frame, *sent = words
+        return self.witness.hears(frame, float(first), sent=sent == ['T'] if sent else None)
+
+
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str) -> None:
+    assert replayed(STORIES[story], Story().step) == STORIES[story]
+
+
+def test_what_is_remembered_of_tasks_has_an_end_but_for_those_under_way() -> None:
+    witness = Witness(inverter())
+    witness.hears('2C8#66C0010000006400', 0.0)
+    for index in range(1100):
+        witness.hears(f'2C8#{1 + index // 256:02X}60{index % 256:02X}0000000000', 0.001)
+    asked = len(witness.telegrams)
+    witness.waits(10.0)
+    lost = witness.telegrams[asked:]
+    assert len(lost) == 1101 and {each.verdict for each in lost} == {Verdict.LOST}
+    assert lost[0].parameters == (RAMP_2,)
+    witness.hears('2C8#6610000000000000', 20.0)
+    witness.hears('2C9#6610000000006700', 20.1)
+    witness.hears('2C9#6640010000006400', 30.0)
+    # nobody knows any more that it was written
+    assert (witness.telegrams[-1].title, witness.telegrams[-1].parameters) == ('read', (RAMP_2,))
+
+
+@pytest.mark.parametrize(('drives', 'identifiers'), [
+    ((drive(), drive('datamodel_standard', name='lift')),
+     (0x003FFFF0, 0x103FFFF0, 0x3F1, 0x7F1, 0x002001E1)),
+    ((inverter(broadcast='group'), inverter('other', 101, extra_setpoints=True)),
+     (0xC8, 0xC9, 0x2C8, 0x2C9, 0x403)),
+    ((WITH_POSITION,), (0x000, 0x080, 0x084, 0x184, 0x204, 0x384, 0x584, 0x604, 0x704, 0x77F)),
+    ((starter(STATUS, CURRENT),), (0x505, 0x485, 0x705, 0x085, 0x000)),
+], ids=['datamodel', 'cannord', 'cia402', 'canopen_pkw'])
+@given(st.data())
+def test_anything(drives: tuple[DriveConfiguration, ...], identifiers: tuple[int, ...],
+                  data: st.DataObject) -> None:
+    witness = Witness(*drives)
+    frames = data.draw(st.lists(st.tuples(
+        st.one_of(st.sampled_from(identifiers), st.integers(0, 0x1FFFFFFF)),
+        st.binary(max_size=8), st.booleans(), st.floats(0, 10), st.sampled_from(RecordKind))))
+    for identifier, content, extended, time, kind in frames:
+        extended = extended or identifier > 0x7FF
+        witness.tracer.take(Record(time, 'can0', identifier, content, extended, kind))
+    witness.waits(100.0)
+    if WITH_POSITION in drives:     # SDO segments bring none
+        assert len(witness.telegrams) >= sum(
+            identifier not in (0x584, 0x604) for identifier, *_ in frames)
