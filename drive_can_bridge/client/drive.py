@@ -30,12 +30,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from drive_can_bridge.core.complaints import hint
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.words import hint
 from drive_can_bridge.process.signals import finish_first
 
 

@@ -15,15 +15,17 @@ from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
+from drive_can_bridge.core.complaints import hint, says, suggestion
 from drive_can_bridge.core.configuration import (
     BusConfiguration, DriveConfiguration, JointConfiguration,
 )
 from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.units import (
     convertible_units, ELECTRICAL_FREQUENCY, Quantity, si_factor,
 )
-from drive_can_bridge.core.words import hint, nearest, seems_limit, show, suggestion
+from drive_can_bridge.core.words import nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 
@@ -44,13 +46,13 @@ class Adapters(Protocol):
     def adapter_keywords(self, interface: str) -> set[str] | None:
         """Return the keyword arguments that an adapter's class names; None: unknown."""
 
-    def check_interface(self, interface: str) -> str | None:
+    def check_interface(self, interface: str) -> Sentence | None:
         """Say why an interface cannot be used here; None: it can."""
 
-    def check_channel(self, interface: str, channel: str | int) -> str | None:
+    def check_channel(self, interface: str, channel: str | int) -> Sentence | None:
         """Say why a channel can be none of an interface; None: it may."""
 
-    def check_bitrate(self, interface: str, bitrate: int) -> str | None:
+    def check_bitrate(self, interface: str, bitrate: int) -> Sentence | None:
         """Say why an adapter cannot be set to a bit rate; None: it may be possible."""
 
 
@@ -101,11 +103,12 @@ def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str
         slip = nearest(key, ours, cutoff=_SLIP)
         if slip is not None:
             set_by_us = 'not' in ours[slip]
-            tree.wrong((*path, key), f"unknown key, did you mean '{slip}'?"
-                       + ' It is set by the bridge itself' * set_by_us)
+            tree.wrong((*path, key), says('unknown_key_of_bridge', word=slip) if set_by_us else
+                       says('unknown_key', hint=says('did_you_mean', word=slip)))
         elif keywords is not None:
-            tree.suspicious((*path, key), f'the adapter for {entry["interface"]} does not name '
-                            f'this key{hint(key, keywords)}; it is handed over all the same')
+            tree.suspicious((*path, key), says('adapter_does_not_name',
+                                               interface=entry['interface'],
+                                               near=hint(key, keywords)))
 
 
 def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration]) -> None:
@@ -113,8 +116,7 @@ def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfi
         if (bus.interface, str(bus.channel)) == (other.interface, str(other.channel)):
             tree.suspicious(
                 ('buses', bus.name, 'channel'),
-                f'{show(bus.channel)} is also the channel of bus {other.name}; identifiers and '
-                'load are checked for each bus alone')
+                says('channel_of_other_bus', channel=bus.channel, bus=other.name))
             return
 
 
@@ -125,8 +127,7 @@ def _look_for_channels_of_others(tree: Tree, buses: Iterable[BusConfiguration]) 
         named = names.get(str(other.channel), other)
         if named is not other:
             tree.suspicious(
-                ('buses', named.name), f'bus {other.name} has a channel of this name: decode '
-                "takes what other programs' traces have of it for this bus")
+                ('buses', named.name), says('name_of_other_channel', bus=other.name))
 
 
 #: share of the bus above which a configuration is refused, and warned about
@@ -168,8 +169,8 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
                 f'one identifier, {mine.purpose} here and {claim.purpose} there'
             tree.wrong(
                 ('drives', drive.name, 'station'),
-                f'{drive.station} collides with drive {other.name} (station {other.station}) on '
-                f'bus {drive.bus}: both use {what}; allowed is a station of its own')
+                says('collides', station=drive.station, other=other.name,
+                     other_station=other.station, bus=drive.bus, purpose=what))
         on_bus.extend((claim, drive) for claim in own)
 
 
@@ -180,13 +181,12 @@ def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigur
     if total <= LOAD_WARNING:
         return
     parts = ', '.join(f'{name} {100 * share:.1f} %' for name, share in shares.items())
-    figure = f'worst-case load {100 * total:.1f} % at {bus.bitrate} bit/s ({parts})'
     if total > LOAD_MAX:
-        tree.wrong(('buses', bus.name), f'{figure}, allowed is {100 * LOAD_MAX:.0f} %: use longer '
-                                        'periods, fewer drives or a higher bit rate')
+        tree.wrong(('buses', bus.name), says(
+            'overload', load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_MAX))
     else:
-        tree.suspicious(('buses', bus.name), f'{figure}, recommended is at most '
-                                             f'{100 * LOAD_WARNING:.0f} %')
+        tree.suspicious(('buses', bus.name), says(
+            'high_load', load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_WARNING))
 
 
 def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:
@@ -198,8 +198,7 @@ def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfig
             allowed = math.ceil(shortest * 1e5 - 1e-6) / 1e5
             tree.wrong(
                 ('drives', drive.name, 'period'),
-                f'{drive.period:g} s is too short for a round of polling at {bus.bitrate} bit/s, '
-                f'allowed is at least {allowed:g} s')
+                says('period_too_short', period=drive.period, bitrate=bus.bitrate, least=allowed))
 
 
 def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
@@ -224,8 +223,8 @@ def check_joint_names(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
         if drive.joint is not None and owners.setdefault(
                 drive.joint.name, drive.name) != drive.name:
             tree.wrong(('drives', drive.name, 'joint', 'name'),
-                       f'{show(drive.joint.name)} is the joint of drives.'
-                       f'{owners[drive.joint.name]} already, allowed is a name of its own')
+                       says('joint_of_other', name=drive.joint.name,
+                            owner=owners[drive.joint.name]))
 
 
 class _JointChecker:
@@ -246,8 +245,7 @@ class _JointChecker:
         values = complete('joint', entry)
         named = {key: entry[key] for key in _KEYS if key in entry}
         if not named and not any((*self._path, key) in self._tree.damaged for key in _KEYS):
-            self._tree.wrong(self._path, 'names no quantity, allowed is at least one of '
-                                         f'{", ".join(_KEYS)}')
+            self._tree.wrong(self._path, says('no_quantity', allowed=', '.join(_KEYS)))
         factors: dict[str, float] = {}
         used: dict[str, str] = {}
         units = set()
@@ -257,8 +255,7 @@ class _JointChecker:
                 continue
             quantity = key.removesuffix(_COMMAND)
             if used.setdefault(name, quantity) != quantity:
-                self._wrong(key, f'{show(name)} is the {used[name]} already, allowed is another '
-                                 'parameter')
+                self._wrong(key, says('quantity_already', name=name, quantity=used[name]))
                 continue
             factor = self._factor(key, parameter, values)
             if factor is not None:
@@ -266,18 +263,18 @@ class _JointChecker:
                 units.add(parameter.unit)
             if key == 'position_command' and not parameter.neutral_from:
                 self._tree.suspicious(
-                    (*self._path, key), f'{show(name)} has no neutral_from: without a command '
-                    f'the axis goes to {show(parameter.value_from_raw(parameter.neutral_raw))} '
-                    f'{parameter.unit}, wherever it stands')
+                    (*self._path, key), says('no_neutral_from', name=name,
+                        neutral=parameter.value_from_raw(parameter.neutral_raw),
+                        unit=parameter.unit))
         if not self._tree.is_sound(self._path):
             return None
         if values['pole_pairs'] != 1 and ELECTRICAL_FREQUENCY not in units:
             self._tree.suspicious(
                 (*self._path, 'pole_pairs'),
-                f'has no effect: no parameter of the joint has the unit {ELECTRICAL_FREQUENCY}')
+                says('no_effect', unit=ELECTRICAL_FREQUENCY))
         return JointConfiguration(factors=factors, **values)
 
-    def _wrong(self, key: str, message: str) -> None:
+    def _wrong(self, key: str, message: Sentence) -> None:
         self._tree.wrong((*self._path, key), message)
 
     def _find(self, key: str, name: str) -> Parameter | None:
@@ -292,17 +289,17 @@ class _JointChecker:
             misspelt = [other.name for other in exchanged.values() if not other.listed]
             if nearest(name, misspelt, cutoff=0.8):
                 return None
-            hint = suggestion(name, exchanged) if exchanged else f'{listed_in} is empty'
-            self._wrong(key, f'{show(name)} is not in {listed_in}, {hint}')
+            hint = suggestion(name, exchanged) if exchanged else says('list_empty', listed=listed_in)
+            self._wrong(key, says('not_in_list', name=name, listed=listed_in, hint=hint))
             return None
         if not parameter.listed:
             return None
         control = self._drive.profile.control
         if control is not None and name == control.parameter and key.endswith(_COMMAND):
-            self._wrong(key, f'{show(name)} is the control word, allowed is a setpoint')
+            self._wrong(key, says('control_word', name=name))
             return None
         if parameter.kind is ValueKind.BOOL:
-            self._wrong(key, f'{show(name)} is a bool, allowed is a number')
+            self._wrong(key, says('is_bool', name=name))
             return None
         return parameter
 
@@ -312,8 +309,8 @@ class _JointChecker:
                            pole_pairs=values['pole_pairs'])
         if factor is None:
             unit = f'the unit {show(parameter.unit)}' if parameter.unit else 'no unit'
-            self._wrong(key, f'{show(parameter.name)} has {unit}, which does not convert; '
-                             f'allowed is one of {", ".join(convertible_units(quantity))}')
+            self._wrong(key, says('does_not_convert', name=parameter.name, unit=unit,
+                                  allowed=', '.join(convertible_units(quantity))))
         return factor
 
 
@@ -346,11 +343,10 @@ class DriveChecker:
     def check(self) -> DriveConfiguration | None:
         """Return the drive as far as it is known; None where not even the protocol is."""
         if self._name == BRIDGE_NAME:
-            self._wrong((), f'{show(self._name)} is the name of the bridge itself, allowed is any '
-                            'other')
+            self._wrong((), says('name_of_bridge', name=self._name))
         bus = self._entry.get('bus')
         if bus is not None and self._buses and bus not in self._buses:
-            self._wrong(('bus',), f'{show(bus)} is unknown, {suggestion(bus, self._buses)}')
+            self._wrong(('bus',), says('unknown', name=bus, hint=suggestion(bus, self._buses)))
         family = FAMILIES.get(self._entry.get('protocol', ''))
         self._load_profile(family)
         lists = {key: self._list(key) for key in LISTS}
@@ -361,11 +357,11 @@ class DriveChecker:
         self._check_setpoints(drive)
         self._check_status(drive)
         if not family.cyclic and not drive.cyclic_response and not self._is_damaged(LISTS[1]):
-            self._wrong((LISTS[1],), f'empty, allowed in {family.name} is at least one parameter')
+            self._wrong((LISTS[1],), says('empty_list', family=family.name))
         if drive.period >= _LONG_PERIOD:
-            self._tree.suspicious((*self._path, 'period'), f'{drive.period:g} s from one exchange '
-                                  f'to the next: it is in seconds, {drive.period:g} ms are '
-                                  f'{drive.period / 1000:g}')
+            self._tree.suspicious((*self._path, 'period'), says('period_in_seconds',
+                                                                period=drive.period,
+                                                                shorter=drive.period / 1000))
         self._place(family.check_widths(drive), Tree.wrong)
         self._place(family.check(drive), Tree.wrong)
         self._place(family.warnings(drive), Tree.suspicious)
@@ -379,7 +375,7 @@ class DriveChecker:
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _wrong(self, keys: tuple[str, ...], message: str, *, at: Path | None = None) -> None:
+    def _wrong(self, keys: tuple[str, ...], message: Sentence, *, at: Path | None = None) -> None:
         self._tree.wrong((*self._path, *keys), message, at=at)
 
     def _is_damaged(self, key: str) -> bool:
@@ -398,8 +394,8 @@ class DriveChecker:
         protocols = loaded.profile.protocols
         if family is not None and protocols and family.name not in protocols:
             # nothing of it fits, and nothing is wrong with it
-            self._wrong(('profile',), f'{show(name)} is for {", ".join(protocols)}, allowed is a '
-                                     f'profile for {family.name}')
+            self._wrong(('profile',), says('profile_for_others', name=name,
+                                           protocols=', '.join(protocols), family=family.name))
             return
         self._loaded = loaded
 
@@ -410,13 +406,13 @@ class DriveChecker:
         for position, name in enumerate(self._entry.get(key, [])):
             at = (*path, position)
             if any(parameter.name == name for parameter in found):
-                self._wrong((key,), f'{show(name)} stands twice, allowed is once', at=at)
+                self._wrong((key,), says('twice', name=name), at=at)
                 continue
             parameter = Parameter(name=name, listed=False)
             if self._loaded is not None:
                 if name not in self._loaded.names:
-                    self._wrong((key,), f'{show(name)} is not in the profile, '
-                                       f'{suggestion(name, self._loaded.names)}', at=at)
+                    self._wrong((key,), says('not_in_profile', name=name,
+                                             hint=suggestion(name, self._loaded.names)), at=at)
                 parameter = self._loaded.profile.parameters.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
@@ -446,8 +442,7 @@ class DriveChecker:
             return
         others = [name for name in self._loaded.profile.protocols if name != family.name]
         if self._loaded.profile.control is not None and not others:
-            self._loaded.tree.wrong(('control',), f'control is built in for {family.name}, '
-                                                  'allowed is to leave it out')
+            self._loaded.tree.wrong(('control',), says('control_built_in', family=family.name))
 
     def _check_setpoints(self, drive: DriveConfiguration) -> None:
         """Check that what is sent without a command lies in the limits."""
@@ -455,8 +450,7 @@ class DriveChecker:
         for position, parameter in enumerate(drive.cyclic_request):
             is_word = control is not None and control.parameter == parameter.name
             if parameter.limit and is_word:
-                self._wrong(('cyclic_request',), f'{show(parameter.name)} is the control word, '
-                            'which is no limit; allowed in what bounds the drive',
+                self._wrong(('cyclic_request',), says('control_word_limit', name=parameter.name),
                             at=(*self._path, 'cyclic_request', position))
             if parameter.neutral_from:
                 self._check_held(drive, parameter, is_word=is_word, at=(
@@ -468,9 +462,8 @@ class DriveChecker:
                 continue
             low, high = parameter.raw_limits
             if not low <= 0 <= high:
-                self._wrong(('cyclic_request',), f'{show(parameter.name)} has no neutral value '
-                            'and raw 0 is out of its range, allowed is a neutral of '
-                            f'{parameter.range_text}',
+                self._wrong(('cyclic_request',), says('no_neutral', name=parameter.name,
+                                                      allowed=parameter.range_text),
                             at=(*self._path, 'cyclic_request', position))
 
     def _look_for_limits(self, drive: DriveConfiguration) -> None:
@@ -486,28 +479,25 @@ class DriveChecker:
             rest = parameter.neutral_from or show(parameter.value_from_raw(parameter.neutral_raw))
             self._tree.suspicious(
                 (*self._path, 'cyclic_request'),
-                f'{show(parameter.name)} looks like a limit, and is sent as {rest}'
-                f'{parameter.unit and " " + parameter.unit} until it is armed: if it bounds the '
-                'drive and moves nothing, give it limit: true and a neutral in the profile',
+                says('looks_like_limit', name=parameter.name, rest=rest,
+                     unit=parameter.unit and ' ' + parameter.unit),
                 at=(*self._path, 'cyclic_request', position))
 
     def _check_held(self, drive: DriveConfiguration, parameter: Parameter, *, is_word: bool,
                     at: Path) -> None:
         """Check what an axis needs that has to stay where it is (``neutral_from``)."""
-        name, measured = show(parameter.name), show(parameter.neutral_from)
+        name, measured = parameter.name, parameter.neutral_from
         if is_word:
-            self._wrong(('cyclic_request',), f'{name} is the control word, which has no '
-                        'neutral_from; allowed in setpoints', at=at)
+            self._wrong(('cyclic_request',), says('control_word_held', name=name), at=at)
         if not self._is_damaged('cyclic_response') and all(
                 other.name != parameter.neutral_from for other in drive.cyclic_response):
-            self._wrong(('cyclic_request',), f'{name} is neutral at {measured}, which is not in '
-                        'cyclic_response, allowed is to add it there', at=at)
+            self._wrong(('cyclic_request',), says('measured_not_listed', name=name,
+                                                  measured=measured), at=at)
         if drive.rearm_immediate:
-            self._wrong(('rearm',), f"'immediate' would let {name} jump from {measured}, allowed "
-                        "with neutral_from is 'neutral'")
+            self._wrong(('rearm',), says('immediate_jumps', name=name, measured=measured))
         if getattr(drive.options, 'broadcast', 'none') != 'none':
-            self._wrong(('broadcast',), f'{show(drive.options.broadcast)} sends the same '
-                        f'{name} to several axes, allowed with neutral_from is none')
+            self._wrong(('broadcast',), says('broadcast_held', broadcast=drive.options.broadcast,
+                                             name=name))
 
     def _check_status(self, drive: DriveConfiguration) -> None:
         control = drive.profile.control
@@ -517,11 +507,10 @@ class DriveChecker:
         if all(parameter.name != control.status_parameter for parameter in drive.cyclic_response):
             self._tree.suspicious(
                 (*self._path, 'cyclic_response'),
-                f'{show(control.status_parameter)} is missing: without the status word the bridge '
-                'cannot tell whether the drive is enabled')
+                says('status_missing', name=control.status_parameter))
 
     def _place(self, complaints: Iterator[Complaint],
-               note: Callable[[Tree, Path, str], None]) -> None:
+               note: Callable[[Tree, Path, Sentence], None]) -> None:
         """Put what a family complains about where it belongs."""
         for key, message in complaints:
             parts = tuple(key.split('.')) if key else ()
@@ -531,17 +520,15 @@ class DriveChecker:
                 note(self._tree, (*self._path, *parts), message)
 
 
-def _direction_problem(key: str, parameter: Parameter) -> str:
+def _direction_problem(key: str, parameter: Parameter) -> Sentence:
     """Say why a parameter cannot travel in this direction; '' if it can."""
     if not parameter.listed:
-        return ''
-    name = show(parameter.name)
+        return NOTHING
+    name = parameter.name
     if key == 'cyclic_response':
-        return f'{name} is write-only, allowed are parameters with access ro or rw' \
-            if parameter.access is Access.WRITE_ONLY else ''
+        return says('write_only', name=name) if parameter.access is Access.WRITE_ONLY else NOTHING
     if parameter.access is Access.READ_ONLY:
-        return f'{name} is read-only, allowed are parameters with access rw or wo'
+        return says('read_only', name=name)
     if parameter.storage is Storage.EEPROM:
-        return f'{name} is kept in EEPROM, which cyclic writing would wear out; allowed are ' \
-               'parameters with storage ram'
-    return ''
+        return says('kept_in_eeprom', name=name)
+    return NOTHING

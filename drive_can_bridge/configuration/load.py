@@ -27,12 +27,13 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import (
     ALL_OPTIONS, check_schema, check_value, complete, definition, parameter_file_schema,
 )
+from drive_can_bridge.core.complaints import hint, says, suggestion
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.profile import RestoreTable
-from drive_can_bridge.core.words import hint, show, suggestion
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overrides',
@@ -62,7 +63,7 @@ def tree_from_overrides(overrides: Mapping[str, object]) -> Tree:
         else:
             target[path[-1]] = _plain(overrides[name])
     for path, below in holders.items():
-        tree.wrong(path, f"has a value, and '{below}' below it; allowed is one of them")
+        tree.wrong(path, says('value_and_below', below=below))
     return tree
 
 
@@ -109,7 +110,7 @@ def declared_parameters(configuration: BridgeConfiguration) -> list[DeclaredPara
     return list(_bridge(configuration))
 
 
-def check_dynamic(name: str, value: object) -> str | None:
+def check_dynamic(name: str, value: object) -> Sentence | None:
     """
     Say why a parameter cannot be set to a value while the node runs; None: it can.
 
@@ -121,7 +122,7 @@ def check_dynamic(name: str, value: object) -> str | None:
     elif len(parts) == 3 and parts[0] == 'drives' and parts[2] in DYNAMIC_DRIVE_KEYS:
         schema = definition('drive')['properties'][parts[2]]
     else:
-        return f'{name} cannot change while the node runs; change the parameter file and restart'
+        return says('not_while_running', name=name)
     return check_value(value, schema)
 
 
@@ -215,12 +216,12 @@ def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration
             drives[name] = drive
     _check_together(tree, buses, drives, checkers)
     if not _names(tree, 'drives') and not tree.is_damaged(('drives',)):
-        tree.suspicious(('drives',), 'no drive is configured')
+        tree.suspicious(('drives',), says('no_drive'))
     found = [tree, *store.trees]
     problems = [problem for part in found for problem in part.problems]
     for name in checkers:
         if name not in drives and not problems:  # whatever it is: no drive gets lost in silence
-            problems.append(tree.problem(('drives', name), 'cannot be used, nobody knows why'))
+            problems.append(tree.problem(('drives', name), says('nobody_knows')))
     if problems:
         raise ConfigurationError(report(problems))
     values.update(buses=buses, drives=drives,
@@ -269,28 +270,31 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
     path = ('profile_directories',)
     for position, entry in enumerate(directories):
         if entry and ('\0' in entry or not FilePath(entry).is_dir()):
-            tree.suspicious(path, f'{show(entry)} is no directory', at=(*path, position))
+            tree.suspicious(path, says('no_directory', name=entry), at=(*path, position))
 
 
-def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> str | None:
+def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | None:
     """Say what needs to know more than the schema does, see :data:`.schema.Override`."""
     if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
             'enum', 'type', 'additionalProperties'):
         return None
     if path[2] == 'protocol' and keyword != 'additionalProperties':
         if keyword == 'type':  # is told as a value that is unknown
-            return ''
-        what = f'unknown{hint(value, FAMILIES)}' if isinstance(value, str) else 'no protocol'
-        return f'{show(value)} is {what}; available: {", ".join(FAMILIES)}'
+            return NOTHING
+        available = ', '.join(FAMILIES)
+        if isinstance(value, str):
+            return says('unknown_protocol', value=value, near=hint(value, FAMILIES),
+                        allowed=available)
+        return says('no_protocol', value=value, allowed=available)
     if keyword != 'additionalProperties':
         return None
     protocol = tree.data['drives'][path[1]].get('protocol')
     family = FAMILIES.get(protocol) if isinstance(protocol, str) else None
     if family is None and path[2] in ALL_OPTIONS:  # perhaps of the family that is meant
-        return ''
+        return NOTHING
     known = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
-    return 'unknown key, ' + suggestion(
-        str(path[2]), [*known, *(family.options_schema if family else ())])
+    return says('unknown_key', hint=suggestion(
+        str(path[2]), [*known, *(family.options_schema if family else ())]))
 
 
 def of_one_bus(configuration: BridgeConfiguration, name: str) -> BridgeConfiguration:

@@ -15,9 +15,11 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.yaml_nodes import (
-    BrokenYaml, DUPLICATE, Kind, Node, read_documents, Rules, TreeReader,
+    BrokenYaml, Kind, Node, read_documents, Rules, TreeReader,
 )
-from drive_can_bridge.core.words import nearest, show, suggestion
+from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.words import nearest
 
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
@@ -61,25 +63,23 @@ class _FileReader:
             documents = read_documents(path)
         except BrokenYaml as error:
             self.broken = True
-            self._note(error.line, (), str(error))
+            self._note(error.line, (), error.why)
             return
         for _, root in documents:
             if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
                 # a line for everything in it would not help
-                self._note(root.line, (), f'a profile, allowed is NODE_NAME: {{{PARAMETERS_KEY}: '
-                                          '…}; drive_can profile check looks at profiles')
+                self._note(root.line, (), says('is_profile', key=PARAMETERS_KEY))
             elif root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
-                self._note(root.line, (), 'no mapping, allowed is '
-                                          f'NODE_NAME: {{{PARAMETERS_KEY}: …}}')
+                self._note(root.line, (), says('no_mapping', key=PARAMETERS_KEY))
 
     def sections_with(self, key: str) -> list[Section]:
         """Return the sections that have a key, or one that begins with it and a dot."""
         return [section for section in self.sections if any(
             str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
 
-    def _note(self, line: int, path: Path, message: str) -> None:
+    def _note(self, line: int, path: Path, message: Sentence) -> None:
         self.problems.append(Problem(self._file, line, '/'.join(map(str, path)) or 'yaml',
                                      message))
 
@@ -88,15 +88,13 @@ class _FileReader:
         has_parameters = False
         for key, value in node.pairs:
             if key.kind is not Kind.SCALAR or not key.text:
-                self._note(key.line, path, 'a key that is no name, allowed are node names')
+                self._note(key.line, path, says('key_no_node_name'))
                 continue
             here = (*path, key.text)
             if has_parameters:
-                self._note(key.line, here, f'stands beside {PARAMETERS_KEY} (rcl refuses or '
-                                           'garbles the file), allowed is a section of its own')
+                self._note(key.line, here, says('beside_parameters', key=PARAMETERS_KEY))
             if here in self._lines:
-                self._note(key.line, here, f'{DUPLICATE}, allowed is one (the first is in line '
-                                           f'{self._lines[here]})')
+                self._note(key.line, here, says('duplicate_key', first=self._lines[here]))
                 continue
             self._lines[here] = key.line
             if key.text == PARAMETERS_KEY:
@@ -105,26 +103,24 @@ class _FileReader:
             elif key.text.startswith(PARAMETERS_KEY) or path and nearest(
                     key.text, [PARAMETERS_KEY], cutoff=_SLIP) is not None:
                 # rcl compares the beginning only, and would take a longer one for the real one
-                self._note(key.line, here, f'misspelt, allowed is {PARAMETERS_KEY}')
+                self._note(key.line, here, says('misspelt', allowed=PARAMETERS_KEY))
             elif value.kind is Kind.MAPPING:
                 self._names(value, here)
             else:
                 hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
-                    f'allowed is {PARAMETERS_KEY} below it'
-                self._note(key.line, here, f'no mapping (rcl refuses the file), {hint}')
+                    says('allowed_below', key=PARAMETERS_KEY)
+                self._note(key.line, here, says('no_mapping_refused', hint=hint))
 
     def _parameters(self, node: Node, path: Path, line: int) -> None:
         name = ''
         for part in map(str, path):
             name += part if not name or name.endswith('/') else f'/{part}'
         if not path:
-            self._note(line, (PARAMETERS_KEY,), 'no node name above it, allowed is '
-                                                f'NODE_NAME: {{{PARAMETERS_KEY}: …}}')
+            self._note(line, (PARAMETERS_KEY,), says('no_node_name_above', key=PARAMETERS_KEY))
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
-            self._note(line, path, f'{show(name)} is no node name (rcl refuses the file), allowed '
-                                   'is for example /**/drive_can_bridge')
+            self._note(line, path, says('no_node_name', name=name))
         if node.kind is not Kind.MAPPING:
-            self._note(line, (*path, PARAMETERS_KEY), 'no mapping, allowed are parameters')
+            self._note(line, (*path, PARAMETERS_KEY), says('no_parameters'))
             return
         reader = TreeReader(self._file, Rules.PARAMETERS)
         reader.read(node)
@@ -175,7 +171,7 @@ def unseen_problems(paths: Iterable[FilePath], node: str,
                 found += section.tree.problems
                 garbled += section.refused
         found += [problem for problem in reader.problems if _is_for(problem.key, node)]
-    return [problem for problem in found if problem.message.startswith(DUPLICATE)], garbled
+    return [problem for problem in found if problem.message.code == 'duplicate_key'], garbled
 
 
 def _is_for(section: str, node: str) -> bool:
@@ -206,21 +202,18 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
         tree.problems[:0] = problems
         if ours[0].name.rpartition('/')[2] not in (_NODE, '*', '**'):
             tree.warnings.append(Problem(
-                str(path), tree.line(()), ours[0].name, f'fits no bridge that has its usual name, '
-                f'allowed is /**/{_NODE}, or a bridge that is started with this name'))
+                str(path), tree.line(()), ours[0].name, says('other_node_name', usual=_NODE)))
         return tree, tree.problems
     for section in ours:
         problems.extend(section.tree.problems)
     for section in ours[1:]:
         problems.append(Problem(
-            str(path), section.tree.line((MARK,)), MARK, f'in a second section, {section.name}; '
-            f'allowed is one section that holds it (the first is {ours[0].name})'))
+            str(path), section.tree.line((MARK,)), MARK, says(
+                'second_section', section=section.name, first=ours[0].name)))
     if not problems:
         names = ', '.join(section.name for section in reader.sections)
-        found = f'; the file has: {names}' if names else ''
-        problems.append(Problem(
-            str(path), 1, MARK, 'no section of the file holds it, allowed is one '
-            f'/**/drive_can_bridge: {{{PARAMETERS_KEY}: {{{MARK}: …}}}}{found}'))
+        problems.append(Problem(str(path), 1, MARK, says('no_section_of', names=names) if names else
+                                says('no_section')))
     return None, problems
 
 
@@ -238,8 +231,8 @@ def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
         if _is_for(name, node):
             together.setdefault(name, []).append(tree)
         elif _is_for(own.name, other) and other.rpartition('/')[2] == node.rpartition('/')[2]:
-            elsewhere.append(Problem(tree.file, tree.line(()), name, 'counts for the bridge in '
-                                     f'another namespace, and is not checked: checked is {node}'))
+            elsewhere.append(Problem(tree.file, tree.line(()), name, says(
+                'other_namespace', node=node)))
     merged, *later = (tree for found in together.values() for tree in found)
     for tree in later:
         _lay_over(merged, tree)
@@ -267,8 +260,7 @@ def _lay_over(below: Tree, above: Tree) -> None:
                 lay(here, there, value)
             elif key in under and isinstance(there, dict) != isinstance(value, dict):
                 # rcl keeps both
-                below.wrong(here, 'has a value in one section, and keys below it in another; '
-                                  'allowed is one of them')
+                below.wrong(here, says('value_and_keys'))
             else:
                 under[key] = value
 

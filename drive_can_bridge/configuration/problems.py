@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Union
 
+from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.text import printable
 
 Path = tuple[Union[str, int], ...]
@@ -34,13 +36,22 @@ class Problem(NamedTuple):
     file: str
     line: int
     key: str
-    message: str
+    message: Sentence
 
     def __str__(self) -> str:
         """Write the line that users see; it stays one, whatever a key or value contains."""
         place = f'{printable(self.file, None)}:{self.line}: ' if self.file else ''
         key = f'{printable(self.key)}: ' if self.key else ''
         return f'{place}{key}{printable(self.message, MESSAGE_MAX)}'
+
+    @property
+    def text(self) -> Sentence:
+        """The line that users see, with the code and the fields of what is wrong, and where."""
+        text = Sentence(self)
+        text.code = self.message.code
+        text.fields = {**self.message.fields, 'file': self.file, 'line': self.line,
+                       'key': self.key}
+        return text
 
 
 @dataclass(frozen=True)
@@ -71,7 +82,7 @@ class Tree:
             path = path[:-1]
         return self.lines.get(path, 1)
 
-    def wrong(self, path: Path, message: str, *, at: Path | None = None) -> None:
+    def wrong(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
         """
         Note a problem with the value at ``path``.
 
@@ -80,11 +91,11 @@ class Tree:
         self._wrong.add(path)
         self.problems.append(self.problem(path, message, at=at))
 
-    def suspicious(self, path: Path, message: str, *, at: Path | None = None) -> None:
+    def suspicious(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
         """Note that the value at ``path`` is allowed, but probably not what is meant."""
         self.warnings.append(self.problem(path, message, at=at))
 
-    def problem(self, path: Path, message: str, *, at: Path | None = None) -> Problem:
+    def problem(self, path: Path, message: Sentence, *, at: Path | None = None) -> Problem:
         """Describe a problem with the value at ``path`` without noting it."""
         key = '.'.join(part for part in path if isinstance(part, str))
         return Problem(self.file, self.line(path if at is None else at), key, message)
@@ -109,7 +120,7 @@ class Tree:
                        for place in found)
 
 
-def report(problems: Iterable[Problem]) -> list[str]:
+def report(problems: Iterable[Problem]) -> list[Sentence]:
     """
     Write problems as lines: no line twice, those of one file together and in its order.
 
@@ -118,7 +129,7 @@ def report(problems: Iterable[Problem]) -> list[str]:
     unique = list(dict.fromkeys(problems))
     order = {file: rank for rank, file in enumerate(dict.fromkeys(p.file for p in unique))}
     unique.sort(key=lambda problem: (order[problem.file], problem.line))
-    lines = [str(problem) for problem in unique[:PROBLEMS_MAX]]
+    lines = [problem.text for problem in unique[:PROBLEMS_MAX]]
     if len(unique) > PROBLEMS_MAX:
-        lines.append(f'and {len(unique) - PROBLEMS_MAX} more')
+        lines.append(says('more', count=len(unique) - PROBLEMS_MAX))
     return lines

@@ -14,6 +14,7 @@ from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.schema import check_schema, profile_schema
+from drive_can_bridge.core.complaints import says, suggestion
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind,
@@ -21,7 +22,8 @@ from drive_can_bridge.core.parameters import (
 from drive_can_bridge.core.profile import (
     ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern,
 )
-from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.words import show
 
 #: names that a drive's node uses itself
 RESERVED = frozenset((
@@ -52,17 +54,16 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
                         names)
     if parameter is not None:
         if not parameter.writable:
-            tree.wrong(('control', 'parameter'), f'{show(parameter.name)} is read-only, allowed '
-                                                 'is one with access rw or wo')
+            tree.wrong(('control', 'parameter'), says('read_only_one', name=parameter.name))
         largest = _largest_word(parameter)
         for key, word in words.items():
             if word > largest:
-                tree.wrong(('control', 'words', key), f'{word} does not fit {parameter.name}, '
-                           f'allowed is 0 to {largest} ({parameter.type.value})')
+                tree.wrong(('control', 'words', key), says('word_too_large', word=word,
+                                                           name=parameter.name, largest=largest,
+                                                           type=parameter.type.value))
     for key, word in words.items():     # nothing but ~/enable starts a drive
         if key != 'enable' and word == words.get('enable'):
-            tree.wrong(('control', 'words', 'enable'), f'{show(word)} is the word for {key} too, '
-                                                       'allowed is another one')
+            tree.wrong(('control', 'words', 'enable'), says('word_twice', word=word, key=key))
     if isinstance(control.get('status'), dict):
         _check_status(tree, control['status'], parameters, names)
 
@@ -75,7 +76,7 @@ def look_up(tree: Tree, path: Path, name: str | None, parameters: dict[str, Para
     One with problems of its own is known.
     """
     if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        tree.wrong(path, f'{show(name)} is unknown, {suggestion(name, names)}', at=at)
+        tree.wrong(path, says('unknown', name=name, hint=suggestion(name, names)), at=at)
     return parameters.get(name or '')
 
 
@@ -84,20 +85,19 @@ def _check_status(tree: Tree, status: dict[str, Any], parameters: dict[str, Para
     path = ('control', 'status')
     parameter = look_up(tree, (*path, 'parameter'), status.get('parameter'), parameters, names)
     if parameter is not None and not parameter.readable:
-        tree.wrong((*path, 'parameter'), f'{show(parameter.name)} is write-only, allowed is one '
-                                         'with access ro or rw')
+        tree.wrong((*path, 'parameter'), says('write_only_one', name=parameter.name))
     for key in ('ready', 'enabled', 'fault'):
         if key not in status:
             continue
         mask, value = status[key]
         if parameter is not None and mask > _largest_word(parameter):
-            tree.wrong((*path, key), f'mask {mask} does not fit {parameter.name}, allowed is 1 to '
-                                     f'{_largest_word(parameter)} ({parameter.type.value})')
+            tree.wrong((*path, key), says('mask_too_large', mask=mask, name=parameter.name,
+                                          largest=_largest_word(parameter),
+                                          type=parameter.type.value))
         if mask == 0:
-            tree.wrong((*path, key), 'mask 0 looks at no bit, allowed is a mask with at least one')
+            tree.wrong((*path, key), says('mask_of_nothing'))
         elif value & ~mask:
-            tree.wrong((*path, key), f'value {value} has bits outside of mask {mask} and never '
-                                     'matches, allowed are bits of the mask')
+            tree.wrong((*path, key), says('outside_mask', value=value, mask=mask))
 
 
 def _largest_word(parameter: Parameter) -> int:
@@ -132,8 +132,7 @@ def check_values(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, 
         return
     if parameter.scaled or parameter.type is ParameterType.BOOL:
         kind = 'a bool' if parameter.type is ParameterType.BOOL else 'a number with a unit'
-        tree.wrong((*path, 'values'), f'{show(parameter.name)} is {kind}, allowed in integers '
-                                      'without scale, offset and unit')
+        tree.wrong((*path, 'values'), says('no_value_names', name=parameter.name, kind=kind))
         return
     check_names(tree, (*path, 'values'), entry['values'], parameter)
 
@@ -151,23 +150,20 @@ def check_names(tree: Tree, path: Path, given: dict[str, Any],
         here, number = (*path, key), int(key, 0)
         low, high = (-2**31, 2**32 - 1) if parameter is None else parameter.type.raw_range
         if not low <= number <= high:
-            tree.wrong(here, f'{key} does not fit, allowed is {low} to {high}')
+            tree.wrong(here, says('does_not_fit', key=key, low=low, high=high))
         elif number in numbers:
-            tree.wrong(here, f'{key} stands twice (as {numbers[number]}), allowed is once')
+            tree.wrong(here, says('number_twice', key=key, other=numbers[number]))
         numbers.setdefault(number, key)
         if isinstance(name, bool):
             word = 'true, on or yes' if name else 'false, off or no'
-            tree.wrong(here, f'{word} without quotes is a bool, allowed is text: write it in '
-                             'quotes')
+            tree.wrong(here, says('word_is_bool', word=word))
         elif not isinstance(name, str):
-            tree.wrong(here, f'{show(name)} is a number, allowed is text')
+            tree.wrong(here, says('is_number', name=name))
         elif (len(name) > NAME_MAX or not _NAME.fullmatch(name) or _NUMBER.match(name)
               or _NEXT.search(name)):
-            tree.wrong(here, f'{show(name)} is no name, allowed are at most {NAME_MAX} characters '
-                             'that begin with no digit, without quotes and double spaces')
+            tree.wrong(here, says('no_name', name=name, longest=NAME_MAX))
         elif name in names:
-            tree.wrong(here, f'{show(name)} is the name of {names[name]} too, allowed is another '
-                             'one')
+            tree.wrong(here, says('name_of_other', name=name, other=names[name]))
         else:
             names[name] = key
 
@@ -188,10 +184,9 @@ def check_fault(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, 
     path = ('fault', 'parameter')
     parameter = look_up(tree, path, section.get('parameter'), parameters, names)
     if parameter is not None and not parameter.readable:
-        tree.wrong(path, f'{show(parameter.name)} is write-only, allowed is one with access ro or '
-                         'rw')
+        tree.wrong(path, says('write_only_one', name=parameter.name))
     elif parameter is not None and parameter.type is ParameterType.BOOL:
-        tree.wrong(path, f'{show(parameter.name)} is a bool, allowed is a number')
+        tree.wrong(path, says('is_bool', name=parameter.name))
     if isinstance(section.get('codes'), dict):
         check_names(tree, ('fault', 'codes'), section['codes'], parameter)
     if isinstance(section.get('bit'), str):
@@ -206,8 +201,8 @@ def _check_bit(tree: Tree, text: str, parameters: dict[str, Parameter],
         return
     bits = dict(parameter.bits)
     if bit not in bits:
-        tree.wrong(path, f'{show(bit)} is no bit of {name}, {suggestion(bit, bits)}' if bits else
-                   f'{show(name)} has no named bits, allowed is PARAMETER.BIT')
+        tree.wrong(path, says('no_bit', bit=bit, name=name, hint=suggestion(bit, bits)) if bits else
+                   says('no_named_bits', name=name))
 
 
 def fault_table(section: dict[str, Any], parameters: dict[str, Parameter]) -> FaultTable:
@@ -233,12 +228,11 @@ def check_identity(tree: Tree, parameters: dict[str, Parameter], names: tuple[st
     for position, name in enumerate(tree.data.get('identity', ())):
         at = ('identity', position)
         if name in seen:
-            tree.wrong(('identity',), f'{show(name)} stands twice, allowed is once', at=at)
+            tree.wrong(('identity',), says('twice', name=name), at=at)
             continue
         parameter = look_up(tree, ('identity',), name, parameters, names, at=at)
         if parameter is not None and not parameter.readable:
-            tree.wrong(('identity',), f'{show(name)} is write-only, allowed are parameters with '
-                                      'access ro or rw', at=at)
+            tree.wrong(('identity',), says('write_only', name=name), at=at)
         seen.add(name)
 
 
@@ -250,8 +244,7 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
         if parameter is None:
             continue
         if not parameter.writable:
-            tree.wrong(path, f'{show(name)} is read-only, allowed are parameters with access rw '
-                             'or wo')
+            tree.wrong(path, says('read_only', name=name))
         elif isinstance(value, dict):
             _check_bits(tree, path, parameter, value)
         else:
@@ -260,7 +253,7 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
             except ValueRefused:
                 allowed = 'true or false' if parameter.type is ParameterType.BOOL \
                     else parameter.range_text
-                tree.wrong(path, f'{show(value)} cannot be written, allowed is {allowed}')
+                tree.wrong(path, says('cannot_be_written', value=value, allowed=allowed))
 
 
 def restore_table(tree: Tree, parameters: dict[str, Parameter]) -> RestoreTable:
@@ -291,11 +284,10 @@ def _check_bits(tree: Tree, path: Path, parameter: Parameter, value: dict[str, b
     known = [bit for bit, _ in parameter.bits]
     for bit in value:
         if bit not in known:
-            tree.wrong((*path, bit), f'{show(bit)} is no bit of {parameter.name}, '
-                                     f'{suggestion(bit, known)}')
+            tree.wrong((*path, bit), says('no_bit', bit=bit, name=parameter.name,
+                                          hint=suggestion(bit, known)))
     if not parameter.readable:
-        tree.wrong(path, f'{show(parameter.name)} is write-only: its other bits cannot be kept, '
-                         'allowed is a value')
+        tree.wrong(path, says('write_only_bits', name=parameter.name))
 
 
 def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
@@ -365,8 +357,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
             built_in = {'cannord', 'cia402'} & {*tree.data.get('protocols', ())}
             if control is None and fault.bit is None and not built_in and not (
                     tree.is_damaged(('control',))):
-                tree.suspicious(('fault',), 'bit is missing: without a control section nothing '
-                                'says when there is a fault, allowed is bit: PARAMETER.BIT')
+                tree.suspicious(('fault',), says('fault_without_bit'))
             _name_faults(parameters, fault)
     check_identity(tree, parameters, names)
     check_restore(tree, parameters, names)
@@ -411,11 +402,9 @@ def _check_names(tree: Tree, path: Path, parameter: Parameter) -> None:
     places += [((*path, 'bits', bit), bit) for bit, _ in parameter.bits]
     for place, name in places:
         if name in RESERVED:
-            tree.wrong(place, f'{show(name)} is taken by the node of the drive, allowed is any '
-                              'other name')
+            tree.wrong(place, says('name_taken', name=name))
         elif RAW_NAME.fullmatch(name):
-            tree.wrong(place, f'{show(name)} reads as a raw parameter, allowed are names other '
-                              'than p<digits> and x<hexadecimal digits>')
+            tree.wrong(place, says('raw_name', name=name))
 
 
 # -- parameters -----------------------------------------------------------------------------------
@@ -428,19 +417,17 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
         for key in ('scale', 'offset', 'unit', 'minimum', 'maximum', 'neutral_from',
                     'arming_tolerance'):
             if key in entry:
-                tree.wrong((*path, key), f'a bool has no {key}, allowed is to leave it out')
+                tree.wrong((*path, key), says('bool_has_no', key=key))
         if 'neutral' in entry and not isinstance(entry['neutral'], bool):
-            tree.wrong((*path, 'neutral'), f'{show(entry["neutral"])} is no bool, allowed is true '
-                                           'or false')
+            tree.wrong((*path, 'neutral'), says('no_bool', value=entry['neutral']))
     else:
         _check_limits(tree, path, parameter, entry)
     for bit, position in parameter.bits:
         if position >= width:
-            tree.wrong((*path, 'bits', bit), f'bit {position} does not exist in '
-                       f'{parameter.type.value}, allowed is 0 to {width - 1}')
+            tree.wrong((*path, 'bits', bit), says('no_such_bit', position=position,
+                                                  type=parameter.type.value, highest=width - 1))
     if parameter.word_order is not None and parameter.type.bits != 32:
-        tree.wrong((*path, 'word_order'), f'{parameter.type.value} has one word, allowed in int32 '
-                                          'and uint32')
+        tree.wrong((*path, 'word_order'), says('one_word', type=parameter.type.value))
 
 
 def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
@@ -449,14 +436,11 @@ def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
     if not parameter.neutral_from or not tree.is_sound((*path, 'neutral_from')):
         return
     if 'neutral' in entry:
-        tree.wrong((*path, 'neutral'), 'stands beside neutral_from, allowed is one of them')
+        tree.wrong((*path, 'neutral'), says('beside_neutral_from'))
     if 'arming_tolerance' not in entry and not tree.is_damaged((*path, 'arming_tolerance')):
-        tree.wrong((*path, 'neutral_from'), 'needs arming_tolerance: how far a command may be '
-                                            'from where the axis is and still arm, allowed is '
-                                            'to give it too')
+        tree.wrong((*path, 'neutral_from'), says('no_arming_tolerance'))
     if not parameter.writable:
-        tree.wrong((*path, 'neutral_from'), f'{show(parameter.name)} is read-only, allowed in '
-                                            'parameters with access rw or wo')
+        tree.wrong((*path, 'neutral_from'), says('read_only_in', name=parameter.name))
 
 
 def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, Any]) -> None:
@@ -464,13 +448,11 @@ def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, 
     if not parameter.limit:
         return
     if 'neutral_from' in entry:
-        tree.wrong((*path, 'limit'), 'stands beside neutral_from, allowed is one of them')
+        tree.wrong((*path, 'limit'), says('beside_neutral_from'))
     elif 'neutral' not in entry and not tree.is_damaged((*path, 'neutral')):
-        tree.wrong((*path, 'limit'), 'needs neutral: what is sent until the first command, '
-                                     'allowed is to give it too')
+        tree.wrong((*path, 'limit'), says('no_neutral_of_limit'))
     if not parameter.writable:
-        tree.wrong((*path, 'limit'), f'{show(parameter.name)} is read-only, allowed in parameters '
-                                     'with access rw or wo')
+        tree.wrong((*path, 'limit'), says('read_only_in', name=parameter.name))
 
 
 def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
@@ -480,16 +462,16 @@ def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[s
         measured = parameters.get(name)
         if not name or (measured is None and name in names):     # wrong itself
             continue
-        message = ''
+        message = NOTHING
         if measured is None:
-            message = f'{show(name)} is not in the profile, {suggestion(name, names)}'
+            message = says('not_in_profile', name=name, hint=suggestion(name, names))
         elif measured is parameter or not measured.readable:
-            message = f'{show(name)} is no actual value, allowed is one that can be read'
+            message = says('no_actual_value', name=name)
         elif measured.type is ParameterType.BOOL:
-            message = f'{show(name)} is a bool, allowed is a number'
+            message = says('is_bool', name=name)
         elif measured.unit != parameter.unit:
-            message = (f'{show(name)} has {_unit_text(measured)}, allowed is an actual value with '
-                       f'{_unit_text(parameter)}, that of {show(parameter.name)}')
+            message = says('other_unit', name=name, unit=_unit_text(measured),
+                           wanted=_unit_text(parameter), parameter=parameter.name)
         if message:
             tree.wrong(path, message)
             del parameters[parameter.name]
@@ -505,26 +487,25 @@ def _check_limits(tree: Tree, path: Path, parameter: Parameter, entry: dict[str,
     if not parameter.scaled:
         for key, limit in limits.items():
             if float(limit) != int(limit):
-                tree.wrong((*path, key), f'{show(limit)} is no integer, allowed without scale, '
-                                         'offset and unit are integers')
+                tree.wrong((*path, key), says('no_integer', limit=limit))
     low, high = parameter.raw_limits
     if len(limits) == 2 and limits['minimum'] > limits['maximum']:
-        tree.wrong((*path, 'minimum'), f'{show(limits["minimum"])} is above the maximum, allowed '
-                                       f'is at most {show(limits["maximum"])}')
+        tree.wrong((*path, 'minimum'), says('above_maximum', minimum=limits['minimum'],
+                                            maximum=limits['maximum']))
     elif low > high and all(tree.is_sound((*path, key)) for key in limits):
         scale = f' with scale {parameter.scale:g}' if 'scale' in entry and low == high + 1 else ''
-        tree.wrong((*path, next(iter(limits))), f'{parameter.type.value}{scale} has no value in '
-                   f'{parameter.range_text}, allowed are limits around one (the nearest is '
-                   f'{_with_unit(parameter, _nearest(parameter))})')
+        tree.wrong((*path, next(iter(limits))), says(
+            'no_value_between', type=parameter.type.value, scale=scale, limits=parameter.range_text,
+            nearest=_with_unit(parameter, _nearest(parameter))))
     if isinstance(entry.get('neutral'), bool):
-        tree.wrong((*path, 'neutral'), f'{show(entry["neutral"])} is a bool, allowed is a number')
+        tree.wrong((*path, 'neutral'), says('is_bool', name=entry['neutral']))
     elif parameter.neutral is not None and all(tree.is_sound((*path, key)) for key in limits):
         try:
             parameter.raw_from_value(parameter.neutral)
         except ValueRefused:
             kind = '' if parameter.scaled else 'an integer, '
-            tree.wrong((*path, 'neutral'), f'{show(parameter.neutral)} cannot be sent, allowed is '
-                                           f'{kind}{parameter.range_text}')
+            tree.wrong((*path, 'neutral'), says('cannot_be_sent', name=parameter.neutral,
+                                                kind=kind, allowed=parameter.range_text))
 
 
 def _nearest(parameter: Parameter) -> Value:
@@ -547,8 +528,8 @@ def _narrowed(tree: Tree, path: Path, parameter: Parameter) -> Parameter:
         ends['maximum'] = high
     for key, end in ends.items():
         limit = tree.data['parameters'][parameter.name][key]
-        tree.suspicious((*path, key), f'{show(limit)} is not representable in '
-                        f'{parameter.type.value}, narrowed to {_with_unit(parameter, end)}')
+        tree.suspicious((*path, key), says('narrowed', limit=limit, type=parameter.type.value,
+                                           end=_with_unit(parameter, end)))
     return replace(parameter, **ends) if ends else parameter  # type: ignore[arg-type]
 
 

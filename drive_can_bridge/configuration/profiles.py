@@ -12,7 +12,8 @@ from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_
 from drive_can_bridge.configuration.yaml_nodes import (
     BrokenYaml, Kind, read_documents, Rules, TreeReader,
 )
-from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.resources import profiles_directory
 
 SUFFIX = '.yaml'
@@ -40,7 +41,7 @@ class ProfileStore:
         """The profiles read so far, with what was found in them."""
         return [loaded.tree for loaded in self._loaded.values()]
 
-    def load(self, name: str) -> LoadedProfile | str:
+    def load(self, name: str) -> LoadedProfile | Sentence:
         """
         Return a profile, or why there is none.
 
@@ -53,27 +54,26 @@ class ProfileStore:
             try:
                 self._loaded[path] = _with_digest(read_profile(path), path)
             except OSError as error:
-                return f'{path} cannot be read ({error.strerror}), allowed is a readable file'
+                return says('cannot_be_read', path=path, why=error.strerror)
         return self._loaded[path]
 
-    def _find(self, name: str) -> FilePath | str:
+    def _find(self, name: str) -> FilePath | Sentence:
         if '/' in name:
             path = FilePath(name)
             if not path.is_absolute():
-                return f'{show(name)} is neither a name nor an absolute path, allowed is one of ' \
-                       'them'
-            return path if _is_file(path) else f'no file {name}, allowed is an existing one'
+                return says('no_absolute_path', name=name)
+            return path if _is_file(path) else says('no_file', name=name)
         for directory in self._directories:
             path = directory / f'{name}{SUFFIX}'
             if _is_file(path):
                 return path
         if name.endswith(SUFFIX):
-            return f'{show(name)} is unknown, allowed is a name without {SUFFIX}'
+            return says('name_with_suffix', name=name, suffix=SUFFIX)
         known = sorted({path.stem for directory in self._directories
                         for path in directory.glob(f'*{SUFFIX}')})
         places = ', '.join(map(str, self._directories)) or 'no directory'
-        hint = suggestion(name, known) if known else 'there is no profile at all'
-        return f'{show(name)} is unknown, {hint} (searched: {places})'
+        hint = suggestion(name, known) if known else says('no_profile_at_all')
+        return says('unknown_profile', name=name, hint=hint, places=places)
 
 
 def _with_digest(loaded: LoadedProfile, path: FilePath) -> LoadedProfile:
@@ -98,25 +98,22 @@ def read_profile(path: FilePath) -> LoadedProfile:
     try:
         documents = read_documents(path)
     except BrokenYaml as error:
-        return _unusable(file, error.line, str(error))
+        return _unusable(file, error.line, error.why)
     if not documents or documents[0].root.kind is not Kind.MAPPING:
-        return _unusable(file, 1, 'no mapping, allowed are protocols, parameters, control, '
-                                  'description')
+        return _unusable(file, 1, says('no_profile'))
     root = documents[0].root
     if any(below.text == PARAMETERS_KEY for _, value in root.pairs for below, _ in value.pairs):
-        return _unusable(file, root.line, 'parameters of nodes, allowed is a profile; drive_can '
-                                          'validate looks at the file of a bridge')
+        return _unusable(file, root.line, says('is_parameter_file'))
     reader = TreeReader(file, Rules.PROFILE)
     reader.read(root)
     tree = reader.tree
     tree.problems[:0] = reader.refused
     if len(documents) > 1:
-        tree.problems.append(Problem(file, documents[1].line, 'yaml', 'a second document, allowed '
-                                                                      'is one'))
+        tree.problems.append(Problem(file, documents[1].line, 'yaml', says('second_document')))
     return profile_from_tree(tree)
 
 
-def _unusable(file: str, line: int, message: str) -> LoadedProfile:
+def _unusable(file: str, line: int, message: Sentence) -> LoadedProfile:
     tree = Tree({}, file, damaged={()})
     loaded = profile_from_tree(tree)
     # what follows from a file that could not be read is not worth mentioning

@@ -25,13 +25,15 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from drive_can_bridge.configuration.problems import Path, Tree
-from drive_can_bridge.core.words import describe_type, hint, show, suggestion, value_text
+from drive_can_bridge.core.complaints import hint, says, suggestion
+from drive_can_bridge.core.sentences import NOTHING, Sentence, uncoded
+from drive_can_bridge.core.words import describe_type, value_text
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 
 Schema = dict[str, Any]
-#: gives another sentence for an error, or None to keep the usual one; '' hides it
-Override = Callable[[Path, Any, str], 'str | None']
+#: gives another sentence for an error, or None to keep the usual one; NOTHING hides it
+Override = Callable[[Path, Any, str], Sentence | None]
 
 _TYPE_WORDS = {
     'boolean': 'true or false', 'integer': 'an integer', 'number': 'a number',
@@ -64,7 +66,7 @@ def check_schema(tree: Tree, schema: Schema, start: str = '', *,
     :param override: see :data:`Override`; called with path, value and the violated keyword.
     """
     root: Schema = {'$ref': f'#/$defs/{start}', '$defs': schema['$defs']} if start else schema
-    found: list[tuple[Path, str, Path]] = []
+    found: list[tuple[Path, Sentence, Path]] = []
     for error in _Validator(root).iter_errors(tree.data):
         for path, message, at in _sentences(error, tree):
             changed = override(path, error.instance, str(error.validator)) if override else None
@@ -75,14 +77,14 @@ def check_schema(tree: Tree, schema: Schema, start: str = '', *,
             tree.wrong(path, message, at=at)
 
 
-def check_value(value: Any, schema: Schema) -> str | None:
+def check_value(value: Any, schema: Schema) -> Sentence | None:
     """Say what is wrong with a single value; None: nothing."""
     for error in _Validator(schema).iter_errors(value):
         return _message(error)
     return None
 
 
-def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, Path]]:
+def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sentence, Path]]:
     """Yield path of the culprit, sentence, and path of the line for every part of an error."""
     path: Path = tuple(error.absolute_path)
     if error.validator == 'required':
@@ -93,13 +95,13 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, 
             # Called once per missing key, with all keys each time: name only this one.
             if f"'{key}'" in error.message:
                 option = error.schema.get('properties', {}).get(key)
-                yield here, f'missing, allowed is {allowed(option)}', here
+                yield here, says('missing', allowed=allowed(option)), here
     elif error.validator == 'additionalProperties':
         known = error.schema.get('properties', {})
         patterns = error.schema.get('patternProperties', ())
         for key in error.instance:
             if key not in known and not any(re.search(pattern, key) for pattern in patterns):
-                yield (*path, key), f'unknown key, {suggestion(str(key), known)}', (*path, key)
+                yield (*path, key), says('unknown_key', hint=suggestion(str(key), known)), (*path, key)
     elif 'propertyNames' in error.relative_schema_path:
         here = (*path, error.instance)
         yield here, _message(error), here
@@ -109,35 +111,36 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, str, 
         yield path, _message(error), path
 
 
-def _message(error: ValidationError) -> str:
+def _message(error: ValidationError) -> Sentence:
     value, schema = error.instance, error.schema
     if error.validator == 'not' and 'errorMessage' in schema:
-        return str(schema['errorMessage'])
+        message = schema['errorMessage']
+        return message if isinstance(message, Sentence) else uncoded(message)
     if error.validator == 'type':
         if isinstance(value, float) and not math.isfinite(value):
-            return f'{show(value)} is not a finite number, allowed is {allowed(schema)}'
-        shown = describe_type(value)
+            return says('not_finite', value=value, allowed=allowed(schema))
+        kind = describe_type(value)
         if isinstance(value, (bool, int, float, str)):
-            shown = f'{show(value)} is {shown}'
-        return f'{shown}, allowed is {allowed(schema)}'
+            return says('wrong_type', value=value, kind=kind, allowed=allowed(schema))
+        return says('wrong_kind', kind=kind, allowed=allowed(schema))
     if error.validator == 'enum':
-        remark = hint(value, schema['enum']) if isinstance(value, str) else ''
-        return f'{show(value)} is unknown{remark}, allowed is {allowed(schema)}'
+        near = hint(value, schema['enum']) if isinstance(value, str) else NOTHING
+        return says('unknown_word', value=value, near=near, allowed=allowed(schema))
     if error.validator in ('minimum', 'maximum'):
-        return f'{show(value)} is out of range, allowed is {allowed(schema)}'
+        return says('out_of_range', value=value, allowed=allowed(schema))
     if error.validator == 'not':
-        return f'{show(value)} is useless, allowed is any other number'
+        return says('useless', value=value)
     if error.validator == 'minLength':
-        return 'an empty string, allowed is text'
+        return says('empty_string')
     if error.validator in ('minItems', 'maxItems'):
         least, most = schema.get('minItems', 0), schema.get('maxItems')
         count = str(least) if least == most else f'at least {least}'
-        return f'a list of {len(value)} values, allowed are {count}'
+        return says('number_of_values', count=len(value), allowed=count)
     if error.validator == 'minProperties':
-        return 'an empty mapping, allowed is at least one entry'
+        return says('empty_mapping')
     if error.validator == 'maxProperties':
-        return f'a mapping of {len(value)} entries, allowed are at most {schema["maxProperties"]}'
-    return f'{show(value)} is wrong, allowed is {allowed(schema)}'
+        return says('too_many_entries', count=len(value), allowed=schema['maxProperties'])
+    return says('wrong', value=value, allowed=allowed(schema))
 
 
 def allowed(schema: Any) -> str:
@@ -237,7 +240,7 @@ def compose(base: Schema, families: list[Family]) -> Schema:
 def _forbidden(key: str, family: Family, families: list[Family]) -> Schema:
     """Accept nothing. Not by ``false``: jsonschema forgets the path of what that refuses."""
     owners = ', '.join(other.name for other in families if key in other.options_schema)
-    message = f'a key of {owners}, allowed with {family.name} is to leave it out'
+    message = says('key_of_others', owners=owners, family=family.name)
     return {'not': {}, 'errorMessage': message}
 
 

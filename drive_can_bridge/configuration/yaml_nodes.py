@@ -24,7 +24,9 @@ from typing import Any, NamedTuple, Union
 import yaml
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.core.words import describe_type, show
+from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.words import describe_type
 
 Scalar = Union[bool, int, float, str]
 
@@ -149,7 +151,7 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 #: of what is read at all, in MiB and in levels
 SIZE_MAX = 4
 DEPTH_MAX = 32
-_TOO_DEEP = f'nested too deep, allowed are {DEPTH_MAX} levels'
+_TOO_DEEP = says('too_deep', levels=DEPTH_MAX)
 #: what is noticed to be wrong much later: where it begins is the line to look at
 _OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scanning a simple key')
 
@@ -157,9 +159,9 @@ _OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scan
 class BrokenYaml(Exception):
     """The text is not YAML from here on."""
 
-    def __init__(self, line: int, message: str) -> None:
-        super().__init__(message)
-        self.line = line
+    def __init__(self, line: int, why: Sentence) -> None:
+        super().__init__(why)
+        self.line, self.why = line, why
 
 
 class Kind(Enum):
@@ -253,17 +255,14 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     line = mark.line + 1 if mark is not None else line
     indentation = re.match(rb'\s*', b''.join(data.splitlines()[line - 1:line]))
     if indentation is not None and b'\t' in indentation[0]:
-        return BrokenYaml(line, 'a tab in the indentation, allowed are spaces')
+        return BrokenYaml(line, says('tab'))
     what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
     if 'nesting' in what:   # libyaml has a limit of its own since PyYAML 6.0.4
         return BrokenYaml(line, _TOO_DEEP)
-    if context.startswith('while parsing a block mapping'):
-        what += ' (no key above it is indented like it: is one missing?)'
-    return BrokenYaml(line, f'not valid YAML: {what}')
+    return BrokenYaml(line, says('indented_like_no_key' if context.startswith(
+        'while parsing a block mapping') else 'not_yaml', what=what))
 
 
-#: how the problem of a key that stands twice begins
-DUPLICATE = 'duplicate key'
 #: stands for a value that could not be read
 _UNREADABLE = object()
 
@@ -297,7 +296,7 @@ class TreeReader:
         self.tree.lines[()] = node.line
         self._mapping(node, (), self.tree.data)
 
-    def _note(self, path: Path, message: str, *, at: Path | None = None) -> None:
+    def _note(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
         """Note a problem; the value at ``path`` is not to be used."""
         self.refused.append(self.tree.problem(path, message, at=at))
         self.tree.damaged.add(path)
@@ -313,14 +312,14 @@ class TreeReader:
             here = (*path, key.text)
             if here in lines:
                 self.tree.problems.append(self.tree.problem(
-                    here, f'{DUPLICATE}, allowed is one (the first is in line {lines[here]})',
+                    here, says('duplicate_key', first=lines[here]),
                 )._replace(line=key.line))
                 continue
             lines[here] = key.line
             # ROS itself reads topic names in QoS overrides, which may have dots.
             if self._parameters and '.' in key.text \
                     and str(here[0]).split('.')[0] != 'qos_overrides':
-                self.tree.wrong(here, 'a key with dots, allowed are nested keys')
+                self.tree.wrong(here, says('dots'))
                 self.tree.incomplete.add(path)
                 continue
             read = self._value(value, here)
@@ -333,10 +332,9 @@ class TreeReader:
         if node.kind is Kind.LIST:
             return self._list(node, path)
         if node.kind is Kind.ALIAS:
-            self._note(path, f'an alias{self._why}, allowed is the value itself')
+            self._note(path, says('alias', why=self._why))
         elif self._parameters and not node.items:
-            self._note(path, 'an empty mapping (rcl garbles what follows), allowed is to leave '
-                             'the key out')
+            self._note(path, says('garbling_mapping'))
         else:
             value: dict[str, Any] = {}
             self._mapping(node, path, value)
@@ -345,9 +343,9 @@ class TreeReader:
 
     def _scalar(self, node: Node, path: Path) -> Any:
         if not node.text and not node.quoted:
-            self._note(path, f'no value{self._why}, allowed is a value, or [] for an empty list')
+            self._note(path, says('no_value', why=self._why))
         elif '\0' in node.text:
-            self._note(path, 'a NUL character, allowed is text without')
+            self._note(path, says('nul'))
         else:
             return node.scalar
         return _UNREADABLE
@@ -360,25 +358,24 @@ class TreeReader:
             plain = item.kind is Kind.SCALAR
             value = self._scalar(item, here) if plain else _UNREADABLE
             if item.kind is Kind.ALIAS:
-                self._note(path, f'an alias{self._why}, allowed is the value itself', at=here)
+                self._note(path, says('alias', why=self._why), at=here)
             elif not plain:
-                self._note(path, 'a list or mapping in a list, allowed are plain values', at=here)
+                self._note(path, says('nested_list'), at=here)
             elif value is _UNREADABLE:
                 self.tree.damaged.add(path)
             elif self._parameters and items and type(value) is not type(items[0]):
-                self._note(path, f'{show(value)} is {describe_type(value)} in a list that began '
-                                 f'with {describe_type(items[0])} (rcl refuses the file), allowed '
-                                 'are values of one type', at=here)
+                self._note(path, says('mixed_list', value=value, kind=describe_type(value),
+                                      first=describe_type(items[0])), at=here)
             else:
                 items.append(value)
         return _UNREADABLE if path in self.tree.damaged else items
 
 
-def _key_problem(key: Node) -> str:
-    """Say why a key cannot be one; '' if it can."""
+def _key_problem(key: Node) -> Sentence:
+    """Say why a key cannot be one; NOTHING if it can."""
     if key.kind is not Kind.SCALAR:
         kind = 'an alias' if key.kind is Kind.ALIAS else 'a list or mapping'
-        return f'{kind} as a key, allowed is a name'
+        return says('no_key', kind=kind)
     if not key.text:
-        return 'an empty key, allowed is a name'
-    return 'a key with a NUL character, allowed is a name' if '\0' in key.text else ''
+        return says('empty_key')
+    return says('key_with_nul') if '\0' in key.text else NOTHING

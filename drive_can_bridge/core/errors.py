@@ -18,6 +18,8 @@ The errors of the package.
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
 
+from collections.abc import Sequence
+
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 
@@ -39,9 +41,9 @@ class ConfigurationError(DriveCanError):
     :param problems: one readable line per problem.
     """
 
-    def __init__(self, problems: list[str]) -> None:
+    def __init__(self, problems: Sequence[str]) -> None:
         super().__init__('\n'.join(problems))
-        self.problems = problems
+        self.problems = list(problems)
 
 
 class LocalProtocolError(DriveCanError, ValueError):

@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 _TEXT_MAX = 40
-_WORDS_MAX = 30
 
 
 def value_text(value: float) -> str:
@@ -59,24 +58,6 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     """Return the known word that looks most like ``word``, or None."""
     matches = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
     return matches[0] if matches else None
-
-
-def hint(word: str, known: Iterable[str]) -> str:
-    """Write the nearest known word as a remark in brackets, or nothing."""
-    match = nearest(word, known)
-    return f" (did you mean '{match}'?)" if match else ''
-
-
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """Write the end of a sentence on an unknown word: the nearest known one, or all."""
-    words = list(known)
-    match = nearest(word, words)
-    if match is not None:
-        return f"did you mean '{match}'?"
-    if not words:
-        return 'nothing is allowed here'
-    more = ' …' if len(words) > _WORDS_MAX else ''
-    return f'allowed: {", ".join(words[:_WORDS_MAX])}{more}'
 
 
 def counted(number: int, one: str, many: str) -> str:

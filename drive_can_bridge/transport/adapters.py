@@ -17,7 +17,8 @@ from typing import Any
 import can
 import can.interfaces
 
-from drive_can_bridge.core.words import show, suggestion
+from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.transport.bus_identity import SERIAL_INTERFACES
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
@@ -47,35 +48,32 @@ def adapter_keywords(interface: str) -> set[str] | None:
     return names - {'self'}
 
 
-def check_interface(interface: str) -> str | None:
+def check_interface(interface: str) -> Sentence | None:
     """Say why an interface can never be used on this machine; None: it may."""
     known = sorted(can.interfaces.BACKENDS)
     if interface not in can.interfaces.BACKENDS:
-        return f'{show(interface)} is no interface of python-can, {suggestion(interface, known)}'
+        return says('no_interface', name=interface, hint=suggestion(interface, known))
     try:
         adapter = _adapter_class(interface)
     except _Unusable as error:
-        return f"the driver of interface '{interface}' is missing ({error}), allowed is one " \
-               'that is installed'
+        return says('driver_missing', interface=interface, why=str(error))
     # python-can's serial adapters import without pyserial, and fail only when they are opened.
     if getattr(inspect.getmodule(adapter), 'serial', adapter) is None:
-        return f"the driver of interface '{interface}' is missing (Python module pyserial), " \
-               'allowed is one that is installed'
+        return says('driver_missing', interface=interface, why='Python module pyserial')
     return None
 
 
-def check_channel(interface: str, channel: str | int) -> str | None:
+def check_channel(interface: str, channel: str | int) -> Sentence | None:
     """Say why a channel can be no channel of an interface; None: it may."""
     if interface not in SERIAL_INTERFACES:
         return None
     text = str(channel)
     if isinstance(channel, str) and ('://' not in text or text.lower().startswith(_REMOTE)):
         return None
-    return (f'{show(channel)} is no serial port, allowed are a device such as /dev/ttyACM0, '
-            'socket://HOST:PORT and rfc2217://HOST:PORT')
+    return says('no_serial_port', channel=channel)
 
 
-def check_bitrate(interface: str, bitrate: int) -> str | None:
+def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
     """
     Say why an adapter cannot be set to a bit rate; None: it may be possible.
 
@@ -88,8 +86,8 @@ def check_bitrate(interface: str, bitrate: int) -> str | None:
         return None
     if not isinstance(rates, dict) or not rates or bitrate in rates:
         return None
-    return f'{bitrate} is impossible with {interface}, ' \
-           f'allowed is one of {", ".join(str(rate) for rate in sorted(rates))}'
+    return says('no_bitrate', bitrate=bitrate, interface=interface,
+                allowed=', '.join(str(rate) for rate in sorted(rates)))
 
 
 class _Unusable(Exception):

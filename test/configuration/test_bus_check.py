@@ -8,6 +8,7 @@ import pytest
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.sentences import Sentence, uncoded
 
 CASES = [
     ('bitrate: 125000', 'bitrate: 10000',
@@ -89,14 +90,15 @@ class Adapters:
     def adapter_keywords(self, interface: str) -> set[str] | None:
         return {'channel', 'bitrates', 'rx_queue_size'} if interface == 'virtual' else None
 
-    def check_interface(self, interface: str) -> str | None:
-        return None if interface in ('virtual', 'closed') else 'no such thing, allowed is virtual'
+    def check_interface(self, interface: str) -> Sentence | None:
+        return None if interface in ('virtual', 'closed') else uncoded(
+            'no such thing, allowed is virtual')
 
-    def check_channel(self, interface: str, channel: str | int) -> str | None:
-        return 'no channel, allowed is room' if channel == 7 else None
+    def check_channel(self, interface: str, channel: str | int) -> Sentence | None:
+        return uncoded('no channel, allowed is room') if channel == 7 else None
 
-    def check_bitrate(self, interface: str, bitrate: int) -> str | None:
-        return 'impossible, allowed is 500000' if bitrate == 500 * 100 else None
+    def check_bitrate(self, interface: str, bitrate: int) -> Sentence | None:
+        return uncoded('impossible, allowed is 500000') if bitrate == 500 * 100 else None
 
 
 @pytest.mark.parametrize(('old', 'new', 'expected'), [

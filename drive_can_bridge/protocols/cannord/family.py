@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import re
 from typing import Literal
 
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
@@ -99,9 +100,8 @@ class Cannord(Family):
 
     def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         if drive.period < ANSWER_TIME:
-            yield Complaint('period', f'{drive.period:g} s is short: inverters take 1 to '
-                                      f'{1e3 * ANSWER_TIME:g} ms to answer; recommended is at '
-                                      f'least {ANSWER_TIME:g} s')
+            yield Complaint('period', says('inverters_are_slow', period=drive.period,
+                                           answer=1000.0 * ANSWER_TIME, least=ANSWER_TIME))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus; a broadcast one is shared."""
@@ -194,8 +194,7 @@ class Cannord(Family):
             other = everyone[0].options.broadcast
             if mine != other:
                 yield drive, Complaint('broadcast', (
-                    f"'{mine}', while drive {everyone[0].name} on the same bus has '{other}' and "
-                    f"inverters obey both; allowed is '{other}' or 'none'"))
+                    says('both_broadcasts', mine=mine, drive=everyone[0].name, other=other)))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         extra = drive.options.extra_setpoints
@@ -204,12 +203,12 @@ class Cannord(Family):
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > largest:
-                yield Complaint(key, f'{len(listed)} parameters are too many, allowed are at most '
-                                     f'{largest}{more}')
+                yield Complaint(key, says('too_many_parameters', count=len(listed), most=largest,
+                                          more=more))
             for parameter in listed:
                 if parameter.type.bits == 32:
-                    yield Complaint(key, f"'{parameter.name}' is {parameter.type.value}, process "
-                                         'words carry bool, int16 or uint16')
+                    yield Complaint(key, says('not_16_bits', name=parameter.name,
+                                              type=parameter.type.value))
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         foreign = any(protocol != self.name for protocol in drive.profile.protocols)
@@ -223,45 +222,37 @@ class Cannord(Family):
     def _check_unnumbered(self, place: str, parameter: Parameter) -> Iterator[Complaint]:
         """Check an entry that exists in process data only."""
         if parameter.subindex is not None:
-            yield Complaint(f'{place}.subindex', 'a sub-index without a number, allowed is '
-                                                 'number with subindex, or neither')
+            yield Complaint(f'{place}.subindex', says('subindex_alone'))
         if parameter.storage is Storage.EEPROM:
-            yield Complaint(f'{place}.storage', 'process data are not stored, allowed without a '
-                                                'number is ram, or to leave it out')
+            yield Complaint(f'{place}.storage', says('process_data_stored'))
         if parameter.type.bits == 32:
-            yield Complaint(f'{place}.type', f'{parameter.type.value} does not fit a process '
-                                             'word, allowed without a number are bool, int16, '
-                                             'uint16')
+            yield Complaint(f'{place}.type', says('no_process_word', type=parameter.type.value))
 
     def _differences(self, leader: DriveConfiguration, member: DriveConfiguration,
                      ) -> Iterator[Complaint]:
         led = f'drive {leader.name}, which leads its broadcast group'
         if [parameter.name for parameter in member.cyclic_request] != [
                 parameter.name for parameter in leader.cyclic_request]:
-            yield Complaint('cyclic_request', f'differs from that of {led}, allowed is the same')
+            yield Complaint('cyclic_request', says('request_differs', leader=led))
         else:
             for mine, other in zip(member.cyclic_request, leader.cyclic_request):
                 if any(getattr(mine, key) != getattr(other, key) for key in _COMMON_SCALES):
-                    yield Complaint('cyclic_request', f"'{mine.name}' has another type, scale, "
-                                                      f'offset or unit than for {led}, allowed '
-                                                      'is the same')
+                    yield Complaint('cyclic_request', says('type_differs', name=mine.name,
+                                                           leader=led))
                 elif any(getattr(mine, key) != getattr(other, key) for key in _COMMON_WORDS):
-                    yield Complaint('cyclic_request', f"'{mine.name}' has another minimum, "
-                                                      f'maximum or neutral than for {led}, '
-                                                      'allowed is the same')
+                    yield Complaint('cyclic_request', says('range_differs', name=mine.name,
+                                                           leader=led))
                 elif mine.limit is not other.limit:
-                    yield Complaint('cyclic_request', f"'{mine.name}' has another limit (true or "
-                                                      f'false) than for {led}, allowed is the '
-                                                      'same')
+                    yield Complaint('cyclic_request', says('limit_differs', name=mine.name,
+                                                           leader=led))
         if member.period != leader.period:
-            yield Complaint('period', f'{member.period:g} s differs from {leader.period:g} s of '
-                                      f'{led}, allowed is the same')
+            yield Complaint('period', says('period_differs', period=member.period,
+                                           other=leader.period, leader=led))
         for key in _COMMON_OPTIONS:
             mine, other = getattr(member.options, key), getattr(leader.options, key)
             if mine != other:
-                yield Complaint(key, f'{str(mine).lower()} differs from {str(other).lower()} of '
-                                     f'{led}, allowed is the same')
+                yield Complaint(key, says('option_differs', value=str(mine).lower(),
+                                          other=str(other).lower(), leader=led))
         for key in _COMMANDS:
             if member.joint is not None and getattr(member.joint, key) is not None:
-                yield Complaint(f'joint.{key}', f'commands go to {led}, allowed is to leave it '
-                                                'out')
+                yield Complaint(f'joint.{key}', says('led_by_other', leader=led))

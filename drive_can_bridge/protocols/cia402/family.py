@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -107,14 +108,13 @@ class Cia402(Family):
         for parameter in drive.cyclic_request:
             place = parameter.index, parameter.subindex or 0
             if place in _SETPOINTS and place != (mode.index, mode.subindex):
-                yield Complaint('cyclic_request', f"'{parameter.name}' is the setpoint of another "
-                                                  f"mode than '{options.mode}'")
+                yield Complaint('cyclic_request', says('setpoint_of_other_mode',
+                                                       name=parameter.name, mode=options.mode))
         if not options.ramp_bits and options.mode != 'vl':
-            yield Complaint('ramp_bits', f"is for mode vl only, '{options.mode}' has no such bits")
+            yield Complaint('ramp_bits', says('vl_only', mode=options.mode))
         if options.mode == 'pp' and drive.command_timeout > 0:
             yield Complaint('command_timeout', (
-                f'{drive.command_timeout:g} s: in pp a target that is not published again within '
-                'it halts the axis on its way; publish it continuously, or set 0'))
+                says('pp_halts', timeout=drive.command_timeout)))
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
@@ -124,20 +124,19 @@ class Cia402(Family):
             first = in_step[0]
             if drive.period != first.period:
                 yield drive, Complaint('period', (
-                    f'{drive.period:g} s differs from {first.period:g} s of drive {first.name}, '
-                    'which hears the same SYNC; allowed is the same'))
+                    says('period_of_sync', period=drive.period, other=first.period,
+                         drive=first.name)))
         stations = {drive.station: drive.name for drive in drives}
         beating = [drive for drive in drives if drive.options.bridge_heartbeat > 0]
         for drive in beating:
             node, first = drive.options.bridge_node, beating[0]
             if node != first.options.bridge_node:
                 yield drive, Complaint('bridge_node', (
-                    f'{node} differs from {first.options.bridge_node} of drive {first.name} on '
-                    'the same bus, allowed is the same'))
+                    says('bridge_node_differs', node=node, other=first.options.bridge_node,
+                         drive=first.name)))
             elif node in stations and drive is first:
                 yield drive, Complaint('bridge_node', (
-                    f'{node} is the station of drive {stations[node]}, allowed is a node-ID that '
-                    'no drive has'))
+                    says('node_of_drive', node=node, drive=stations[node])))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         node, options = drive.station, drive.options
@@ -212,11 +211,9 @@ class Cia402(Family):
             place = f'profile.parameters.{name}'
             if parameter.index is None:
                 if not foreign:
-                    yield Complaint(f'{place}.index', f'missing, allowed in {self.name} is an '
-                                                      'index, with a subindex unless that is 0')
+                    yield Complaint(f'{place}.index', says('index_missing', family=self.name))
             elif parameter.number is not None and not foreign:
-                yield Complaint(f'{place}.number', f'{self.name} knows no numbers, allowed is '
-                                                   'index with subindex')
+                yield Complaint(f'{place}.number', says('no_numbers', family=self.name))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         taken: dict[tuple[int, int], str] = {
@@ -226,29 +223,28 @@ class Cia402(Family):
             parameters: tuple[Parameter, ...] = getattr(drive, listed)
             for parameter in parameters:
                 if parameter.listed and parameter.index is None:
-                    yield Complaint(listed, f"'{parameter.name}' has no index, allowed in a PDO "
-                                            'are objects')
+                    yield Complaint(listed, says('no_index', name=parameter.name))
                 if key == 'request_pdos' and parameter.index is not None:
                     place = parameter.index, parameter.subindex or 0
                     if place in taken:
-                        yield Complaint(listed, f"'{parameter.name}' is {taken[place]}, allowed "
-                                                'is to leave it out')
+                        yield Complaint(listed, says('mapped_already', name=parameter.name,
+                                                     taken=taken[place]))
                     taken.setdefault(place, f"the same object as '{parameter.name}'")
                 elif parameter.index == STATUS_WORD:
-                    yield Complaint(listed, f"'{parameter.name}' is the status word, which is "
-                                            'published by itself, allowed is to leave it out')
+                    yield Complaint(listed, says('status_word_mapped', name=parameter.name))
             numbers = getattr(drive.options, key)
             if len(set(numbers)) < len(numbers):
-                yield Complaint(key, 'a PDO stands twice, allowed is once')
+                yield Complaint(key, says('pdo_twice'))
             needed = len(pdo.distribute([pdo.width(each) for each in (first, *parameters)]))
             if needed > len(numbers):
-                yield Complaint(key, f'{len(numbers)} PDO{"s" * (len(numbers) != 1)} of 8 bytes '
-                                     f'cannot carry {listed}, needed are {needed}')
+                yield Complaint(key, says('pdos_too_small', count=len(numbers),
+                                          plural='s' * (len(numbers) != 1), listed=listed,
+                                          needed=needed))
 
     def _check_mode(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         name: str | None = drive.options.mode
         if name is None:
-            yield Complaint('mode', f'missing, allowed is one of {", ".join(MODES)}')
+            yield Complaint('mode', says('one_missing', allowed=', '.join(MODES)))
             return
         mode = MODES[name]
         setpoint = next((each for each in drive.cyclic_request if (
@@ -256,36 +252,30 @@ class Cia402(Family):
         if setpoint is None:
             if all(each.listed for each in drive.cyclic_request):
                 yield Complaint('cyclic_request', (
-                    f"mode '{name}' has its setpoint in {mode.index:04X}h."
-                    f'{mode.subindex:02X}h, which is missing, allowed is to add it'))
+                    says('setpoint_missing', name=name, index=mode.index, subindex=mode.subindex)))
         elif setpoint.type is not mode.type:
             yield Complaint(f'profile.parameters.{setpoint.name}.type', (
-                f'{setpoint.type.value}, the setpoint of {name} is {mode.type.value}'))
+                says('setpoint_type', type=setpoint.type.value, name=name,
+                     wanted=mode.type.value)))
         elif mode.position and not setpoint.neutral_from:
             yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
-                f'missing: a position has no value that is neutral everywhere; allowed in {name} '
-                'is the name of the actual position, with an arming_tolerance'))
+                says('no_neutral_position', name=name)))
         if mode.interpolated and not (
                 drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):
-            yield Complaint('mode', f"'{name}' is interpolated by the drive from SYNC to SYNC, "
-                                    'allowed is transmission: sync with a period of at most '
-                                    f'{INTERPOLATION_MAX:g} s')
+            yield Complaint('mode', says('interpolated', name=name, most=INTERPOLATION_MAX))
 
     def _check_times(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         options, milliseconds = drive.options, 1000 * drive.period
         if options.transmission == 'event' and (
                 abs(milliseconds - round(milliseconds)) > 1e-6 or drive.period > TIMER_MAX):
-            yield Complaint('period', f'{drive.period:g} s is no event timer, allowed with '
-                                      'transmission: event are whole milliseconds up to '
-                                      f'{TIMER_MAX:g} s')
+            yield Complaint('period', says('no_event_timer', period=drive.period, most=TIMER_MAX))
         if 0 < options.heartbeat_timeout <= options.heartbeat_producer:
             yield Complaint('heartbeat_timeout', (
-                f'{options.heartbeat_timeout:g} s is not longer than heartbeat_producer '
-                f'({options.heartbeat_producer:g} s), allowed is more, or 0'))
+                says('heartbeat_too_short', timeout=options.heartbeat_timeout,
+                     producer=options.heartbeat_producer)))
         for key in ('heartbeat_producer', 'bridge_heartbeat'):
             if 0 < getattr(options, key) < 0.001:
-                yield Complaint(key, f'{getattr(options, key):g} s is too short, allowed is 0, or '
-                                     'at least 0.001 s')
+                yield Complaint(key, says('time_too_short', seconds=getattr(options, key)))
 
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:

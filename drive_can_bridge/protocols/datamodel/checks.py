@@ -4,6 +4,7 @@
 from collections.abc import Iterator
 import re
 
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
@@ -36,22 +37,21 @@ def raw_parameter(drive: DriveConfiguration, name: str) -> Parameter | None:
 def check_period_and_maps(drive: DriveConfiguration) -> Iterator[Complaint]:
     """Look at how fast the drive is cycled, and at the place of its maps."""
     if drive.period < FASTEST_PERIOD and not drive.options.allow_fast_cycle:
-        yield Complaint('period', f'{drive.period:g} s is too fast, allowed is at least '
-                                  f'{FASTEST_PERIOD:g} s unless allow_fast_cycle is true')
+        yield Complaint('period', says('period_too_fast', period=drive.period,
+                                       least=FASTEST_PERIOD))
     offset = drive.options.parameter_offset
     for key in ('request_map_base', 'response_map_base'):
         base = getattr(drive.options, key)
         if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
-            yield Complaint(key, f'{base} with parameter_offset {offset} is out of range, '
-                                 f'allowed on the wire is 0 to {NUMBER_MAX - SLOTS}')
+            yield Complaint(key, says('map_out_of_range', base=base, offset=offset,
+                                      most=NUMBER_MAX - SLOTS))
     request = drive.options.request_map_base
     response = drive.options.response_map_base
     if abs(request - response) < SLOTS:
         # at the key that was given; the other one has its default
         moved = request != REQUEST_MAP_BASE and response == RESPONSE_MAP_BASE
         yield Complaint('request_map_base' if moved else 'response_map_base',
-                        f'{request} and {response} overlap, allowed is a distance of {SLOTS} '
-                        'or more')
+                        says('maps_overlap', request=request, response=response, distance=SLOTS))
 
 
 def check_parameters(drive: DriveConfiguration, family: str) -> Iterator[Complaint]:
@@ -68,16 +68,15 @@ def _check_request(drive: DriveConfiguration) -> Iterator[Complaint]:
             continue
         if parameter.number in numbers:
             yield Complaint('cyclic_request',
-                            f"'{parameter.name}' and '{numbers[parameter.number]}' are both "
-                            f'{parameter.address}, allowed is one of them')
+                            says('same_number', name=parameter.name,
+                                 other=numbers[parameter.number], address=parameter.address))
         numbers.setdefault(parameter.number, parameter.name)
         for key in ('request_map_base', 'response_map_base'):
             base = getattr(drive.options, key)
             if base <= parameter.number < base + SLOTS:
                 yield Complaint('cyclic_request',
-                                f"'{parameter.name}' ({parameter.address}) is a mapping "
-                                f'parameter, allowed are others than {base} to '
-                                f'{base + SLOTS - 1}')
+                                says('mapping_parameter', name=parameter.name,
+                                     address=parameter.address, base=base, last=base + SLOTS - 1))
 
 
 def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint]:
@@ -86,20 +85,18 @@ def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint
     for name, parameter in drive.profile.parameters.items():
         place = f'profile.parameters.{name}'
         if parameter.number is None:
-            yield Complaint(f'{place}.number', f'missing, allowed in {family} is '
-                                               f'0 to {NUMBER_MAX}')
+            yield Complaint(f'{place}.number', says('number_missing', family=family,
+                                                    most=NUMBER_MAX))
             continue
         if not 0 <= parameter.number <= NUMBER_MAX:
-            yield Complaint(f'{place}.number', f'{parameter.number} is out of range, '
-                                               f'allowed is 0 to {NUMBER_MAX}')
+            yield Complaint(f'{place}.number', says('number_out_of_range', number=parameter.number,
+                                                    most=NUMBER_MAX))
         elif not 0 <= parameter.number + offset <= NUMBER_MAX:
-            yield Complaint('parameter_offset', f"{offset} moves '{name}' "
-                                                f'({parameter.address}) out of the allowed '
-                                                f'0 to {NUMBER_MAX}')
+            yield Complaint('parameter_offset', says('moved_out', offset=offset, name=name,
+                                                     address=parameter.address, most=NUMBER_MAX))
         elif parameter.writable and parameter.number + offset == CYCLIC_PARAMETER:
-            yield Complaint(f'{place}.access', f'{parameter.access.value} is impossible, '
-                                               f'{CYCLIC_PARAMETER} is never written; '
-                                               f'allowed is ro')
+            yield Complaint(f'{place}.access', says('access_impossible',
+                                                    access=parameter.access.value,
+                                                    name=CYCLIC_PARAMETER))
         if parameter.subindex is not None and not shared:
-            yield Complaint(f'{place}.subindex', f'{family} knows no sub-index, '
-                                                 f'allowed is number alone')
+            yield Complaint(f'{place}.subindex', says('no_subindex', family=family))

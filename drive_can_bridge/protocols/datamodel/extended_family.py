@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter
@@ -61,9 +62,7 @@ class DataModelExtended(Family):
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > SLOTS:
-                yield Complaint(key, f'{len(listed)} parameters are too many, '
-                                     f'allowed are at most {SLOTS}')
+                yield Complaint(key, says('too_many_slots', count=len(listed), most=SLOTS))
             for parameter in listed:
                 if parameter.number is not None and parameter.number + offset == 0:
-                    yield Complaint(key, f"'{parameter.name}' has number 0 on the wire, which "
-                                         f'ends a map; allowed is 1 to {NUMBER_MAX}')
+                    yield Complaint(key, says('number_zero', name=parameter.name, most=NUMBER_MAX))

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
@@ -56,19 +57,18 @@ class DataModelStandard(Family):
         bases = _bases(drive)
         highest = STANDARD_IDENTIFIER_MAX - max(bases.values())
         if drive.station < 1:
-            yield Complaint('station', f'{drive.station} is out of range, '
-                                       f'allowed is 1 to {highest} ({self.name})')
+            yield Complaint('station', says('station_out_of_range', station=drive.station,
+                                            most=highest, family=self.name))
         for direction, base in bases.items():
             identifier = base + drive.station
             if identifier > STANDARD_IDENTIFIER_MAX:
                 yield Complaint(
-                    'station', f'{drive.station} is out of range: the identifier of {direction}s, '
-                    f'{base:X}h + {drive.station} = {identifier:X}h, does not fit 11 bits; '
-                    f'allowed is 1 to {highest} with these bases')
+                    'station', says('identifier_too_long', station=drive.station,
+                                    direction=direction, base=base, identifier=identifier,
+                                    most=highest))
                 break
         if bases['request'] == bases['response']:
-            yield Complaint('response_id_base', f'{bases["response"]} is request_id_base, too: '
-                                                'allowed are bases that differ')
+            yield Complaint('response_id_base', says('same_base', base=bases['response']))
 
 
 def _bases(drive: DriveConfiguration) -> dict[str, int]:
