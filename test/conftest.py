@@ -12,6 +12,9 @@ a while. The locks end with the process.
 
 *Logs* of ROS go to a directory of the run, not to the user's.
 
+*Shipped profiles* are read and checked once in a process, which takes as long as a whole story of
+a drive; not so in the tests of that, ``configuration/`` and ``profiles/``.
+
 *Profiles.* Whatever is random looks for a short time, unless DRIVE_CAN_TEST_PROFILE is ``long``.
 How long one example takes says how busy the machine is, and is no failure.
 
@@ -34,6 +37,7 @@ signals, and what is started here would inherit that.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 import fcntl
 from functools import cache
 import gc
@@ -52,6 +56,10 @@ from middleware import tell_in_messages
 import pytest
 import real
 from told_again import ToldAgain
+
+from drive_can_bridge.configuration import profiles
+from drive_can_bridge.configuration.profile_check import LoadedProfile
+from drive_can_bridge.resources import profiles_directory
 
 sys.path.insert(0, str(Path(__file__).with_name('clocked')))
 sys.path.append(str(Path(__file__).with_name('ros')))
@@ -119,6 +127,8 @@ FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
          'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/', 'test/')
 #: s for which others are looked at
 LOOK = 0.5
+#: whose tests read shipped profiles
+READING = ('test/configuration/', 'test/profiles/')
 #: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 2
 
@@ -163,8 +173,10 @@ def new_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Choose the domain of a test."""
+    """Choose the domain of a test, and whether it reads shipped profiles anew."""
     os.environ['ROS_DOMAIN_ID'] = _domain(item.nodeid.startswith('test/ros/'))
+    profiles.read_profile = (READ_PROFILE if item.nodeid.startswith(READING)  # type: ignore
+                             else _remembered)
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -177,6 +189,24 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         for nodeid in dict.fromkeys(failed):
             terminalreporter.line(f'{given} {os.path.relpath(sys.executable)} -m pytest '
                                   f'-n 0 {shlex.quote(nodeid)}')
+
+
+# -- shipped profiles -----------------------------------------------------------------------------
+
+
+READ_PROFILE = profiles.read_profile
+_read_once = cache(READ_PROFILE)
+
+
+def _remembered(path: Path) -> LoadedProfile:
+    """Read a profile, or return what a shipped one holds, with findings of its own."""
+    if path.parent != profiles_directory():
+        return READ_PROFILE(path)
+    loaded = _read_once(path)
+    found = loaded.tree
+    return replace(loaded, tree=replace(
+        found, damaged=set(found.damaged), incomplete=set(found.incomplete),
+        problems=list(found.problems), warnings=list(found.warnings), _wrong=set(found._wrong)))
 
 
 # -- the bench ------------------------------------------------------------------------------------

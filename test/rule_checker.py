@@ -48,12 +48,12 @@ class Kind(NamedTuple):
     acknowledged: bool = False
 
 
-#: the ways in which families tell their drives
+#: the ways in which families tell their drives; first those that take few moves to look at
 KINDS = {
     'cycles alone': Kind((CYCLE,)),
+    'writes that are acknowledged': Kind((SETPOINT, CONTROL_WORD), acknowledged=True),
     'cycles, and a word by number': Kind((CYCLE, CONTROL_WORD)),
     'writes that nobody acknowledges': Kind((SETPOINT, CONTROL_WORD)),
-    'writes that are acknowledged': Kind((SETPOINT, CONTROL_WORD), acknowledged=True),
 }
 
 
