@@ -7,7 +7,7 @@ from trace_builders import Witness
 
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.protocols.observer import Kind
-from drive_can_bridge.trace.lines import Only
+from drive_can_bridge.trace.sinks import Only
 
 
 def test_an_exchange() -> None:
