@@ -41,7 +41,6 @@ INTERNAL: dict[str, set[str]] = {
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'clock', 'core', 'monitor'},
-    'security': {'', 'core', 'protocols'},
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
     'ros.client': {'', 'clock', 'core', 'ros.recognition'},
@@ -56,7 +55,7 @@ INTERNAL: dict[str, set[str]] = {
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
-        'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel', 'security',
+        'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
         'demo', 'client', 'client.drive', 'backup', 'ros', 'ros.client', 'ros.monitor',
         'ros.demo'},
 }

@@ -20,8 +20,7 @@ from drive_can_bridge.resources import command_that_brings
 from drive_can_bridge.trace.files import (
     check_readable, open_text, read_records, READABLE, UnknownFormat,
 )
-from drive_can_bridge.trace.lines import LineWriter, Only, Selection
-from drive_can_bridge.trace.series import Plotter, TableWriter
+from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 
 #: complaints about a file that are shown one by one

@@ -2,19 +2,24 @@
 """The subcommand ``drive_can profile``: which parameter tables there are, and making new ones."""
 
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter, SUPPRESS
+import codecs
+from collections.abc import Mapping, Sequence
+import csv
 from pathlib import Path
+import re
 from typing import Any
 
 from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
 from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
+from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.profiles.build import Built
+from drive_can_bridge.profiles.build import build_profile, Built, ImportFailed
 from drive_can_bridge.profiles.catalogue import (
     available, check, Checked, description, find, VERIFIED_WORDS,
 )
-from drive_can_bridge.profiles.csv_import import COLUMNS, WrongColumns
-from drive_can_bridge.profiles.importing import columns_from_option, import_file, WrongOption
+from drive_can_bridge.profiles.csv_import import COLUMNS, read_table, WrongColumns
+from drive_can_bridge.profiles.eds_import import read_eds
 from drive_can_bridge.protocols.families import FAMILIES
 
 _HELP = {
@@ -24,6 +29,23 @@ _HELP = {
     'import': 'make a profile from an EDS, DCF or CSV file',
 }
 _SIGNS = {'point': '.', 'comma': ','}
+#: MiB; larger files are no parameter tables, and would fill the memory
+SIZE_MAX = 32
+_EDS_HEAD = re.compile(r'^\s*\[(?:FileInfo|DeviceInfo|DeviceComissioning|MandatoryObjects)\]',
+                       re.IGNORECASE | re.MULTILINE)
+#: what is no table at all, by its first bytes
+_OTHERS = (
+    (b'PK\x03\x04', 'is a workbook or an archive; save its table as CSV'),
+    (b'\xd0\xcf\x11\xe0', 'is an old workbook or document; save its table as CSV'),
+    (b'%PDF', 'is a PDF; copy its table into a spreadsheet and save that as CSV'),
+    (b'<?xml', 'is XML (an XDD, perhaps); what is read is EDS, DCF and CSV'),
+)
+#: marks at the beginning, longest first: UTF-32 begins like UTF-16
+_MARKS = (
+    (codecs.BOM_UTF32_LE, 'utf-32'), (codecs.BOM_UTF32_BE, 'utf-32'),
+    (codecs.BOM_UTF8, 'utf-8-sig'), (codecs.BOM_UTF16_LE, 'utf-16'),
+    (codecs.BOM_UTF16_BE, 'utf-16'),
+)
 
 
 #: option -> what argparse wants to know, what it is without, and the actions that have it
@@ -243,11 +265,11 @@ def _import(args: Namespace) -> int:
             args.file, columns=columns_from_option(args.columns),
             sign=_SIGNS.get(args.decimal, ''), protocols=_protocols(args.protocols),
             description=args.description, file_format=args.format)
-        if args.json and args.output is None:
-            raise WrongOption('--json says on standard output what became of the file: say where '
-                              'the profile goes with -o FILE')
-    except (WrongOption, WrongColumns) as error:
+    except WrongColumns as error:
         raise WrongUsage(str(error)) from None
+    if args.json and args.output is None:
+        raise WrongUsage('--json says on standard output what became of the file: say where the '
+                         'profile goes with -o FILE')
     if not args.json:
         for each in (*(f' {note}' for note in built.notes), *built.left_out):
             complain(f'{args.file}:{each}')
@@ -276,10 +298,10 @@ def _protocols(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(',') if name.strip())
     for name in names:
         if name not in FAMILIES:
-            raise WrongOption(f"--protocols: '{name}' is unknown, there are: "
-                              f'{", ".join(FAMILIES)}')
+            raise WrongUsage(f"--protocols: '{name}' is unknown, there are: "
+                             f'{", ".join(FAMILIES)}')
     if len(set(names)) < len(names):
-        raise WrongOption('--protocols: one of them stands twice')
+        raise WrongUsage('--protocols: one of them stands twice')
     return names
 
 
@@ -290,3 +312,78 @@ def _counted(built: Built) -> str:
     if built.remarks:
         text += f', {built.remarks} with a remark in the profile'
     return f'{text}; {", ".join(built.protocols)}'
+
+
+def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
+                protocols: Sequence[str] = (), description: str = '',
+                file_format: str = '') -> Built:
+    """
+    Make a profile of a file.
+
+    :param columns: of a CSV table, by heading or place; the others are guessed.
+    :param sign: what separates the fraction in its numbers; '': they tell.
+    :param file_format: ``eds`` or ``csv``; '': what its name and contents say.
+    :raises ImportFailed: it cannot be imported; the text begins with the name of the file.
+    :raises OSError: it cannot be read, is no regular file, or is too large.
+    """
+    try:
+        text = _decoded(read_regular(path, SIZE_MAX))
+        kind = {'.dcf': 'eds', '.tsv': 'csv'}.get(path.suffix.lower(), path.suffix.lower()[1:])
+        kind = file_format or kind
+        if kind == 'eds' or kind != 'csv' and _EDS_HEAD.search(text):
+            found = read_eds(text, protocols)
+        else:
+            found = read_table(text, columns, sign, protocols)
+        return build_profile(found, path.name, description=description, protocols=protocols)
+    except ImportFailed as error:
+        raise ImportFailed(f'{path}: {error}') from None
+
+
+def columns_from_option(text: str) -> dict[str, str]:
+    """
+    Read ``number=Nr,name=Bezeichnung``; a heading with a comma stands in double quotes.
+
+    :raises WrongUsage: a column is unknown or stands twice.
+    """
+    found: dict[str, str] = {}
+    try:
+        parts = next(csv.reader([re.sub(r'(\w+)\s*=\s*"', r'"\1=', text)], strict=True), [])
+    except csv.Error as error:
+        raise WrongUsage(f'--columns: {error}') from None
+    for part in parts:
+        column, sign, heading = (each.strip() for each in part.partition('='))
+        if column not in COLUMNS:
+            raise WrongUsage(f"--columns: '{column}' is no column, there are: "
+                             f'{", ".join(COLUMNS)}')
+        if not sign:
+            raise WrongUsage(f'--columns: {column} has no heading, allowed is '
+                             f'{column}=HEADING')
+        if column in found:
+            raise WrongUsage(f'--columns: {column} stands twice')
+        found[column] = heading
+    return found
+
+
+def _decoded(data: bytes) -> str:
+    """
+    Return the text of a file; line ends are those of Unix.
+
+    Without a mark at its beginning a file that is valid UTF-8 is UTF-8, and any other one is what
+    Windows writes in western Europe: cp1252, whose gaps are filled as latin-1 fills them.
+
+    :raises ImportFailed: it is no text.
+    """
+    for head, what in _OTHERS:
+        if data.startswith(head):
+            raise ImportFailed(what)
+    encoding = next((name for mark, name in _MARKS if data.startswith(mark)), '')
+    try:
+        text = data.decode(encoding or 'utf-8')
+    except UnicodeDecodeError as error:
+        if encoding:
+            raise ImportFailed(f'begins like {encoding} text and is none: byte {error.start} '
+                               f'({error.reason})') from None
+        text = ''.join(bytes((byte,)).decode('cp1252', 'ignore') or chr(byte) for byte in data)
+    if '\0' in text:
+        raise ImportFailed('is no text: it contains NUL characters')
+    return text.replace('\r\n', '\n').replace('\r', '\n')

@@ -2,27 +2,233 @@
 """
 ``drive_can security``: who may talk to the bridge of a parameter file.
 
-Writes files only; docs/security.md says what they protect against, and what enforces them.
+Writes files only; docs/security.md says what they protect against, and what enforces them. The
+policy has three enclaves, and says what each may do. Everything else is denied.
+
+``/bridge``
+    the process of the bridge: its own topics and services.
+``/operator``
+    who moves drives: commands, ``~/enable``, parameters; and all that a viewer may.
+``/viewer``
+    who looks: topics of drives, diagnostics, the log, reading parameters.
+
+Access control of DDS knows topics, not contents: who may call ``~/enable`` may call it with true.
 """
 
-import argparse
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterable
+from dataclasses import dataclass
 import ipaddress
 from pathlib import Path
+from xml.etree import ElementTree
 
 from drive_can_bridge.cli.command import namespace, output_path, whole
 from drive_can_bridge.cli.output import write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.security.policy import (
-    BRIDGE, bridge_profile, client_profile, Meeting, OPERATOR, policy, VIEWER,
-)
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.protocols.families import FAMILIES
 
 _NODE = 'drive_can_bridge'
 _POLICY, _TLS_BRIDGE, _TLS_CLIENT = 'policy.xml', 'tls_bridge.xml', 'tls_client.xml'
 
+#: how parameters are read and written: ``~/get_parameters`` ...
+READING = ('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters')
+WRITING = ('set_parameters', 'set_parameters_atomically')
+CONTROL = ('enable', 'reset_fault')
+#: a managed node says how it is, and is told
+STATES = ('get_available_states', 'get_available_transitions', 'get_state',
+          'get_transition_graph')
+TRANSITIONS = ('change_state',)
+#: what every node has
+TYPE_DESCRIPTION = 'get_type_description'
+_NAMESPACE = 'http://www.eprosima.com'
+_TRANSPORT = 'drive_can_tls'
+#: a peer without a certificate of ours is shown out
+_VERIFY = ('VERIFY_PEER', 'VERIFY_FAIL_IF_NO_PEER_CERT')
+#: what is older than TLS 1.2
+_OPTIONS = ('NO_SSLV2', 'NO_SSLV3', 'NO_TLSV1', 'NO_TLSV1_1')
 
-def define(parser: argparse.ArgumentParser) -> None:
+
+@dataclass(frozen=True, slots=True)
+class NodeNames:
+    """
+    What one node has, relative to it (``~/`` is left out).
+
+    :param shown: topics that it publishes.
+    :param taken: topics that it obeys.
+    :param asked: services that change nothing.
+    :param obeyed: services that do.
+    """
+
+    node: str
+    shown: tuple[str, ...] = ()
+    taken: tuple[str, ...] = ()
+    asked: tuple[str, ...] = ()
+    obeyed: tuple[str, ...] = ()
+
+
+def bridge_names(configuration: BridgeConfiguration) -> NodeNames:
+    """Return what the bridge itself has."""
+    joints = [drive.joint for drive in configuration.drives.values() if drive.joint is not None]
+    return NodeNames(
+        _NODE, shown=('transition_event', *(('joint_states',) if joints else ())),
+        taken=('joint_commands',) if joints else (),
+        asked=(*READING, *STATES, 'get_logger_levels', TYPE_DESCRIPTION),
+        obeyed=(*WRITING, *TRANSITIONS, 'set_logger_levels', 'save_trace'))
+
+
+def drive_names(drive: DriveConfiguration) -> NodeNames:
+    """Return what the node of a drive has."""
+    session = FAMILIES[drive.protocol].make_session(drive)
+    shown = ['online', 'response', 'request']
+    for parameter in session.sample_parameters:
+        shown.append(parameter.name)
+        shown += [f'{parameter.name}/{bit}' for bit, _ in parameter.bits]
+    control = drive.profile.control
+    taken = [f'command/{parameter.name}' for parameter in drive.cyclic_request
+             if control is None or parameter.name != control.parameter]
+    if drive.joint is not None:
+        shown.append('joint_state')
+        taken.append('joint_command')
+    return NodeNames(
+        drive.name, shown=tuple(shown), taken=tuple(taken), asked=READING,
+        obeyed=(*WRITING, 'quick_stop', *(CONTROL if session.control is not None else ()),
+                *(('home',) if getattr(drive.options, 'homing', False) else ())))
+
+
+VERSION = '0.2.0'
+BRIDGE, OPERATOR, VIEWER = '/bridge', '/operator', '/viewer'
+#: nodes of clients that come with ROS and with this package; patterns as DDS has them
+_TOOLS = ('_drive_can_*', '_ros2cli_*')
+_LOG, _EVENTS, _DIAGNOSTICS, _CLOCK = '/rosout', '/parameter_events', '/diagnostics', '/clock'
+
+
+def policy(configuration: BridgeConfiguration, namespace: str) -> str:
+    """
+    Write the policy as XML.
+
+    :param namespace: in which the bridge runs, ``/`` or ``/cell``.
+    """
+    nodes = [bridge_names(configuration), *map(drive_names, configuration.drives.values())]
+    root = ElementTree.Element('policy', version=VERSION)
+    enclaves = ElementTree.SubElement(root, 'enclaves')
+    _add_bridge(_enclave(enclaves, BRIDGE), nodes, namespace)
+    _add_client(_enclave(enclaves, OPERATOR), nodes, namespace, acts=True)
+    _add_client(_enclave(enclaves, VIEWER), nodes, namespace, acts=False)
+    return _document(root)
+
+
+def _enclave(parent: ElementTree.Element, path: str) -> ElementTree.Element:
+    enclave = ElementTree.SubElement(parent, 'enclave', path=path)
+    return ElementTree.SubElement(enclave, 'profiles')
+
+
+def _add_bridge(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str) -> None:
+    for number, node in enumerate(nodes):
+        profile = _enclave_profile(profiles, namespace, node.node)
+        shared = [_EVENTS, _LOG, _DIAGNOSTICS] if number == 0 else [_EVENTS]
+        _rule(profile, 'topics', 'publish', [*shared, *_own(node.shown)])
+        _rule(profile, 'topics', 'subscribe', [_CLOCK, _EVENTS, *_own(node.taken)])
+        _rule(profile, 'services', 'reply', _own((*node.asked, *node.obeyed)))
+
+
+def _add_client(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str, *,
+                acts: bool) -> None:
+    place = namespace.rstrip('/')
+    seen = [_DIAGNOSTICS, _LOG, _EVENTS, _CLOCK]
+    used: dict[str, list[str]] = {'publish': [], 'request': []}
+    for node in nodes:
+        seen += _absolute(place, node, node.shown)
+        used['request'] += _absolute(place, node, node.asked)
+        if acts:
+            used['publish'] += _absolute(place, node, node.taken)
+            used['request'] += _absolute(place, node, node.obeyed)
+    # access goes by enclave: what one of its nodes may use, all of them may
+    profile = _enclave_profile(profiles, '/', OPERATOR[1:] if acts else VIEWER[1:])
+    _rule(profile, 'topics', 'publish', used['publish'])
+    _rule(profile, 'topics', 'subscribe', seen)
+    _rule(profile, 'services', 'request', used['request'])
+    for node_name in (profile.attrib['node'], *_TOOLS):
+        # every node announces its parameters, writes to the log, and has this service
+        profile = _enclave_profile(profiles, '/', node_name)
+        _rule(profile, 'topics', 'publish', [_EVENTS, _LOG])
+        _rule(profile, 'services', 'reply', [f'~/{TYPE_DESCRIPTION}'])
+
+
+def _enclave_profile(parent: ElementTree.Element, namespace: str,
+                     node: str) -> ElementTree.Element:
+    return ElementTree.SubElement(parent, 'profile', ns=namespace, node=node)
+
+
+def _rule(profile: ElementTree.Element, kind: str, verb: str, names: Iterable[str]) -> None:
+    listed = list(dict.fromkeys(names))
+    if listed:
+        rule = ElementTree.SubElement(profile, kind, {verb: 'ALLOW'})
+        for name in listed:
+            ElementTree.SubElement(rule, kind[:-1]).text = name
+
+
+def _own(names: Iterable[str]) -> list[str]:
+    return [f'~/{name}' for name in names]
+
+
+def _absolute(place: str, node: NodeNames, names: Iterable[str]) -> list[str]:
+    return [f'{place}/{node.node}/{name}' for name in names]
+
+
+def transport_profile(args: Namespace, *, listens: bool) -> str:
+    """
+    Write a profile of Fast DDS: TCP only, both sides show a certificate.
+
+    The bridge listens, everybody else connects to it. There is no element for a password: an
+    empty one is not the same as none, and keeps a key without a password from being read.
+    """
+    root = ElementTree.Element('dds', xmlns=_NAMESPACE)
+    profiles = ElementTree.SubElement(root, 'profiles')
+    descriptors = ElementTree.SubElement(profiles, 'transport_descriptors')
+    transport = ElementTree.SubElement(descriptors, 'transport_descriptor')
+    _text(transport, 'transport_id', _TRANSPORT)
+    _text(transport, 'type', 'TCPv4')
+    if listens:
+        ports = ElementTree.SubElement(transport, 'listening_ports')
+        _text(ports, 'port', str(args.port))
+    tls = ElementTree.SubElement(transport, 'tls')
+    for name, file in (('private_key_file', 'key.pem'), ('cert_chain_file', 'cert.pem'),
+                       ('verify_file', 'ca.pem')):
+        _text(tls, name, str(args.certificates / file))
+    modes = ElementTree.SubElement(tls, 'verify_mode')
+    for mode in _VERIFY:
+        _text(modes, 'verify', mode)
+    options = ElementTree.SubElement(tls, 'options')
+    for option in _OPTIONS:
+        _text(options, 'option', option)
+    participant = ElementTree.SubElement(
+        profiles, 'participant', profile_name=_TRANSPORT, is_default_profile='true')
+    rtps = ElementTree.SubElement(participant, 'rtps')
+    _text(ElementTree.SubElement(rtps, 'userTransports'), 'transport_id', _TRANSPORT)
+    _text(rtps, 'useBuiltinTransports', 'false')
+    if not listens:
+        builtin = ElementTree.SubElement(rtps, 'builtin')
+        peers = ElementTree.SubElement(builtin, 'initialPeersList')
+        locator = ElementTree.SubElement(ElementTree.SubElement(peers, 'locator'), 'tcpv4')
+        _text(locator, 'address', args.host)
+        _text(locator, 'physical_port', str(args.port))
+        _text(locator, 'port', '0')
+    return _document(root)
+
+
+def _document(root: ElementTree.Element) -> str:
+    ElementTree.indent(root)
+    return ('<?xml version="1.0" encoding="UTF-8"?>\n'
+            f'{ElementTree.tostring(root, encoding="unicode")}\n')
+
+
+def _text(parent: ElementTree.Element, name: str, text: str) -> None:
+    ElementTree.SubElement(parent, name).text = text
+
+
+def define(parser: ArgumentParser) -> None:
     """Define the words and options of the subcommand."""
-    usual = Meeting()
     parser.description = (
         'Write the SROS2 policy for the bridge of a parameter file (enclaves '
         f'{BRIDGE}, {OPERATOR}, {VIEWER}), and Fast DDS profiles for TLS between '
@@ -32,16 +238,17 @@ def define(parser: argparse.ArgumentParser) -> None:
                         help='directory for the files, made where it is missing')
     parser.add_argument('--namespace', metavar='NS', default='', type=namespace,
                         help='in which the bridge runs (default: none)')
-    parser.add_argument('--host', metavar='ADDRESS', default=usual.host, type=_address,
+    parser.add_argument('--host', metavar='ADDRESS', default='127.0.0.1', type=_address,
                         help='of the host of the bridge, for TLS (default: %(default)s)')
-    parser.add_argument('--port', metavar='PORT', default=usual.port, type=whole(1, 65535),
+    parser.add_argument('--port', metavar='PORT', default=5100, type=whole(1, 65535),
                         help='of TCP on that host (default: %(default)s)')
-    parser.add_argument('--certificates', metavar='DIR', default=usual.certificates, type=Path,
+    parser.add_argument('--certificates', metavar='DIR', type=Path,
+                        default=Path('/etc/drive_can/certificates'),
                         help='where key.pem, cert.pem and ca.pem are on each host '
                              '(default: %(default)s)')
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Namespace) -> int:
     """
     Write the files.
 
@@ -49,10 +256,10 @@ def run(args: argparse.Namespace) -> int:
     :raises OSError: a file cannot be read or written.
     """
     configuration = configuration_from_file(args.file)
-    meeting = Meeting(args.host, args.port, args.certificates)
     files = {
-        _POLICY: policy(configuration, node=_NODE, namespace=args.namespace or '/'),
-        _TLS_BRIDGE: bridge_profile(meeting), _TLS_CLIENT: client_profile(meeting)}
+        _POLICY: policy(configuration, args.namespace or '/'),
+        _TLS_BRIDGE: transport_profile(args, listens=True),
+        _TLS_CLIENT: transport_profile(args, listens=False)}
     args.output.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         write_atomically(args.output / name, text.encode())
@@ -64,4 +271,4 @@ def _address(text: str) -> str:
     try:
         return str(ipaddress.IPv4Address(text))
     except ValueError:
-        raise argparse.ArgumentTypeError(f'{text}: an IPv4 address is wanted') from None
+        raise ArgumentTypeError(f'{text}: an IPv4 address is wanted') from None

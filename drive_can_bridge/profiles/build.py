@@ -28,10 +28,6 @@ class ImportFailed(DriveCanError):
     """The file as a whole cannot be imported; the text continues its name."""
 
 
-class Unusable(ValueError):
-    """A cell or key has no usable value; the text says why."""
-
-
 @dataclass(slots=True)
 class Draft:
     """

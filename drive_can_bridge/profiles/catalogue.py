@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,13 @@ from drive_can_bridge.resources import profiles_directory
 #: how an entry's key ``verified`` is shown
 VERIFIED_WORDS: dict[bool | None, str] = {True: 'yes', False: 'no', None: ''}
 _OURS = 'profile.'
+#: of a parameter, in the order in which it is described
+_DESCRIBED = (
+    'address', 'number', 'index', 'subindex', 'type', 'scale', 'offset', 'unit', 'access',
+    'storage', 'minimum', 'maximum', 'neutral', 'neutral_from', 'limit', 'arming_tolerance',
+    'bits', 'values', 'word_order', 'protected', 'description', 'source', 'verified', 'open')
 #: a key of a family that changes what it needs of an entry: any value will do
 _CHOICES = {'canopen_pkw': ('addressing', ('register', 'canopen'))}
-
-
-class NoSuchProfile(DriveCanError):
-    """There is no profile of that name, or it cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +65,12 @@ def available(directories: Sequence[Path]) -> dict[str, Path]:
 
     :param directories: searched before the shipped ones; the first of a name counts, as for a
         bridge.
-    :raises NoSuchProfile: one of the directories is not there.
+    :raises DriveCanError: one of the directories is not there.
     """
     found: dict[str, Path] = {}
     for directory in directories:
         if not directory.is_dir():
-            raise NoSuchProfile(f'{directory} is no directory')
+            raise DriveCanError(f'{directory} is no directory')
     for directory in (*directories, profiles_directory()):
         for path in sorted(directory.glob(f'*{SUFFIX}')):
             found.setdefault(path.stem, path)
@@ -79,16 +81,16 @@ def find(name: str, directories: Sequence[Path]) -> Path:
     """
     Return the file of a profile, given by its name or as a file.
 
-    :raises NoSuchProfile: there is none; the text names those that exist.
+    :raises DriveCanError: there is none; the text names those that exist.
     """
     as_file = Path(name)
     if '/' in name or name.endswith((SUFFIX, '.yml')):
         if not as_file.is_file():
-            raise NoSuchProfile(f'{name}: no such file')
+            raise DriveCanError(f'{name}: no such file')
         return as_file
     found = ProfileStore([str(directory) for directory in directories]).load(name)
     if isinstance(found, str):
-        raise NoSuchProfile(found)
+        raise DriveCanError(found)
     return Path(found.profile.path)
 
 
@@ -112,20 +114,13 @@ def check(path: Path) -> Checked:
 
 def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[str, Any]:
     """Describe an entry with all its keys, given ones and defaults: one JSON document."""
-    return {
-        'name': name, 'address': parameter.address, 'number': parameter.number,
-        'index': parameter.index, 'subindex': parameter.subindex, 'type': parameter.type.value,
-        'scale': parameter.scale, 'offset': parameter.offset, 'unit': parameter.unit,
-        'access': parameter.access.value,
-        'storage': parameter.storage.value if parameter.storage else None,
-        'minimum': parameter.minimum, 'maximum': parameter.maximum,
-        'neutral': parameter.neutral, 'neutral_from': parameter.neutral_from or None,
-        'limit': parameter.limit,
-        'arming_tolerance': parameter.arming_tolerance, 'bits': dict(parameter.bits),
-        'values': {str(raw): name for raw, name in parameter.values},
-        'word_order': parameter.word_order, 'protected': parameter.protected,
-        'description': parameter.description, 'source': entry.get('source'),
-        'verified': parameter.verified, 'open': entry.get('open')}
+    found = {key: getattr(parameter, key, None) for key in _DESCRIBED}
+    return {'name': name,
+            **{key: each.value if isinstance(each, Enum) else each for key, each in found.items()},
+            'neutral_from': parameter.neutral_from or None,
+            'bits': dict(parameter.bits),
+            'values': {str(raw): name for raw, name in parameter.values},
+            'source': entry.get('source'), 'open': entry.get('open')}
 
 
 # -- what families can carry ----------------------------------------------------------------------

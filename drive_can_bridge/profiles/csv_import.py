@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 import csv
 import re
 from typing import Any, NamedTuple
-import unicodedata
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
-from drive_can_bridge.profiles.names import known_unit, name_of, one_line, split_unit, unit
-from drive_can_bridge.profiles.numerals import (
-    decimal_sign, factor, integer, interval, is_hexadecimal_only, Measure, measure, rounded,
+from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut
+from drive_can_bridge.profiles.names import (
+    decimal_sign, factor, integer, interval, is_hexadecimal_only, known_unit, Measure, measure,
+    name_of, one_line, plain_words, rounded, split_unit, unit, Unusable,
 )
 
 #: ends the search for headings
@@ -86,8 +85,7 @@ _FILLERS = frozenset(
     'engineering'.split())
 #: headings that may stand for numbers as well as for names; the cells tell
 _AMBIGUOUS = frozenset(('parameter', 'param', 'par', 'parametro', 'p'))
-_NUMERIC = ('scale', 'divisor', 'offset', 'minimum', 'maximum',
-            'range', 'unit')
+_NUMERIC = ('scale', 'divisor', 'offset', 'minimum', 'maximum', 'range', 'unit')
 
 # -- what manuals call types, access and storage --------------------------------------------------
 
@@ -187,12 +185,8 @@ def _read_rows(text: str) -> list[Row]:
 
 def _plain_heading(text: str) -> str:
     """Return a heading without case, accents, brackets and signs."""
-    text = re.sub(r'[\[(][^\])]*[\])]', ' ', text).casefold().replace('n°', 'nr')
-    for letter, letters in (('ä', 'ae'), ('ö', 'oe'), ('ü', 'ue'), ('ß', 'ss')):
-        text = text.replace(letter, letters)
-    return ' '.join(re.findall(r'[a-z0-9]+', ''.join(
-        letter for letter in unicodedata.normalize('NFKD', text) if not
-        unicodedata.combining(letter))))
+    text = re.sub(r'[\[(][^\])]*[\])]', ' ', text)
+    return ' '.join(plain_words(text.casefold().replace('n°', 'nr')))
 
 
 def _columns_of(heading: str) -> list[str]:

@@ -19,11 +19,10 @@ import re
 from types import ModuleType
 from typing import Any
 
-from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut, Unusable
+from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut
 from drive_can_bridge.profiles.catalogue import check, Checked
 from drive_can_bridge.profiles.csv_import import access_of
-from drive_can_bridge.profiles.names import one_line, unit
-from drive_can_bridge.profiles.numerals import rounded
+from drive_can_bridge.profiles.names import one_line, rounded, unit, Unusable
 from drive_can_bridge.resources import command_that_brings, profiles_directory
 
 #: how the library needs these keys to be written

@@ -12,12 +12,15 @@ Not by python-can: its reader takes most error frames for data frames, ends at t
 is none of its own, and does not know the screen.
 """
 
+from collections.abc import Callable
 from datetime import datetime
 import re
+from typing import TypeVar
 
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.record import DATA, Record, RecordKind
 
+Parsed = TypeVar('Parsed')
 #: linux/can.h, in identifiers of eight digits
 _ERROR_FLAG = 0x20000000
 _CLASSICAL_MAX = 8
@@ -126,11 +129,15 @@ def _shown(words: list[str]) -> Record:
                     len(identifier))
 
 
-def _time(word: str) -> float:
+def _read(parse: Callable[[str], Parsed], text: str, what: str) -> Parsed:
     try:
-        return float(word[1:-1])
+        return parse(text)
     except ValueError:
-        raise ValueError(f'{word[1:-1]!r} is no time') from None
+        raise ValueError(f'{text!r} is no {what}') from None
+
+
+def _time(word: str) -> float:
+    return _read(float, word[1:-1], 'time')
 
 
 def _date(words: str) -> float:
@@ -144,17 +151,11 @@ def _date(words: str) -> float:
 
 
 def _number(digits: str) -> int:
-    try:
-        return int(digits, 16)
-    except ValueError:
-        raise ValueError(f'{digits!r} is no identifier') from None
+    return _read(lambda text: int(text, 16), digits, 'identifier')
 
 
 def _content(digits: str) -> bytes:
-    try:
-        return bytes.fromhex(digits)
-    except ValueError:
-        raise ValueError(f'{digits!r} is no hexadecimal data') from None
+    return _read(bytes.fromhex, digits, 'hexadecimal data')
 
 
 def _checked(record: Record, digits: int) -> Record:

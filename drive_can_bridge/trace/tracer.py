@@ -175,7 +175,7 @@ class Tracer:
             found = bus.find(identifier, extended)
         if found is None:
             bus.strays += 1
-            self._stray(bus, record)
+            self._tell(bus, time, '', _hex(record), Verdict.NORMAL)
             return
         handler, observer = found
         self._sent = sent
@@ -221,10 +221,8 @@ class Tracer:
 
         No answer comes before its question, and nothing would be missed until the old time.
         """
-        self._sink(bus.name, Telegram(
-            bus.newest, '', Direction.NEITHER, Kind.OTHER, 'time', verdict=Verdict.SUSPICIOUS,
-            remark=f'goes back by {bus.newest - time:.6f} s: the clock was set, or two traces '
-                   f'are in one'))
+        self._tell(bus, bus.newest, 'time', f'goes back by {bus.newest - time:.6f} s: the clock '
+                   'was set, or two traces are in one')
         bus.shift += bus.newest - time
         return bus.newest
 
@@ -240,20 +238,18 @@ class Tracer:
     def _take_other(self, bus: BusTrace, record: Record) -> None:
         if record.kind is RecordKind.ERROR:
             bus.error_frames += 1
-            self._sink(bus.name, Telegram(
-                record.time, '', Direction.NEITHER, Kind.OTHER, 'error frame',
-                verdict=Verdict.SUSPICIOUS,
-                remark=decode_error_frame(record.identifier, record.data).text))
+            self._tell(bus, record.time, 'error frame',
+                       decode_error_frame(record.identifier, record.data).text)
             return
         bus.count(bits_on_bus(len(record.data), record.extended), record.time)
-        self._sink(bus.name, Telegram(
-            record.time, '', Direction.NEITHER, Kind.OTHER,
-            'remote frame' if record.kind is RecordKind.REMOTE else 'CAN FD frame',
-            verdict=Verdict.SUSPICIOUS, remark=_hex(record)))
+        title = 'remote frame' if record.kind is RecordKind.REMOTE else 'CAN FD frame'
+        self._tell(bus, record.time, title, _hex(record))
 
-    def _stray(self, bus: BusTrace, record: Record) -> None:
-        self._sink(bus.name, Telegram(record.time, '', Direction.NEITHER, Kind.OTHER, '',
-                                      remark=_hex(record)))
+    def _tell(self, bus: BusTrace, time: float, title: str, remark: str,
+              verdict: Verdict = Verdict.SUSPICIOUS) -> None:
+        """Tell what is of no drive."""
+        self._sink(bus.name, Telegram(time, '', Direction.NEITHER, Kind.OTHER, title,
+                                      verdict=verdict, remark=remark))
 
 
 def _hex(record: Record) -> str:
@@ -292,23 +288,17 @@ def summary_documents(tracer: Tracer) -> Iterator[dict[str, Any]]:
                'seconds': _rounded(bus.last - bus.first, 6)}
 
 
-def _drive_cells(observed: Observed) -> Iterator[str]:
-    yield str(observed.exchanges)
-    yield str(observed.missed)
-    yield _three(observed.period)
-    yield _three(observed.latency)
-    for count in (observed.requests, observed.unanswered, observed.refused, observed.late,
-                  observed.unasked, observed.malformed, observed.fast_writes):
-        yield str(count)
+def _drive_cells(observed: Observed) -> tuple[str, ...]:
+    counts = (observed.requests, observed.unanswered, observed.refused, observed.late,
+              observed.unasked, observed.malformed, observed.fast_writes)
+    return (str(observed.exchanges), str(observed.missed), _three(observed.period),
+            _three(observed.latency), *map(str, counts))
 
 
-def _bus_cells(bus: BusTrace) -> Iterator[str]:
-    yield _number(bus.last - bus.first, 3)
-    yield str(bus.frames)
-    yield (f'{_number(100.0 * bus.load, 1)}, {_number(100.0 * bus.peak_load, 1)}'
-           if bus.bitrate else '–')
-    yield str(bus.error_frames)
-    yield str(bus.strays)
+def _bus_cells(bus: BusTrace) -> tuple[str, ...]:
+    load = f'{_number(100.0 * bus.load, 1)}, {_number(100.0 * bus.peak_load, 1)}'
+    return (_number(bus.last - bus.first, 3), str(bus.frames), load if bus.bitrate else '–',
+            str(bus.error_frames), str(bus.strays))
 
 
 def _three(statistic: Statistic) -> str:

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from drive_can_bridge.cli.profile import columns_from_option, import_file
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.profiles.build import Built
 from drive_can_bridge.profiles.catalogue import check
-from drive_can_bridge.profiles.importing import columns_from_option, import_file
 
 
 class Outcome(NamedTuple):

@@ -3,9 +3,9 @@
 
 import pytest
 
-from drive_can_bridge.profiles.build import Unusable
-from drive_can_bridge.profiles.names import unit
-from drive_can_bridge.profiles.numerals import decimal_sign, factor, integer, interval, measure
+from drive_can_bridge.profiles.names import (
+    decimal_sign, factor, integer, interval, measure, unit, Unusable,
+)
 
 POINT, COMMA, UNKNOWN = '.', ',', ''
 

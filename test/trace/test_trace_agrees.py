@@ -28,7 +28,7 @@ from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.trace.files import read_records, TraceWriter
-from drive_can_bridge.trace.lines import LineWriter, Selection
+from drive_can_bridge.trace.sinks import LineWriter, Selection
 from drive_can_bridge.trace.tracer import Tracer
 
 

@@ -4,7 +4,7 @@
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.trace.series import Curve, Lanes, Marks
+from drive_can_bridge.trace.sinks import Curve, Lanes, Marks
 
 
 def test_a_short_curve_is_kept_as_it_is() -> None:

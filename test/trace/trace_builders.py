@@ -8,7 +8,7 @@ from drive_can_bridge.core.configuration import (
 )
 from drive_can_bridge.core.record import Record
 from drive_can_bridge.protocols.observer import Observed, Telegram
-from drive_can_bridge.trace.lines import LineWriter, Only, Selection
+from drive_can_bridge.trace.sinks import LineWriter, Only, Selection
 from drive_can_bridge.trace.tracer import Tracer
 
 
