@@ -340,6 +340,7 @@ class BusExchange:
         member = self._member(session)
         with self.lock:
             now = self._clock()
+            self._notice_lost_time(now)     # else an enable would go by what was before
             try:
                 session.services.submit(request, now)
                 member.pump()
@@ -403,28 +404,41 @@ class BusExchange:
 
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
-        now = self._clock()
-        late = now - self._meant_at
-        if not self._notice_lost_time(now) and late > LATENESS_MAX and self.active:
-            for member in self._members:
-                member.tell(member.listener.discard_commands,
-                            f'the exchange was {late:.2f} s late')
+        now = self._last_pass = self._look_at_clock()
+        self._meant_at = min(self._meant_at, now)
         if now >= self._tell_at:
             self._tell_again(now)
         soonest = min(now + PASS_PERIOD, self._tell_at)
         for member in self._members:
             if member.due <= now or member.look_at <= now and self.active:
-                now = self._clock()  # the drives before took their time
+                now = self._look_at_clock()  # the drives before took their time
                 member.look_at = now + LOOK_PERIOD
-                member.serve(now)
+                member.take_commands(now)
+                now = self._look_at_clock()  # and so did these
+                member.take(member.session.handle_timer, now)
             if member.anew_at <= now:
                 member.begin_anew(now)
         for member in self._members:  # a partner's timer may have changed after its turn
             due = member.look_at if member.look_at < member.due and self.active else member.due
             if due < soonest:
                 soonest = due
-        self._meant_at = soonest
+        self._meant_at = max(soonest, now)
         return soonest
+
+    def _look_at_clock(self) -> float:
+        """
+        Return the time, and see to what a stall has made stale.
+
+        Not only when a pass begins: a process may be stopped in the midst of one.
+        """
+        now = self._clock()
+        late = now - self._meant_at
+        if late > LATENESS_MAX and not self._notice_lost_time(now):
+            self._meant_at = now
+            for member in self._members if self.active else ():
+                member.tell(member.listener.discard_commands,
+                            f'the exchange was {late:.2f} s late')
+        return now
 
     def _tell_again(self, now: float) -> None:
         self._tell_at = now + REQUEST_PERIOD
@@ -435,10 +449,9 @@ class BusExchange:
     def _notice_lost_time(self, now: float) -> bool:
         """Re-arm everything after a second that was lost; False: none was."""
         gap = now - self._last_pass
-        self._last_pass = now
         if gap < LOST_TIME or not self.active:
             return False
-        self._meant_at = now
+        self._last_pass = self._meant_at = now
         for member in self._members:
             member.tell(member.listener.discard_commands,
                         f'the bridge stood still for {gap:.2f} s')

@@ -123,11 +123,10 @@ class Member:
         except Exception as error:  # noqa: BLE001  likewise
             self._unheard(error)
 
-    def serve(self, now: float) -> None:
-        """Let the drive have its turn: it is due, or commands may wait for it."""
+    def take_commands(self, now: float) -> None:
+        """Let the listener hand in the commands that wait."""
         if not self.session.defect:
             self.tell(self.listener.take_commands, now)
-        self.take(self.session.handle_timer, now)
 
     def pump(self) -> None:
         """Send what the session wants sent, and tell its listener what happened."""

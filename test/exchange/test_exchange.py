@@ -166,6 +166,61 @@ def test_a_drive_that_comes_after_a_slow_one_has_the_time_of_its_own_turn() -> N
     assert second.session.setpoints.items[0].commanded_at == pytest.approx(10.104)
 
 
+def _answer_both(bench: Bench, now: float) -> None:
+    for station in (1, 2):
+        bench.hears(f'{0x10 << 24 | 0x1FFFF0 + (station << 21):08X}#03E800FA00010000', now)
+
+
+@pytest.mark.parametrize('whose', [0, 1])
+@pytest.mark.parametrize(('seconds', 'told'), [(0.2, '07D0'), (0.3, '03E8'), (1.5, None)])
+def test_who_is_served_after_a_stall_in_the_midst_of_a_pass_gets_nothing_stale(
+        whose: int, seconds: float, told: str | None) -> None:
+    bench = Bench(*[drive(name=name, station=station, mapping='assume', rearm_immediate=True,
+                          command_timeout=5.0)
+                    for name, station in (('first', 1), ('second', 2))])
+    for session in bench.sessions:
+        session.phase = 0.0     # both are due at once
+    bench.exchange.bus_opened()
+    bench.exchange.activate()
+    second = bench.notes[1]
+    for step in range(4):
+        second.commands.append((0, 100.0))
+        bench.at(10.0 + 0.02 * step)
+        _answer_both(bench, 10.001 + 0.02 * step)
+    assert bench.at(10.08)[1] == '005FFFF0#03E8000000000000'
+    _answer_both(bench, 10.081)
+    take = bench.notes[whose].take_commands
+
+    def stall(now: float) -> None:
+        take(now)
+        bench.now += seconds
+        second.commands.append((0, 200.0))     # comes while the process stands still
+        bench.notes[whose].take_commands = take  # type: ignore[method-assign]
+    bench.notes[whose].take_commands = stall  # type: ignore[method-assign]
+    discarded = second.discarded
+    sent = [text for text in bench.at(10.1) if text.startswith('005FFFF0#')]
+    if told is None:
+        assert all(text == f'005FFFF0#{ZEROS}' for text in sent)
+        assert not second.session.online
+    elif whose == 1:    # it has taken what there was
+        assert sent == ['005FFFF0#03E8000000000000']
+    else:
+        assert sent == [f'005FFFF0#{told}000000000000']
+    assert second.discarded == discarded + (seconds > 0.25)
+    bench.at(bench.now + 0.001)     # and that is judged once
+    assert second.discarded == discarded + (seconds > 0.25)
+
+
+def test_an_enable_that_comes_with_the_end_of_a_stall_finds_the_drive_lost() -> None:
+    bench = Bench(drive(control=CONTROL))
+    bench.online()
+    bench.now = 11.5        # no pass has noticed it yet
+    bench.exchange.submit(bench.sessions[0], ControlRequest(ControlAction.ENABLE))
+    assert not bench.sessions[0].online
+    assert [event.success for event in bench.notes[0].events
+            if isinstance(event, ControlCompleted)] == [False]
+
+
 def test_pass_says_when_the_next_is_due() -> None:
     bench = Bench(drive())
     bench.online()
