@@ -14,7 +14,7 @@ from drive_can_bridge.core.parameters import ParameterType, Storage
 from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.protocols.observer import Verdict
-from drive_can_bridge.trace.lines import Only
+from drive_can_bridge.trace.sinks import Only
 
 STORIES = stories(__file__, 'decode.yaml')
 
