@@ -1,10 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Simulated drives of all families on a bus of the bench, and files about them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
+import json
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import world
 
@@ -23,6 +25,27 @@ BY_HAND = {
     'pump': {'flc1_ratio': 50.0, 'motor_trip_class': 10.0, 'network_fallback': 2},
 }
 _CHANNELS = count()
+
+
+class Said(NamedTuple):
+    """What a command said, and its exit code."""
+
+    code: int
+    lines: list[str]
+    errors: list[str]
+
+    @property
+    def documents(self) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in self.lines]
+
+    @property
+    def view(self) -> list[str]:
+        """Return all of it as lines."""
+        return [*self.lines, *(f'! {line}' for line in self.errors),
+                *([f'[{self.code}]'] if self.code else [])]
+
+
+Command = Callable[..., Said]
 
 
 class Shop:
