@@ -214,8 +214,8 @@ def test_a_fault_does_not_wait_for_the_extra_values() -> None:
 def test_extra_values_that_belong_to_nothing() -> None:
     talk = five()
     talk.hears('003#0100020000', 10.01)
-    assert talk.events(FrameRejected) == [
-        FrameRejected(says('unasked', what='additional process data'))]
+    what = 'additional process data'
+    assert talk.events(FrameRejected) == [FrameRejected(says('unasked', what=what))]
     talk.until(10.021)
     talk.hears('003#0100020000', 10.022)     # the main answer was lost
     assert talk.samples() == []

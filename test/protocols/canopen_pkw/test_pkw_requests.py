@@ -161,6 +161,7 @@ def test_what_fits_no_frame_is_not_written(items: Any) -> None:
     ('31000906', 0x06090031, '06090031h (value too high)'),
     ('32000906', 0x06090032, '06090032h (value too low)'),
     ('00000206', 0x06020000, '06020000h (no such register or object)'),
+    ('00000106', 0x06010000, '06010000h (access not supported)'),
     ('02000106', 0x06010002, '06010002h (write to a read-only object)'),
     ('41000406', 0x06040041, '06040041h (object cannot be mapped to a PDO)'),
     ('21000008', 0x08000021, '08000021h (data cannot be stored because of local control)'),

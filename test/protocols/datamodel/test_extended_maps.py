@@ -218,8 +218,8 @@ def test_response_map_that_changes_while_cycling() -> None:
     talk.hears(ANSWER, 11.002)
     assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
     assert talk.hears('102007E4#00D100D300D20000', 11.004) == []
-    assert talk.events(MappingDiffered) == [
-        MappingDiffered('response map is 209, 211, 210, configured 209, 210, 211')]
+    how = 'response map is 209, 211, 210, configured 209, 210, 211'
+    assert talk.events(MappingDiffered) == [MappingDiffered(says('maps_found', differences=how))]
     assert talk.until(12.0) == []
 
 
