@@ -54,7 +54,7 @@ class Idle(Session):
         raise NotImplementedError
 
     def begin(self, now: float) -> None:
-        self.done.append((f'begin at {now:g}', self.report.advice))
+        self.done.append(('begin', f'{now:g}', self.report.advice))
         self.online = True
 
     def fall_silent(self) -> None:
@@ -84,7 +84,7 @@ def test_begins_when_bus_and_activity_are_there_in_any_order() -> None:
         for now, call in enumerate(order):
             assert made.done == []
             getattr(made, call)(float(now))
-        assert made.done == [('begin at 1', says('looked_for'))]
+        assert made.done == [('begin', '1', says('looked_for'))]
         assert not made.ever_online
 
 

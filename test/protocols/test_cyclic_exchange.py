@@ -51,7 +51,7 @@ class Plain(Session):
         super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
         server: RequestServer = Silent()
         self.services = DriveServices(self, server)
-        self.answers = Answers(self, silence='no answer', advice='look at the plug')
+        self.answers = Answers(self, silence='no answer', advice='the plug')
         self.exchange = CyclicExchange(self.answers, self, slot=0)
         self.look_after(self.exchange, channel=Silent())
 
@@ -125,10 +125,9 @@ def test_once_a_period_as_long_as_it_answers() -> None:
     assert talk.session.next_timer() == pytest.approx(10.02)
     for number in range(1, 5):
         assert talk.at(10.0 + 0.02 * number) == ['0000']
-    reason = 'no answer for 3 cycles'
+    reason = says('silent_for_cycles', what='no answer', cycles=3)
     assert talk.session.take_events() == [StationLost(reason)]
-    assert talk.session.offline_advice == says(
-        'silent', look_at='look at the plug', what='no answer')
+    assert talk.session.offline_advice == says('silent', what='no answer', look_at='the plug')
     assert talk.at(10.1) == ['0000'], 'which is how it is found again'
     talk.answer(10.101)
     assert talk.session.take_events() == [StationFound()]

@@ -11,7 +11,7 @@ from typing import Any
 from builders import (
     CONTROL, Conversation, drive, INT16, parameter, RAM, RO, SPEED, STATUS, TABLE, WORD,
 )
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
@@ -291,8 +291,7 @@ def test_pkw_without_control_is_told_nothing_after_a_loss() -> None:
     assert not talk.session.online
     assert not [text for text in sent if int(text[10:12] or '0', 16) & 0x7F == 0x2A]
     warnings = [event.text for event in talk.events(Noted) if event.warning]
-    assert 'where its axis is, nobody knows, so that it is told nothing: it may still be running' \
-        in warnings
+    assert may_run('position_unknown') in warnings
 
 
 def test_pkw_does_not_enable_what_refuses_its_position() -> None:
@@ -303,4 +302,5 @@ def test_pkw_does_not_enable_what_refuses_its_position() -> None:
     assert sent == ['505#C60200AA46000000']
     talk.hears('485#C60200CE22000008', 10.055)      # 0800 0022h: not in the present state
     answer = talk.session.services.control_refusal(ControlAction.ENABLE)
-    assert answer.startswith('it would jump: write of position_setpoint refused')
+    assert answer == says('would_jump', why=says('write_failed', what=says(
+        'write_refused', what='position_setpoint')))

@@ -3,6 +3,7 @@
 
 from builders import Conversation, drive, GAIN, read
 import pytest
+from saying import codes
 
 ZEROS = '0000000000000000'
 
@@ -58,5 +59,4 @@ def test_a_drive_that_never_answers_costs_the_other_nothing() -> None:
     assert done.count([7]) > 100
     latencies.append(first.session.statistics.period_error.maximum)
     assert latencies[0] < 1e-9
-    assert {str(outcome) for outcome, in second.outcomes()} <= {
-        'no answer; drive offline', 'busy'}
+    assert set(codes(outcome for outcome, in second.outcomes())) <= {'no_answer_offline', 'busy'}

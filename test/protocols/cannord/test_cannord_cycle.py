@@ -214,8 +214,8 @@ def test_a_fault_does_not_wait_for_the_extra_values() -> None:
 def test_extra_values_that_belong_to_nothing() -> None:
     talk = five()
     talk.hears('003#0100020000', 10.01)
-    assert talk.events(FrameRejected) == [
-        FrameRejected(says('unasked', what='additional process data'))]
+    what = 'additional process data'
+    assert talk.events(FrameRejected) == [FrameRejected(says('unasked', what=what))]
     talk.until(10.021)
     talk.hears('003#0100020000', 10.022)     # the main answer was lost
     assert talk.samples() == []
@@ -370,7 +370,8 @@ def test_silence_is_offline_and_cycling_goes_on() -> None:
     assert talk.events(StationLost) == []
     assert talk.until(10.101) == [(10.1, '002#7E040000')]
     lost, = talk.events(StationLost)
-    assert lost.reason == says('silent_for_cycles', cycles=3)
+    what = 'no answer to process data'
+    assert lost.reason == says('silent_for_cycles', cycles=3, what=what)
     assert 'P509' in talk.session.offline_advice
     assert talk.session.statistics.missed == 3
     assert talk.commands(0, 0.0, 10.11) is CommandOutcome.NOT_ARMED

@@ -223,7 +223,8 @@ def test_another_value_is_forgotten_with_its_write() -> None:
 def test_only_one_fits_a_frame() -> None:
     talk = online()
     assert talk.submits(write((FLAG, 1), (OFFSET, 2), atomic=True), 10.003) == []
-    assert talk.outcomes() == [[says('not_in_one_frame')] * 2]
+    fits = 'a CANnord frame carries one parameter'
+    assert talk.outcomes() == [[says('not_in_one_frame', fits=fits)] * 2]
     assert asked(talk, write((FLAG, 1), atomic=True),
                  ('78E0000000000100', '7810000000000100')) == ['written']
 

@@ -137,8 +137,8 @@ def test_no_heartbeat_was_due_while_nobody_listened() -> None:
 
 def test_emergencies_last_until_they_are_over() -> None:
     watched = node()
-    assert watched.receive_emergency(OVERLOAD) == (
-        says('emergency', text='2310h (current, output side), error register 02h'))
+    text = '2310h (current, output side), error register 02h'
+    assert watched.receive_emergency(OVERLOAD) == says('emergency', text=text)
     assert watched.emergency == OVERLOAD
     assert watched.receive_emergency(OVERLOAD) == '', 'nothing new'
     assert watched.receive_emergency(Emergency(0)) == (

@@ -114,8 +114,8 @@ def test_drive_that_refuses_its_status_is_not_driven_on() -> None:
             asked += talk.hears(answer, now + 0.001)
     together, alone, rest = '505#C701002600000000', '505#C70100A500000000', '505#C801002500000000'
     assert sent == [together, *3 * [alone, rest], DISABLE_1, STILL_0]
-    assert 'enable withdrawn: 3 answers without a status word; only ~/enable starts the drive ' \
-        'again' in [note.text for note in talk.events(Noted)]
+    assert says('enable_withdrawn', reason=says('status_missing', answers=3)) in [
+        note.text for note in talk.events(Noted)]
 
 
 def test_enabling_while_tripped_is_refused() -> None:
@@ -177,7 +177,7 @@ def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
     (_, success, message), = outcomes
     assert now == pytest.approx(12.075)
     assert not success
-    assert 'no confirmation in 2 s' in message
+    assert message == says('stuck', timeout=2.0)
     assert sent == [DISABLE_1], 'it is not known to be disabled any more'
 
 
@@ -214,18 +214,18 @@ def test_unsent_word_waits_for_the_mailbox() -> None:
 # -- refusals -------------------------------------------------------------------------------------
 
 
-LOCAL = 'refused by the drive: 08000021h (data cannot be stored because of local control)'
+LOCAL = says('refused_by_drive', number=0x08000021)
 
 
 def test_refused_enable_fails_with_the_reason_of_the_drive() -> None:
     talk = ready()
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
     assert talk.hears('485#C002004E21000008', 10.076) == [DISABLE_1], 'it is withdrawn'
-    assert talk.control_outcomes() == [('enable', False, f'control word 0001h {LOCAL}')]
-    assert talk.events(Noted) == [
-        Noted(f'write of control_register_1 0001h {LOCAL}', warning=True)]
-    assert talk.session.warning == (
-        f'write of control_register_1 0001h {LOCAL}: look at the device')
+    assert talk.control_outcomes() == [
+        ('enable', False, says('word_refused', word=1, reason=LOCAL))]
+    refused = says('write_refused', what='control_register_1 0001h', reason=LOCAL)
+    assert talk.events(Noted) == [Noted(says('write_failed', what=refused), warning=True)]
+    assert talk.session.warning == says('word_not_taken', what=refused)
     assert talk.hears(DISABLED_1, 10.077) == []
     assert talk.session.warning == ''
     assert talk.until(10.0901) == [(10.09, READ_0)]
@@ -261,8 +261,10 @@ def test_refused_disable_is_tried_again_until_the_drive_takes_it() -> None:
     assert talk.hears('485#C002004E22000008', 10.096) == []
     (action, success, message), = talk.control_outcomes()
     assert (action, success) == ('disable', False)
-    assert message.startswith('control word 0000h refused by the drive: 08000022h')
-    assert 'control_register_1 0000h refused by the drive: 08000022h' in talk.session.warning
+    refused = says('refused_by_drive', number=0x08000022)
+    assert message == says('word_refused', word=0, reason=refused)
+    assert talk.session.warning == says('word_not_taken', what=says(
+        'write_refused', what='control_register_1 0000h', reason=refused))
     (at, text), = rounds(talk, 10.1, 12.0, '81000000')
     assert text[:10] == '505#C00200' and text[12:] == '00000000'
     assert 10.34 < at < 10.38
@@ -304,8 +306,8 @@ def test_a_drive_that_runs_on_under_disable_is_told_of() -> None:
     assert talk.session.control.disregard == ''
     rounds(talk, 12.09, 12.3, '81000000')
     text = talk.session.control.disregard
-    assert text.startswith(
-        'still enabled (status word 0081h) although its control word is disable (0000h)')
+    assert text == says(
+        'disregards', state='enabled', status=status_word(0x0081), action='disable', word=0)
     assert Noted(text, warning=True) in talk.events(Noted)
     asked, = talk.asks(ControlAction.DISABLE, 12.302)
     assert asked[4:8] + asked[12:] == 'C00200000000', 'at once for who asks again'

@@ -11,6 +11,7 @@ from pkw_builders import (
     STATUS, TABLE,
 )
 import pytest
+from saying import says
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter
@@ -147,26 +148,34 @@ def test_what_fits_no_frame_is_not_written(items: Any) -> None:
     talk = online()
     assert talk.submits(write(*items, atomic=True), 10.06) == []
     (reasons,) = talk.outcomes()
-    assert reasons == [
-        'cannot be written in one frame, nothing was written: two 16-bit parameters in adjacent '
-        'registers fit, or one of 32 bits'] * len(items)
+    fits = 'two 16-bit parameters in adjacent registers fit, or one of 32 bits'
+    assert reasons == [says('not_in_one_frame', fits=fits)] * len(items)
 
 
 # -- failures -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('answer, text', [
-    ('485#8C02004E30000906', '06090030h (value out of range)'),
-    ('485#8C02004E09063000', '06090030h (value out of range)'),
-    ('485#8C02004E0B000000', '0000000Bh (no SDO abort code; as a PROFIBUS device would mean it: '
+@pytest.mark.parametrize('answer, number, text', [
+    ('30000906', 0x06090030, '06090030h (value out of range)'),
+    ('09063000', 0x06090030, '06090030h (value out of range)'),
+    ('31000906', 0x06090031, '06090031h (value too high)'),
+    ('32000906', 0x06090032, '06090032h (value too low)'),
+    ('00000206', 0x06020000, '06020000h (no such register or object)'),
+    ('00000106', 0x06010000, '06010000h (access not supported)'),
+    ('02000106', 0x06010002, '06010002h (write to a read-only object)'),
+    ('41000406', 0x06040041, '06040041h (object cannot be mapped to a PDO)'),
+    ('21000008', 0x08000021, '08000021h (data cannot be stored because of local control)'),
+    ('22000008', 0x08000022,
+     '08000022h (data cannot be stored in the present state of the device)'),
+    ('0B000000', 0x0000000B, '0000000Bh (no SDO abort code; as a PROFIBUS device would mean it: '
                              'word value too low)'),
-    ('485#8C02004E99999999', '99999999h (unknown code)'),
+    ('99999999', 0x99999999, '99999999h (unknown code)'),
 ])
-def test_illegal_value_is_refused_with_code_and_text(answer: str, text: str) -> None:
+def test_illegal_value_is_refused_with_code_and_text(answer: str, number: int, text: str) -> None:
     talk = online()
     assert asked(talk, write((FLC, 0xFFFF))) == '505#8C02002AFFFF0000'
-    assert talk.hears(answer, 10.061) == []
-    assert talk.outcomes() == [[f'refused by the drive: {text}']]
+    assert talk.hears(f'485#8C02004E{answer}', 10.061) == []
+    assert talk.outcomes() == [[says('refused_by_drive', number=number, text=text)]]
     assert talk.session.warning == ''
 
 
@@ -176,8 +185,7 @@ def test_refused_pair_is_read_one_by_one() -> None:
     assert talk.hears('485#8C02004E00000206', 10.061) == ['505#8C0200A500000000']
     assert talk.hears('485#8C0200A507000000', 10.062) == ['505#8D02002500000000']
     talk.hears('485#8D02004E00000206', 10.063)
-    assert talk.outcomes() == [
-        [7, 'refused by the drive: 06020000h (no such register or object)']]
+    assert talk.outcomes() == [[7, says('refused_by_drive', number=0x06020000)]]
 
 
 def test_lost_answer_of_a_read_is_asked_for_again() -> None:
@@ -196,7 +204,7 @@ def test_read_that_nobody_answers_fails() -> None:
     frames = talk.until(11.5)
     assert [text[:12] for _, text in frames if text != IDLE] == [
         '505#D10100A5', '505#D1010025', '505#8C0200A5', '505#8C020025', '505#8C0200A5']
-    assert talk.outcomes() == [['no answer in 0.1 s, 3 attempts'] * 2]
+    assert talk.outcomes() == [[says('no_answer', timeout=0.1, attempts=3)] * 2]
 
 
 def test_lost_answer_of_a_write_is_never_repeated() -> None:
@@ -205,7 +213,7 @@ def test_lost_answer_of_a_write_is_never_repeated() -> None:
     assert talk.until(10.17) == [(10.16, IDLE)]
     assert talk.hears(IDLE_ANSWER, 10.161) == ['505#5E0200AA0A000000'], 'the next one'
     talk.hears('485#5E0200AA00000000', 10.162)
-    assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt', 'written']]
+    assert talk.outcomes() == [[says('no_answer', timeout=0.1, attempts=1), 'written']]
 
 
 def test_write_waits_until_the_function_byte_is_known() -> None:
@@ -215,8 +223,8 @@ def test_write_waits_until_the_function_byte_is_known() -> None:
     talk.submits(write((FLC, 91)), 10.17)
     frames = talk.until(11.0)
     assert {text for _, text in frames} == {IDLE}
-    assert talk.outcomes() == [['no answer in 0.1 s, 1 attempt'],
-                               ['no answer in 0.1 s, 2 attempts']]
+    assert talk.outcomes() == [
+        [says('no_answer', timeout=0.1, attempts=attempts)] for attempts in (1, 2)]
 
 
 def test_offline_drive_is_tried_and_then_given_up() -> None:
@@ -224,7 +232,7 @@ def test_offline_drive_is_tried_and_then_given_up() -> None:
     talk.submits(read(FLC, LEVEL, CLASS), 10.01)
     talk.submits(write((FLC, 1), (CLASS, 2)), 10.01)
     frames = talk.until(13.5)
-    assert talk.outcomes() == [['no answer; drive offline'] * 3, ['no answer; drive offline'] * 2]
+    assert talk.outcomes() == [[says('no_answer_offline')] * number for number in (3, 2)]
     asked_for = [text[:9] for _, text in frames]
     assert asked_for.count('505#D1010') == 3
     assert '505#8C020' not in asked_for
@@ -239,7 +247,8 @@ def test_restart_in_the_middle_of_a_write() -> None:
     assert asked(talk, write((FLC, 90))) == '505#8C02002A5A000000'
     talk.submits(read(CLASS), 10.061)
     assert talk.hears(BOOT_UP, 10.062) == [], 'started a moment ago'
-    assert talk.outcomes() == [['no answer: the device restarted']] * 2
+    assert talk.outcomes() == [
+        [says('no_answer_because', reason=says('device_restarted'))]] * 2
     # the answer, should it still come, is nobody's
     assert talk.hears('485#8C02002A00000000', 10.063) == []
     assert talk.session.statistics.rejected == 1
@@ -261,9 +270,10 @@ def test_node_that_is_known_to_be_stopped_gets_no_requests() -> None:
     talk = online()
     assert asked(talk, read(FLC)) == '505#8C02002500000000'
     assert talk.hears(PRE_OPERATIONAL, 10.061) == [], 'started a moment ago'
-    assert talk.outcomes() == [['drive offline: node is pre-operational']]
+    stopped = says('drive_offline_because', reason=says('node_state', state='pre-operational'))
+    assert talk.outcomes() == [[stopped]]
     assert talk.submits(read(FLC, CLASS), 10.07) == []
-    assert talk.outcomes() == [['drive offline: node is pre-operational'] * 2]
+    assert talk.outcomes() == [[stopped] * 2]
 
 
 # -- whose turn it is -----------------------------------------------------------------------------
@@ -327,8 +337,8 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
     assert not raw('x2004.6', table=bare).writable
     talk = online(table=bare, response=bare[:2], request=(bare[10],))
     assert SPEED.name == bare[10].name
-    assert talk.session.services.write_refusal(raw('x2008.0B', table=bare)) == (
-        'sent cyclically: publish ~/command/speed')
+    assert talk.session.services.write_refusal(raw('x2008.0B', table=bare)) == says(
+        'sent_cyclically', name='speed')
 
 
 @pytest.mark.parametrize('name, refusal', [
@@ -355,4 +365,4 @@ def test_time_out_can_change_while_running() -> None:
     talk.session.reconfigure(parameter_timeout=0.05)
     asked(talk, read(FLC))
     talk.until(10.2)
-    assert talk.outcomes() == [['no answer in 0.05 s, 1 attempt']]
+    assert talk.outcomes() == [[says('no_answer', timeout=0.05, attempts=1)]]

@@ -13,7 +13,7 @@ from pkw_builders import (
     STOPPED, TABLE, WORD,
 )
 import pytest
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -25,11 +25,8 @@ READ_CLASS_0 = '505#5E02002500000000'
 READ_CLASS_1 = '505#5E0200A500000000'
 CLASS_0 = '485#5E02002507000000'
 CLASS_1 = '485#5E0200A507000000'
-RUNNING_ON = 'it may still be running'
-
-
 def worries(talk: Conversation) -> list[str]:
-    return [note.text for note in talk.events(Noted) if RUNNING_ON in note.text]
+    return [note.text for note in talk.events(Noted) if 'may still be running' in note.text]
 
 
 # -- in every state -------------------------------------------------------------------------------
@@ -51,7 +48,7 @@ def test_what_was_not_answered_may_run_all_the_same() -> None:
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
     talk.until(10.58)
     talk.bus_down(10.59)
-    assert worries(talk) == [f'the bus was lost before it could be told to stop: {RUNNING_ON}']
+    assert worries(talk) == [may_run('bus_lost_before_stop')]
 
 
 def test_stall() -> None:
@@ -82,7 +79,7 @@ def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
 def test_signal_right_after_the_bus_came_back() -> None:
     talk = running()
     assert talk.bus_down(10.1) == []
-    assert worries(talk) == [f'the bus was lost before it could be told to stop: {RUNNING_ON}']
+    assert worries(talk) == [may_run('bus_lost_before_stop')]
     assert talk.bus_up(12.0) == [START, DISABLE_0]
     assert talk.deactivate(12.0) == []
     assert talk.hears(DISABLED_0, 12.003) == [DISABLE_1]
@@ -100,8 +97,8 @@ def test_nobody_answers_after_the_bus_came_back() -> None:
     sent = talk.until(20.0)
     assert sent == [(12.05, DISABLE_1), (12.183333, DISABLE_0), (12.316667, DISABLE_1)]
     assert talk.session.stopped
-    assert worries(talk) == [
-        f'told to stop, but control_register_1 0000h not acknowledged in 3 attempts: {RUNNING_ON}']
+    assert worries(talk) == [may_run('stop_failed', what=[
+        says('write_not_acknowledged', what='control_register_1 0000h', attempts=3)])]
 
 
 def test_bus_that_comes_back_stops_setpoints_without_control_too() -> None:
@@ -124,7 +121,7 @@ def test_slow_device_after_the_bus_came_back() -> None:
     assert len(stops) == 3
     talk.hears(DISABLED_1 if stops[-1][1] == DISABLE_1 else DISABLED_0, stops[-1][0] + 0.3)
     talk.until(12.5)
-    assert worries(talk) == [says('may_still_be_running', why=says('bus_lost_before_stop'))]
+    assert worries(talk) == [may_run('bus_lost_before_stop')]
 
 
 def test_end_while_the_bus_is_lost() -> None:
@@ -133,7 +130,7 @@ def test_end_while_the_bus_is_lost() -> None:
     talk.events()
     assert talk.deactivate(11.0) == []
     assert talk.session.stopped
-    assert worries(talk) == [f'could not be told to stop: {RUNNING_ON}']
+    assert worries(talk) == [may_run('stop_not_possible')]
 
 
 def test_bus_that_is_lost_during_the_stop() -> None:
@@ -172,8 +169,8 @@ def test_held_back_and_silent_is_told() -> None:
     talk.hears(PRE_OPERATIONAL, 10.3)
     sent = talk.until(11.1)
     assert sent == [(10.433333, DISABLE_1), (10.566667, DISABLE_0)]
-    assert worries(talk) == [
-        f'told to stop, but control_register_1 0000h not acknowledged in 3 attempts: {RUNNING_ON}']
+    assert worries(talk) == [may_run('stop_failed', what=[
+        says('write_not_acknowledged', what='control_register_1 0000h', attempts=3)])]
 
 
 def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:
@@ -220,8 +217,8 @@ def test_bus_that_takes_no_stop_at_all() -> None:
     assert not talk.session.stopped
     assert talk.until(11.7) == []
     assert talk.session.stopped, '0.5 s for each of three attempts'
-    assert worries(talk) == [
-        f'told to stop, but control_register_1 0000h not taken by the bus: {RUNNING_ON}']
+    assert worries(talk) == [may_run('stop_failed', what=[
+        says('write_not_taken', what='control_register_1 0000h')])]
 
 
 def test_stop_that_is_given_up() -> None:
@@ -232,7 +229,7 @@ def test_stop_that_is_given_up() -> None:
     assert talk.sent() == []
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
-    assert worries(talk) == [f'could not be told to stop: {RUNNING_ON}']
+    assert worries(talk) == [may_run('stop_not_possible')]
 
 
 def test_refused_disable_of_a_user_is_tried_until_the_bus_takes_it() -> None:

@@ -5,13 +5,13 @@ from typing import Any
 
 from builders import Conversation
 from pkw_builders import CONTROL, driven, echo, online, READ_0, SPEED, SPEED_1
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
 
-MAY_RUN = 'it may still be running'
+UNANSWERED = says('write_unanswered', what='speed')
 
 #: what is not answered: the setpoint, whatever it is
 SPEEDS = '505#C60200'
@@ -63,11 +63,8 @@ def test_drive_that_refuses_neutral_is_not_enabled() -> None:
     assert '0100' not in words(sent)
     (action, success, message), = talk.control_outcomes()
     assert (action, success) == ('enable', False)
-    assert message == (says(
-        'word_refused', reason=says('word_held_back', what=says('write_refused',
-        reason=says('refused_by_drive', number=0x08000022,
-        text='08000022h (data cannot be stored in the present state of the device)'),
-        what='speed')), word=1))
+    assert message == says('word_refused', word=1, reason=says('word_held_back', what=says(
+        'write_refused', what='speed', reason=says('refused_by_drive', number=0x08000022))))
 
 
 def test_drive_that_refused_neutral_once_can_be_enabled_and_disabled() -> None:
@@ -90,10 +87,9 @@ def test_drive_that_does_not_answer_to_neutral_is_not_enabled() -> None:
     assert '0100' not in words(sent)
     assert talk.control_outcomes() == [
         ('enable', False, says(
-            'word_refused', reason=says('word_held_back', what=says('write_unanswered',
-            what='speed')), word=1))]
-    assert notes(talk) == [says('write_failed', what=says('write_unanswered', what='speed'))]
-    assert 'write of speed: no answer' in talk.session.warning
+            'word_refused', word=1, reason=says('word_held_back', what=UNANSWERED)))]
+    assert notes(talk) == [says('write_failed', what=UNANSWERED)]
+    assert talk.session.warning == says('setpoint_not_taken', what=UNANSWERED)
 
 
 def test_enabled_drive_that_does_not_take_neutral_is_disabled() -> None:
@@ -102,8 +98,8 @@ def test_enabled_drive_that_does_not_take_neutral_is_disabled() -> None:
     sent = answers(talk, 13.0)
     assert words(sent) == ['0000'] * 2, 'it says that it runs on'
     assert len([text for text in sent if text.startswith(SPEEDS)]) >= 3
-    assert ('enable withdrawn: neutral is not taken, write of speed: no answer; only ~/enable '
-            'starts the drive again') in notes(talk)
+    assert says('enable_withdrawn', reason=says('neutral_not_taken', what=UNANSWERED)) in notes(
+        talk)
 
 
 def test_enabled_drive_that_refuses_neutral_is_disabled_at_once() -> None:
@@ -122,7 +118,7 @@ def test_drive_without_control_that_does_not_take_neutral_may_run() -> None:
     assert talk.hears(echo(asked_, '4100'), 10.072) == []
     talk.events()
     answers(talk, 13.0)
-    assert notes(talk) == [f'write of speed: no answer: {MAY_RUN}']
+    assert notes(talk) == [may_run('write_failed', what=UNANSWERED)]
 
 
 def test_disable_that_is_not_answered_is_told() -> None:
@@ -138,8 +134,9 @@ def test_disable_that_is_not_answered_is_told() -> None:
                 asked += talk.hears(echo(text), talk.now + 0.0001)
         asked = talk.at(max(talk.now, talk.session.next_timer()))
     assert len(words(sent)) > 3, 'with each round again'
-    assert notes(talk) == [f'write of control_register_1 0000h: no answer: {MAY_RUN}'], 'once'
-    assert 'write of control_register_1 0000h: no answer' in talk.session.warning
+    unanswered = says('write_unanswered', what='control_register_1 0000h')
+    assert notes(talk) == [may_run('write_failed', what=unanswered)], 'once'
+    assert talk.session.warning == says('word_not_taken', what=unanswered)
     asked = [text for text in asked if text[4:8] == 'C002'] or [sent[-1]]
     while talk.session.warning:
         if asked:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from saying import says
 from servo_builders import Axis
 from test_cia402_modes import home, meet
 from test_cia402_set_up import FITS
@@ -14,6 +15,7 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.statistics import DriveStatistics
+from drive_can_bridge.protocols.canopen.abort_codes import describe
 from drive_can_bridge.protocols.cia402.handover import Handover
 
 
@@ -90,7 +92,8 @@ def test_a_fixed_drive_that_differs_says_what_it_refused() -> None:
     axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
     axis.start()
     assert not axis.session.online
-    assert '1400h.01h refused by the drive: 06010000h' in axis.session.offline_advice
+    assert axis.session.offline_advice == says('mapping_differs', how=says(
+        'object_refused', what='1400h.01h', why=describe(0x06010000)))
 
 
 def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> None:

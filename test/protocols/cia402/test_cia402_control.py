@@ -8,6 +8,7 @@ from servo_builders import Axis
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.protocols.cia402.states import State
 
 ENABLE, DISABLE, QUICK_STOP = (
     ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
@@ -113,7 +114,10 @@ class TestWhatKeepsItFromEnabling:
         axis.live(2.0)
         (_, success, why), = axis.talk.control_outcomes()
         assert not success
-        assert '6061h shows mode 1 yet instead of 9 (csv)' in why
+        told = says('word_sent_last', parts=[
+            says('word_sent_last', word=0x000F),
+            says('mode_differs', mode='csv', number=9, shown=1)])
+        assert why == says('stuck', remarks=[says('word_not_followed', word=0x000F), told])
         assert axis.drive.state == axis.drive.READY
 
     def test_a_mode_that_shows_only_when_enabled(self) -> None:
@@ -143,7 +147,7 @@ class TestWhatKeepsItFromEnabling:
         axis.live(0.1)
         assert axis.session.services.control_refusal(ENABLE) == says('bridge_missed')
         assert axis.asks(ControlAction.RESET_FAULT) == [
-            ('reset_fault', True, 'ready to switch on')]
+            ('reset_fault', True, State.READY_TO_SWITCH_ON.value)]
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
 
 
@@ -159,7 +163,7 @@ class TestQuickStop:
         axis.live(0.1)
         assert axis.words() == ['0200', '0600']
         assert [(success, message) for _, success, message in axis.talk.control_outcomes()] == [
-            (True, 'switch on disabled')]
+            (True, State.SWITCH_ON_DISABLED.value)]
 
     def test_one_that_takes_longer_than_people_wait(self) -> None:
         axis = Axis(control_timeout=0.5).enabled()
@@ -183,7 +187,7 @@ class TestQuickStop:
             axis.drive.objects[0x606C, 0] = bytes(4)
         axis.live(0.1)
         assert axis.talk.control_outcomes() == [
-            ('quick_stop', True, says('quick_stop_holds', state='quick stop active'))]
+            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
         axis.live(5.0)
         assert axis.words() == ['0200']
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
@@ -219,7 +223,7 @@ class TestQuickStop:
 
     def test_of_a_drive_that_is_not_enabled(self) -> None:
         axis = Axis().online()
-        assert axis.asks(QUICK_STOP) == [('quick_stop', True, 'ready to switch on')]
+        assert axis.asks(QUICK_STOP) == [('quick_stop', True, State.READY_TO_SWITCH_ON.value)]
         assert axis.words() == ['0600']
 
     def test_one_that_the_drive_began_by_itself(self) -> None:

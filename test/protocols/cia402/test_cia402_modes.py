@@ -12,6 +12,10 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
+from drive_can_bridge.protocols.cia402.states import State
+
+#: how far it is with homing while it moves
+AWAY = 'on its way'
 
 
 class PositionDrive(ServoDrive):
@@ -217,7 +221,7 @@ class TestHoming:
         assert drive.number(0x6060) == number
         drive.homing = -1
         assert home(axis, 1.5) == [('home', False, says(
-            'homing_timed_out', timeout=1.0, step='on its way'))]
+            'homing_timed_out', timeout=1.0, step=AWAY))]
         assert drive.number(0x6060) == number
         assert drive.state == drive.ENABLED
 
@@ -226,8 +230,8 @@ class TestHoming:
         drive.homing = -1
         home(axis, 0.2)
         outcomes = axis.asks(ControlAction.DISABLE, 0.5)
-        assert ('home', False, says('homing_stopped', step='on its way')) in outcomes
-        assert ('disable', True, 'ready to switch on') in outcomes
+        assert ('home', False, says('homing_stopped', step=AWAY)) in outcomes
+        assert ('disable', True, State.READY_TO_SWITCH_ON.value) in outcomes
         assert drive.number(0x6060) == number
         assert axis.session.busy == ''
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]

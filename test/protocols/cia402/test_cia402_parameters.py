@@ -5,6 +5,7 @@ from typing import Any
 
 from builders import parameter, read, RO, text_of, WO, write
 import pytest
+from saying import says
 from servo_builders import Axis, TABLE
 
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -66,22 +67,22 @@ def test_raw_names_take_the_width_that_the_device_answers(axis: Axis) -> None:
     assert outcomes(axis, write((raw('x2006.0', axis), -1))) == ['written']
     assert '605#2F062000FF000000' in axis.take()
     assert outcomes(axis, write((raw('x2006.0', axis), 300))) == [
-        '300 is not representable in 8 bits: -128 to 255']
+        says('not_in_bits', value=300, bits=8, low=-128, high=255)]
 
 
 def test_refusals_in_words(axis: Axis) -> None:
     axis.drive.fixed = {(0x2003, 0): 0x06090031}
     assert outcomes(axis, write((WORD, 5))) == [
-        'refused by the drive: 06090031h (value too high)']
+        says('refused_by_drive', number=0x06090031)]
     del axis.drive.objects[0x2001, 1]
     assert outcomes(axis, read(BYTE)) == [
-        'refused by the drive: 06020000h (no such register or object)']
+        says('refused_by_drive', number=0x06020000)]
 
 
 def test_another_length_than_the_profile_says(axis: Axis) -> None:
     axis.drive.objects[0x2003, 0] = b'\5'
     assert outcomes(axis, read(WORD)) == [
-        'the drive answers with 1 byte, the profile says int16']
+        says('other_length', length=1, listed='int16')]
 
 
 def test_what_can_only_be_written_has_to_be_listed(axis: Axis) -> None:
@@ -104,7 +105,7 @@ def test_texts_are_no_numbers(axis: Axis) -> None:
     sdo = axis.drive._sdo
     axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
         answers.get(data.hex(), sdo(data).hex()))
-    assert outcomes(axis, read(NAME)) == ['8 bytes: only objects of 1 to 4 bytes are numbers']
+    assert outcomes(axis, read(NAME)) == [says('too_long', length=8)]
     sent = axis.take()
     at = sent.index('605#4008100000000000')
     assert [text for text in sent[at:] if text.startswith('605#')][:3] == [
@@ -120,7 +121,7 @@ def test_what_is_longer_than_four_bytes_is_not_written(axis: Axis) -> None:
     axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
         answers.get(data.hex(), sdo(data).hex()))
     assert outcomes(axis, write((raw('x2008.0', axis), 1))) == [
-        '8 bytes: only objects of 1 to 4 bytes are numbers']
+        says('too_long', length=8)]
     assert not [text for text in axis.take() if text.startswith('605#2')]
 
 
@@ -137,8 +138,9 @@ def test_a_drive_that_gives_up_in_the_middle_of_its_segments(axis: Axis) -> None
 
 
 def test_together_or_not_at_all(axis: Axis) -> None:
-    assert all('an SDO carries one object' in str(why) for why in outcomes(
-        axis, write((BYTE, 1), (WORD, 1), atomic=True)))
+    fits = 'an SDO carries one object'
+    assert outcomes(axis, write((BYTE, 1), (WORD, 1), atomic=True)) == [
+        says('not_in_one_frame', fits=fits)] * 2
 
 
 def test_parameters_of_a_drive_that_differs(axis: Axis) -> None:

@@ -10,6 +10,8 @@ from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import MappingDiffered, Noted
 from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.protocols.canopen.abort_codes import describe
+from drive_can_bridge.protocols.cia402.states import State
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)
 #: COB-ID, type and mapping as the bridge writes them for csv with the position
@@ -78,8 +80,7 @@ class TestConfigure:
         axis = Axis()
         axis.drive.fixed = {(0x1600, 1): 0x06040041}
         axis.start()
-        assert differs(axis) == ('1600h.01h refused by the drive: 06040041h (object cannot be '
-                                 'mapped to a PDO)')
+        assert differs(axis) == says('object_refused', what='1600h.01h', why=describe(0x06040041))
         axis.drive.fixed.clear()
         axis.live(1.1)
         assert axis.session.online      # looked at again
@@ -120,7 +121,7 @@ class TestConfigure:
         assert '00180332000000' in written(axis)
         said = notes(axis)
         assert [text for text in said if '1800h.03h' in text] == [
-            '1800h.03h refused by the drive: 06010002h (write to a read-only object)']
+            says('object_refused', what='1800h.03h', why=describe(0x06010002))]
         axis.live(5.0)      # this drive sends nothing by itself: it is set up again and again
         assert written(axis).count('00180332000000') > 1
         assert not [text for text in notes(axis) if '1800h.03h' in text]
@@ -149,7 +150,7 @@ class TestFaultReaction:
         told = axis.take()
         assert told.count('605#4041600000000000') > 10
         assert not [text for text in told if text.startswith(('000#', '605#2', '205#', '080#'))]
-        assert notes(axis) == [says('found_braking', state='fault reaction active')]
+        assert notes(axis) == [says('found_braking', state=State.FAULT_REACTION.value)]
         axis.drive.state = axis.drive.FAULT
         axis.drive.objects[0x6041, 0] = self.FAULT
         axis.live(0.5)
@@ -234,7 +235,8 @@ class TestMode:
         axis.drive.fixed = {(0x60C2, 1): 0x06090032}
         axis.start()
         assert axis.session.online
-        assert notes(axis) == ['60C2h.01h refused by the drive: 06090032h (value too low)']
+        assert notes(axis) == [
+            says('object_refused', what='60C2h.01h', why=describe(0x06090032))]
 
     def test_a_period_that_it_cannot_say(self) -> None:
         axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=1 / 300)
@@ -310,7 +312,7 @@ class TestNoNmt:
         axis.drive.operational = True
         axis.start()
         axis.live(0.5)
-        assert 'not known to be pre-operational' in differs(axis)
+        assert differs(axis) == says('not_pre_operational')
         axis = Axis(nmt_start=False)
         axis.start()
         assert '00140105020000' in written(axis)

@@ -4,6 +4,7 @@
 from typing import Any
 
 from builders import Conversation, drive
+from saying import says
 
 ZEROS = '0000000000000000'
 ASK_REQUEST_MAP = f'002007A4#{ZEROS}'
@@ -14,6 +15,8 @@ NEUTRAL = f'003FFFF0#{ZEROS}'
 #: 100.0 rpm, 2.50 A, ready
 ANSWER = '103FFFF0#03E800FA00010000'
 
+#: why a drive is lost that three cycles were sent to
+SILENT = says('silent_for_cycles', cycles=3, what='no cyclic response')
 #: more than what sums of periods are wrong by
 TICK = 1e-6
 

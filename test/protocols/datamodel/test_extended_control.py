@@ -8,7 +8,7 @@ from builders import (
     read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
-    ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, TICK, ZEROS,
+    ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, SILENT, TICK, ZEROS,
 )
 import pytest
 from saying import says, status_word
@@ -18,7 +18,6 @@ from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
-MAY_RUN = 'it may still be running'
 
 READY, ENABLED, FAULT = (
     ANSWER, '103FFFF0#03E800FA00030000', '103FFFF0#03E800FA00080000')
@@ -197,8 +196,7 @@ def test_loss_puts_the_word_back() -> None:
         running, running, running, NEUTRAL]
     talk.hears(ENABLED, 10.121)
     assert exchange(talk, 10.14, ENABLED) == NEUTRAL
-    assert any('enable withdrawn: no cyclic response' in note.text
-               for note in talk.events(Noted))
+    assert says('enable_withdrawn', reason=SILENT) in [note.text for note in talk.events(Noted)]
 
 
 def test_a_stop_that_was_wanted_is_no_warning() -> None:
@@ -209,7 +207,7 @@ def test_a_stop_that_was_wanted_is_no_warning() -> None:
     talk.events()
     talk.deactivate(10.05)
     note, = talk.events(Noted)
-    assert note.text.startswith('enable withdrawn: bridge inactive')
+    assert note.text == says('enable_withdrawn', reason=says('bridge_inactive'))
     assert not note.warning
 
 
@@ -222,7 +220,7 @@ def test_time_out_of_a_request() -> None:
     assert talk.until(10.054) == []
     (action, success, text), = talk.control_outcomes()
     assert (action, success) == ('enable', False)
-    assert text.startswith('no confirmation in 0.05 s: stuck in state ready')
+    assert text == says('stuck', timeout=0.05, state='ready')
     assert exchange(talk, 10.06, READY) == NEUTRAL
 
 
@@ -415,8 +413,7 @@ def test_loss_writes_disable() -> None:
     # disable at once when it is lost, and read back
     assert [text for _, text in found if text != ASK_WORD] == (
         [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
-    assert talk.events(StationLost) == [StationLost(says(
-        'silent_for_cycles', cycles=3, what='no cyclic response'))]
+    assert talk.events(StationLost) == [StationLost(SILENT)]
 
 
 @pytest.mark.parametrize('mapping', ['assume', 'verify'])
@@ -431,7 +428,8 @@ def test_enabled_drive_that_is_deaf_to_disable(mapping: str) -> None:
     talk.deactivate(10.3)
     talk.until(11.0)
     assert talk.session.stopped
-    assert [note.text for note in talk.events(Noted) if note.warning][-1].endswith(MAY_RUN)
+    assert [note.text for note in talk.events(Noted) if note.warning][-1] == says(
+        'may_still_be_running')
 
 
 def test_enabled_drive_that_hears_disable() -> None:
@@ -444,7 +442,7 @@ def test_enabled_drive_that_hears_disable() -> None:
     assert not talk.session.online
     talk.deactivate(10.3)
     talk.until(11.0)
-    assert not any(note.text.endswith(MAY_RUN) for note in talk.events(Noted))
+    assert says('may_still_be_running') not in [note.text for note in talk.events(Noted)]
 
 
 def test_differing_map_writes_disable() -> None:
@@ -465,7 +463,7 @@ def test_drive_that_reports_nothing() -> None:
     talk.until(10.02)
     (action, success, text), = talk.control_outcomes()
     assert (action, success) == ('enable', True)
-    assert 'does not report' in text
+    assert text == says('state_not_reported')
 
 
 def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:

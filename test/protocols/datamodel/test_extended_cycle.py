@@ -8,7 +8,7 @@ from builders import (
 )
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, exchange, NEUTRAL, online,
-    REQUEST_MAP, RESPONSE_MAP, TICK, ZEROS,
+    REQUEST_MAP, RESPONSE_MAP, SILENT, TICK, ZEROS,
 )
 import pytest
 from saying import says
@@ -146,11 +146,12 @@ def test_short_response_that_holds_everything(data: str, raws: tuple[int, ...]) 
     ('03E8', (1000,)),
 ])
 def test_response_too_short_publishes_only_what_arrived(data: str, raws: tuple[int, ...]) -> None:
+    what = f'{len(data) // 2} data bytes, 6 needed'
     talk = online()
     talk.at(10.02)
     talk.hears(f'103FFFF0#{data}', 10.021)
     assert talk.events() == [
-        FrameRejected(f'cyclic response with {len(data) // 2} data bytes, 6 needed'),
+        FrameRejected(says('bad_cyclic_response', what=what)),
         ProcessDataReceived(raws, 10.021)]
     assert talk.session.statistics.rejected == 1
     assert talk.session.statistics.short == 0
@@ -160,11 +161,12 @@ def test_response_too_short_publishes_only_what_arrived(data: str, raws: tuple[i
 
 @pytest.mark.parametrize('data', ['', 'FF'])
 def test_response_without_a_whole_word_is_none(data: str) -> None:
+    what = f'{len(data) // 2} data bytes, 6 needed'
     talk = online()
     talk.at(10.02)
     talk.hears(f'103FFFF0#{data}', 10.021)
     assert talk.events() == [
-        FrameRejected(f'cyclic response with {len(data) // 2} data bytes, 6 needed')]
+        FrameRejected(says('bad_cyclic_response', what=what))]
     talk.hears(ANSWER, 10.022)  # the real one may still come
     assert talk.samples() == [(1000, 250, 1)]
     talk.at(10.04)
@@ -175,11 +177,12 @@ def test_response_without_a_whole_word_is_none(data: str) -> None:
 
 @pytest.mark.parametrize('data', ['03E800FA00017F', '03E8', ''])
 def test_strict_policy_takes_eight_bytes_only(data: str) -> None:
+    what = f'{len(data) // 2} data bytes instead of 8'
     talk = online(length_policy='strict')
     talk.at(10.02)
     talk.hears(f'103FFFF0#{data}', 10.021)
     assert talk.events() == [
-        FrameRejected(f'cyclic response with {len(data) // 2} data bytes instead of 8')]
+        FrameRejected(says('bad_cyclic_response', what=what))]
     talk.at(10.04)
     assert talk.session.statistics.missed == 1
     assert talk.session.statistics.short == 0
@@ -246,7 +249,7 @@ def test_second_master_is_noticed(text: str) -> None:
     talk = online()
     assert talk.hears(text, 10.003) == []
     assert talk.events() == [ForeignMasterSeen(
-        f'another master sends requests to station 1: {text}')]
+        says('other_master_asks', station=1, frame=text))]
     assert talk.session.online
 
 
@@ -298,11 +301,9 @@ def test_offline_at_the_limit_three_neutral_cycles_then_silence() -> None:
     assert talk.session.statistics.missed == 2
 
     assert talk.until(10.08 + TICK) == [(10.08, NEUTRAL)]
-    assert talk.events() == [StationLost(says(
-        'silent_for_cycles', cycles=3, what='no cyclic response'))]
+    assert talk.events() == [StationLost(SILENT)]
     assert not talk.session.online
-    assert talk.session.offline_advice == says(
-        'silent_for_cycles', cycles=3, what='no cyclic response')
+    assert talk.session.offline_advice == SILENT
 
     assert talk.until(10.1421) == [
         (10.1, NEUTRAL), (10.12, NEUTRAL),
@@ -363,8 +364,8 @@ def test_limit(limit: int) -> None:
     assert talk.session.online
     talk.until(10.02 + 0.02 * limit + TICK)
     assert not talk.session.online
-    assert talk.events(StationLost) == [
-        StationLost(f'no cyclic response for {limit} cycles')]
+    (lost,) = talk.events(StationLost)
+    assert lost.reason == says('silent_for_cycles', cycles=limit)
 
 
 def test_misses_have_to_be_consecutive() -> None:

@@ -17,7 +17,7 @@ from extended_builders import (
     REQUEST_MAP, RESPONSE_MAP, TICK,
 )
 import pytest
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.drive_state import DriveState
@@ -29,7 +29,10 @@ SPEED_ZERO, LIMIT_ZERO = '00300321#0000000000000000', '00300331#0000000000000000
 ASK_SPEED, ASK_LIMIT = '00200321#0000000000000000', '00200331#0000000000000000'
 SPEED_IS_ZERO, LIMIT_IS_ZERO = '10200321#0000000000000000', '10200331#0000000000000000'
 ENABLED = '103FFFF0#03E800FA00030000'
-MAY_RUN = 'it may still be running'
+#: what is told of a stop that nobody has answered
+UNHEARD = may_run('stop_failed', what=[
+    says('write_unanswered', what='speed_setpoint (P50)'),
+    says('write_unanswered', what='torque_limit (P51)')])
 STOPPED_BY_NUMBER = [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
 
 
@@ -86,9 +89,7 @@ def test_stop_right_after_a_stall_that_nobody_confirms() -> None:
     talk.deactivate(12.0001)
     talk.until(12.0 + talk.session.longest_stop)
     assert talk.session.stopped
-    assert warnings(talk) == [
-        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-        f'{MAY_RUN}']
+    assert warnings(talk) == [UNHEARD]
 
 
 def test_drive_that_was_only_told_neutral_is_not_written_to_after_a_stall() -> None:
@@ -112,7 +113,7 @@ def test_stall_with_assumed_maps_needs_no_writes() -> None:
 def test_bus_that_comes_back_stops_the_drive_before_its_maps_are_read() -> None:
     talk = running()
     assert talk.bus_down(10.03) == []
-    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]
     assert talk.bus_up(12.0) == [SPEED_ZERO]
     assert [text for _, text in talk.until(12.002)] == [LIMIT_ZERO, ASK_SPEED]
     assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
@@ -145,13 +146,11 @@ def test_stop_while_nobody_answers_after_the_bus_came_back() -> None:
     talk.bus_down(10.03)
     talk.bus_up(12.0)
     talk.until(12.35)
-    assert warnings(talk)[-1].endswith(MAY_RUN)
+    assert warnings(talk)[-1] == says('may_still_be_running')
     assert talk.deactivate(12.4) == [SPEED_ZERO]    # still owed
     talk.until(14.0)
     assert talk.session.stopped
-    assert warnings(talk) == [
-        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-        f'{MAY_RUN}']
+    assert warnings(talk) == [UNHEARD]
 
 
 def test_end_while_the_bus_is_lost() -> None:
@@ -160,7 +159,7 @@ def test_end_while_the_bus_is_lost() -> None:
     talk.events()
     assert talk.deactivate(10.1) == []
     assert talk.session.stopped
-    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('stop_not_possible')]
 
 
 def test_bus_that_goes_during_the_stop() -> None:
@@ -170,7 +169,7 @@ def test_bus_that_goes_during_the_stop() -> None:
     talk.events()
     talk.bus_down(12.0002)
     assert talk.session.stopped
-    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]
 
 
 # -- the maps differ ------------------------------------------------------------------------------
@@ -256,7 +255,7 @@ def test_response_map_that_differs_and_a_drive_that_falls_silent() -> None:
     talk = neutral_cycles_without_an_answer()
     assert warnings(talk) == []
     talk.bus_down(11.9)
-    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]
 
 
 def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
@@ -416,7 +415,7 @@ def test_end_while_a_drive_that_ran_is_lost() -> None:
     sent += [text for _, text in talk.until(13.0)]
     assert SPEED_ZERO in sent and LIMIT_ZERO in sent    # no map can misroute these
     assert talk.session.stopped
-    assert warnings(talk)[-1].endswith(MAY_RUN)
+    assert warnings(talk)[-1] == says('may_still_be_running')
 
 
 def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:
@@ -427,7 +426,7 @@ def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:
     assert not talk.session.stopped
     talk.until(12.0)
     assert talk.session.stopped
-    assert warnings(talk)[-1].endswith(MAY_RUN)
+    assert warnings(talk)[-1] == says('may_still_be_running')
 
 
 # -- frames that the bus refuses ------------------------------------------------------------------
@@ -445,7 +444,7 @@ def test_stop_frames_that_are_refused_are_no_stop() -> None:
     assert not talk.session.stopped
     talk.session.give_up(11.0)
     assert talk.session.stopped
-    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('stop_not_possible')]
 
 
 def test_stop_goes_on_until_three_frames_were_taken() -> None:
@@ -585,8 +584,6 @@ def test_cycling_that_begins_again_makes_writes_needless() -> None:
 
 # -- the drive falls silent -----------------------------------------------------------------------
 
-UNHEARD = ('told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-           f'{MAY_RUN}')
 
 
 def left_alone() -> Conversation:

@@ -11,7 +11,7 @@ from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, cycling, exchange, NEUTRAL, online, TICK,
 )
 import pytest
-from saying import says
+from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
@@ -274,9 +274,11 @@ def test_disable_that_the_drive_does_not_have_is_written_again() -> None:
     assert warnings(talk) == []
 
 
-@pytest.mark.parametrize('answer, text', [
-    ('', 'no answer'), ('10200341#0001000000000000', 'read back 1 instead of 0')])
-def test_disable_that_is_not_confirmed_is_told(answer: str, text: str) -> None:
+@pytest.mark.parametrize('answer, why', [
+    ('', says('write_unanswered', what='control_word (P52)')),
+    ('10200341#0001000000000000',
+     says('write_read_back', what='control_word (P52)', found=1, wanted=0))])
+def test_disable_that_is_not_confirmed_is_told(answer: str, why: says) -> None:
     talk, now = written_word()
     sent = [(now, frame) for frame in talk.deactivate(now)]
     for step in range(1, 1000):
@@ -287,8 +289,7 @@ def test_disable_that_is_not_confirmed_is_told(answer: str, text: str) -> None:
     assert [frame for _, frame in sent if frame != NEUTRAL] == [DISABLE, ASK_WORD] * 3
     assert sent[-1][0] < now + 0.6
     silent(talk, now + 6.0)
-    assert warnings(talk) == [
-        f'told to stop, but control_word (P52): {text}: it may still be running']
+    assert warnings(talk) == [may_run('stop_failed', what=[why])]
 
 
 @pytest.mark.parametrize('period, gap', [(0.02, 0.02), (0.005, 0.02), (0.02, 0.1)])

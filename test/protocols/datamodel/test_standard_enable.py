@@ -3,10 +3,12 @@
 
 from builders import CONTROL, Conversation, drive, LIMIT, SPEED, WORD
 import pytest
+from saying import says
 from standard_builders import ANSWER, ASK
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.parameters import Parameter
 
 ENABLE = '3F1#0634000100000000'
@@ -60,7 +62,7 @@ class Enabled:
         before = len(self.line.log)
         self.line.live(self.talk.now + 3.0)
         assert ENABLE not in [text for _, text in self.line.log[before:]], self.line.log[before:]
-        assert any('no longer enabled' in str(event) for event in self.talk.events())
+        assert says('dropped_out_for_good') in [note.text for note in self.talk.events(Noted)]
 
 
 @pytest.mark.parametrize('phase', [0.001 * step for step in range(0, 560, 7)])

@@ -8,7 +8,7 @@ from builders import (
     RAMP, read, RO, SPEED, STATUS, TABLE, WORD, write,
 )
 import pytest
-from saying import says
+from saying import may_run, says
 from standard_builders import (
     ANSWER, ASK, LIMIT_ZERO, online, polling, round_of, SPEED_ZERO,
 )
@@ -130,7 +130,7 @@ def test_a_silent_drive_is_asked_again_and_again_and_gets_nothing_else() -> None
     assert [when for when, _ in sent[:3]] == pytest.approx([10.2, 10.4, 10.6])
     assert talk.session.state is DriveState.OFFLINE
     assert talk.session.statistics.missed == 10
-    assert 'drive silent, wrong station' in talk.session.offline_advice
+    assert talk.session.offline_advice == says('reads_unanswered')
 
 
 def test_three_failed_rounds_are_the_end_of_online() -> None:
@@ -172,7 +172,10 @@ def test_it_comes_back_neutral() -> None:
 
 
 ASK_SPEED, ASK_LIMIT = '3F1#0332000100000000', '3F1#0333000100000000'
-MAY_RUN = 'it may still be running'
+#: what is told of a stop that nobody has answered
+UNHEARD = may_run('stop_failed', what=[
+    says('write_unanswered', what='speed_setpoint (P50)'),
+    says('write_unanswered', what='torque_limit (P51)')])
 
 
 def warnings(talk: Conversation) -> list[str]:
@@ -184,9 +187,7 @@ def test_a_lost_drive_is_told_three_times_to_stand_still() -> None:
     talk.commands(0, 150.0, 10.01)
     told = [text for _, text in talk.until(12.0) if text != ASK]
     assert told == ['3F1#063200DC05000000', *[SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3]
-    assert warnings(talk) == [
-        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-        f'{MAY_RUN}']
+    assert warnings(talk) == [UNHEARD]
 
 
 def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
@@ -441,8 +442,8 @@ def test_a_read_is_repeated_after_the_quarantine_only() -> None:
 def test_one_parameter_is_all_that_fits_a_frame() -> None:
     talk = online()
     assert talk.submits(write((GAIN, 1), (DAMPING, 2), atomic=True), 10.005) == []
-    assert talk.outcomes() == [[
-        says('not_in_one_frame', fits='one parameter fits')] * 2]
+    fits = 'one parameter fits'
+    assert talk.outcomes() == [[says('not_in_one_frame', fits=fits)] * 2]
     assert talk.submits(write((GAIN, 1), atomic=True), 10.005) == ['3F1#0628000100000000']
 
 
@@ -534,8 +535,8 @@ def test_a_stop_that_does_not_take_is_repeated_and_told() -> None:
             talk.hears('7F1#0000000000000000', now)
     assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED, ASK_LIMIT, *[SPEED_ZERO, ASK_SPEED] * 2]
     assert talk.session.stopped
-    assert warnings(talk) == [
-        f'told to stop, but speed_setpoint (P50): read back 1500 instead of 0: {MAY_RUN}']
+    assert warnings(talk) == [may_run('stop_failed', what=[
+        says('write_read_back', what='speed_setpoint (P50)', found=1500, wanted=0)])]
 
 
 def test_a_stop_that_nobody_answers_ends_and_is_told() -> None:
@@ -544,9 +545,7 @@ def test_a_stop_that_nobody_answers_ends_and_is_told() -> None:
     sent += [text for _, text in talk.until(10.03 + talk.session.longest_stop)]
     assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3
     assert talk.session.stopped
-    assert warnings(talk) == [
-        'told to stop, but speed_setpoint (P50): no answer; torque_limit (P51): no answer: '
-        f'{MAY_RUN}']
+    assert warnings(talk) == [UNHEARD]
 
 
 def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run() -> None:
@@ -560,7 +559,7 @@ def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run() -> None:
 def test_a_bus_that_comes_back_stops_what_was_running() -> None:
     talk = moving()
     assert talk.bus_down(10.03) == []
-    assert warnings(talk) == [f'the bus was lost before it could be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]
     assert talk.bus_up(12.0) == [SPEED_ZERO]
     assert [text for _, text in talk.until(12.0025)] == [LIMIT_ZERO, ASK_SPEED]
 
@@ -571,7 +570,7 @@ def test_the_end_while_the_bus_is_lost_is_told() -> None:
     talk.events()
     assert talk.deactivate(10.04) == []
     assert talk.session.stopped
-    assert warnings(talk) == [f'could not be told to stop: {MAY_RUN}']
+    assert warnings(talk) == [may_run('stop_not_possible')]
 
 
 def test_a_stop_while_the_stop_after_a_stall_is_under_way() -> None:

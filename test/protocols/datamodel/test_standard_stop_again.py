@@ -6,6 +6,7 @@ from dataclasses import replace
 from builders import (
     ACTUAL, CONTROL, Conversation, CURRENT, drive, GAIN, LIMIT, SPEED, STATUS, TABLE, WORD,
 )
+from saying import says
 from standard_builders import LIMIT_ZERO, SPEED_ZERO
 
 from drive_can_bridge.core.control import ControlAction
@@ -82,8 +83,8 @@ def test_a_drive_that_answers_a_part_of_its_round_is_told_again() -> None:
     assert [text for _, text in sent[place:place + 3]] == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
     assert not talk.session.duty.owed
     assert [note.text for note in talk.events(Noted)] == [CONFIRMED]
-    assert 'actual_speed (P209), motor_current (P210), status_word (P211)' in (
-        talk.session.offline_advice)
+    names = 'actual_speed (P209), motor_current (P210), status_word (P211)'
+    assert talk.session.offline_advice == says('one_read_unanswered', names=names)
 
 
 def test_one_that_is_back_right_after_the_stop_it_has_not_heard_is_told_at_once() -> None:
