@@ -161,15 +161,6 @@ class TestRefusals:
         assert asks(made, '9B 21 00 00 00 00 05 00') == '9B 11 00 00 00 00 05 00'
         assert made.wear == {'offset': 1}
 
-    def test_minimum_above_the_maximum(self) -> None:
-        made = inverter(table=(*TABLE, parameter('minimum_frequency', 104, maximum=400),
-                               parameter('maximum_frequency', 105, maximum=400)))
-        asks(made, '69 20 00 00 00 00 32 00')                # P105 = 50
-        assert asks(made, '68 20 00 00 00 00 33 00') == '68 70 00 00 00 00 02 00'
-        asks(made, '69 20 00 00 00 00 64 00')
-        assert asks(made, '68 20 00 00 00 00 33 00') == '68 10 00 00 00 00 33 00'
-        assert asks(made, '69 20 00 00 00 00 32 00') == '69 70 00 00 00 00 02 00'
-
     def test_spontaneous_bit(self) -> None:
         made = inverter()
         assert says(made, '2C8#6618000000000000') == []

@@ -189,17 +189,6 @@ class TestDrive:
         assert made.wear == {'ramp_time': 2, 'p122': 1, 'p123': 1}
         assert made.eeprom_writes == 4
 
-    def test_settings_whose_order_matters(self) -> None:
-        made = drive([*EXAMPLE, parameter('minimum_gain', 60, storage=RAM, maximum=100),
-                      parameter('maximum_gain', 61, storage=RAM, maximum=100)])
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 100)
-        ask(made, '003003D1#0032000000000000', 0.0)         # maximum 50
-        ask(made, '003003C1#003C000000000000', 0.0)         # minimum 60: not above the maximum
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 50)
-        ask(made, '003003D1#0050000000000000', 0.0)         # maximum 80
-        ask(made, '003003C1#003C000000000000', 0.0)
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (60, 80)
-
     def test_setting_that_needs_another_one_first(self) -> None:
         made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM, maximum=100)])
         before = made.value('gain')

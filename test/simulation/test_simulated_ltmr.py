@@ -366,17 +366,6 @@ class TestMailbox:
         made.fault('ok', 0.3)
         assert made.write(652, 50, 0.4) == ['485#8C02002A00000000']
 
-    def test_minimum_above_the_maximum(self) -> None:
-        parameters = {name: Parameter(name, number=number, maximum=100.0) for name, number in (
-            ('minimum_level', 20), ('maximum_level', 21))}
-        made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
-                    response=('minimum_level',))
-        made.write(21, 50, 0.1)
-        assert made.write(20, 60, 0.2) == ['485#1400004E36000906']
-        # both together are no question of order
-        assert made.ask('505#1400002B3C005000', 0.3) == ['485#1400002B00000000']
-        assert (made.read(20, 0.4), made.read(21, 0.4)) == (60, 80)
-
     def test_stuck_register_is_acknowledged_and_keeps_its_value(self) -> None:
         made = Ltmr()
         made.fault('stuck=flc1_ratio', 0.0)
@@ -606,23 +595,6 @@ class TestMotor:
         made.write(704, 8, 32.0 + wait)
         assert made.read(455, 32.0 + wait) == 0x0041
 
-    def test_cleared_thermal_level(self) -> None:
-        made = Ltmr()
-        made.write(652, 5, 0.0)
-        made.write(704, 1, 0.0)
-        made.until(30.0)
-        made.write(705, 1 << 2, 30.0)
-        assert made.read(465, 30.0) == 0
-        made.write(704, 8, 30.0)
-        assert made.read(455, 30.0) == 0x0041
-
-    def test_cleared_settings(self) -> None:
-        made = Ltmr()
-        made.write(652, 50, 0.0)
-        made.write(606, 20, 0.0)
-        made.write(705, 1 << 3, 0.1)
-        assert (made.read(652, 0.2), made.read(606, 0.2)) == (33, 5)
-
     def test_trip_class_is_the_time_at_six_times_the_full_load_current(self) -> None:
         starter = Ltmr().drive.plant.starter
         for trip_class in (5, 10, 30):
@@ -633,15 +605,6 @@ class TestMotor:
             # 100 = level * (1 - exp(-t / T))
             assert level * (1.0 - 2.718281828459045 ** (-trip_class / starter.time_constant)) \
                 == pytest.approx(100.0)
-
-    @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
-    def test_it_hardly_matters_how_often_time_passes(self, steps: list[float]) -> None:
-        coarse, fine = Ltmr().drive.plant.starter, Ltmr().drive.plant.starter
-        coarse.advance(sum(steps), on=True)
-        for step in steps:
-            fine.advance(step, on=True)
-        assert fine.thermal == pytest.approx(coarse.thermal, abs=0.5)
-        assert fine.current == pytest.approx(coarse.current, abs=1e-6)
 
     def test_a_trip_opens_the_contactor(self) -> None:
         starter = Ltmr().drive.plant.starter
