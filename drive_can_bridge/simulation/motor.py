@@ -77,7 +77,7 @@ class Travel:
     slope: float = 0.0
 
     def run(self, duration: float, target: float, rates: Rates) -> None:
-        """Go towards a speed for some time; the slope is that of the last instant if it is none."""
+        """Go towards a speed for some time; in no time the slope stays."""
         if duration <= 0.0:
             return
         way = self.slope = 0.0

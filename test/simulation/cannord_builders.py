@@ -72,10 +72,10 @@ def tells(made: SimulatedCannordInverter, data: str, now: float = 0.0) -> str:
 
 
 def asks(made: SimulatedCannordInverter, data: str, now: float = 0.0) -> str:
-    """Send a parameter task to address 100, with spaces; return the data of the answer."""
+    """Send a parameter task to address 100; return the data of the answer."""
     answer, = says(made, f'2C8#{data}', now)
     assert answer.startswith('2C9#')
-    return bytes.fromhex(answer[4:]).hex(' ').upper()
+    return answer[4:]
 
 
 def run(made: SimulatedCannordInverter, now: float = 0.0) -> None:
