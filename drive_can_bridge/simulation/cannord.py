@@ -41,7 +41,6 @@ from drive_can_bridge.simulation.registers import (
 INVALID_TASK, CANNOT_BE_REPRESENTED = 201, 202
 
 _NEGATIVE = 0xFFFF
-_LIMITS = (Refusal.OUT_OF_RANGE, Refusal.CROSSED)
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
     1 << STATUS_BITS[name] for name in (
         'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
@@ -204,7 +203,7 @@ class CannordTable:
         raw = low - 0x10000 if high and not double else parameter.raw_from_word(value)
         refusal = self._registers.refusal({parameter.name: raw})
         if refusal is not None:
-            raise Refused(LIMIT_EXCEEDED if refusal in _LIMITS else CANNOT_BE_CHANGED)
+            raise Refused(LIMIT_EXCEEDED if refusal is Refusal.OUT_OF_RANGE else CANNOT_BE_CHANGED)
         self._registers.write(parameter.name, raw, keep=eeprom, wear=int(eeprom))
 
 
@@ -222,33 +221,26 @@ class InverterPlant(MotorPlant):
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
-        # entries of the sets 2 to 4, by name: the motor knows set 1 and what stands in for it
-        self._of_sets = {
-            member.name: group.members[0] for group in groups_of(registers.parameters).values()
-            if group.sets for index, member in group.members.items() if index != 0}
-        super().__init__(
-            registers, configuration, mechanics, operation=Operation(_MACHINE),
-            movable={name: parameter for name, parameter in registers.parameters.items()
-                     if name not in self._of_sets})
-        moved = self.speed_setpoint
-        self._mover = moved if moved in configuration.cyclic_request else None
+        # the motor knows set 1 and what stands in for it
+        plain = {name: each for name, each in registers.parameters.items() if not each.subindex}
+        super().__init__(registers, configuration, mechanics, operation=Operation(_MACHINE),
+                         movable=plain)
+        self._first = {each.number: each for each in plain.values() if each.number is not None}
 
     def command(self, value: float) -> float:
         """Return what the last control word makes of the frequency setpoint."""
         operation, word = self.operation, self.operation.word
-        if self._mover is None:
-            return value
         if operation.state is State.SHUTDOWN:
             return 0.0
         if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
-            return self.motor.speed
+            return self.motor.shaft.speed
         if not word & states.ENABLE_SETPOINT:
             return 0.0
         # rotation right has priority
-        if word & states.ROTATE_LEFT and not word & states.ROTATE_RIGHT:
-            name = self._mover.name
-            raw = self.registers.clamped(name, -self.registers.plain(name))
-            return float(self._mover.value_from_raw(raw))
+        moved = self.speed_setpoint
+        if moved and word & states.ROTATE_LEFT and not word & states.ROTATE_RIGHT:
+            raw = self.registers.clamped(moved.name, -self.registers.plain(moved.name))
+            return float(moved.value_from_raw(raw))
         return value
 
     @property
@@ -260,14 +252,14 @@ class InverterPlant(MotorPlant):
             word |= (operation.word & _OFF) << _OFF_SHIFT
         if motor.temperature > WARNING_TEMPERATURE:
             word |= WARNING
-        if motor.speed == target:
+        if motor.shaft.speed == target:
             word |= SETPOINT_REACHED
         # at standstill the manuals' examples show "right"
-        return word | (ROTATING_LEFT if motor.speed < 0.0 else ROTATING_RIGHT)
+        return word | (ROTATING_LEFT if motor.shaft.speed < 0.0 else ROTATING_RIGHT)
 
     def initial(self, parameter: Parameter) -> int:
         """Return what a new inverter has in a register: the same in all parameter sets."""
-        first = self._of_sets.get(parameter.name, parameter)
+        first = self._first.get(parameter.number or 0, parameter)
         return IDENTITY.get(parameter.number or 0) or super().initial(first)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
@@ -277,7 +269,7 @@ class InverterPlant(MotorPlant):
         if moved is None:
             return lambda: 0
         own, its = parameter.type.raw_range, moved.type.raw_range
-        return lambda: clamp(nearest_raw(moved, motor.speed, its), own)
+        return lambda: clamp(nearest_raw(moved, motor.shaft.speed, its), own)
 
 
 class SimulatedCannordInverter(SimulatedDrive):

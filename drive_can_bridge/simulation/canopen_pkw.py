@@ -46,7 +46,7 @@ CONTROLLER_CURRENT = 27.0
 LOAD_CURRENT = 6.3
 INRUSH_CURRENT = 45.0
 #: s
-INRUSH_TIME_CONSTANT = 0.4
+INRUSH_TIME = 0.4
 START_TIME = 2.0
 #: the motor may carry this share of its full load current for ever
 SERVICE_FACTOR = 1.1
@@ -54,8 +54,6 @@ SERVICE_FACTOR = 1.1
 CLASS_FACTOR = -1.0 / math.log1p(-(SERVICE_FACTOR / 6.0) ** 2)
 #: % of the thermal capacity
 TRIP_LEVEL, ALARM_LEVEL, RESET_LEVEL = 100.0, 85.0, 75.0
-#: longest step of the thermal image, s
-STEP = 0.05
 
 #: trip codes
 THERMAL_OVERLOAD, TEST_TRIP = 4, 10
@@ -76,19 +74,16 @@ TRIP_CLASS = 606
 FULL_LOAD_RATIO = 652
 NODE_ADDRESS = 696
 CONTROL_REGISTER_1 = 704
-CONTROL_REGISTER_2 = 705
 STATUS_1 = 455
 
 #: bit of the general configuration register: settings can be changed
 CONFIGURATION_MODE = 1 << 0
-#: bits of control register 2
-CLEAR_ALL, CLEAR_THERMAL_LEVEL, CLEAR_SETTINGS = 1 << 0, 1 << 2, 1 << 3
 
 #: registers that are written in configuration mode only
 SETTINGS = {*range(540, 700)} - {GENERAL_CONFIGURATION}
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
-            682: 0, 695: 0, CONTROL_REGISTER_1: 0, CONTROL_REGISTER_2: 0}
+            682: 0, 695: 0, CONTROL_REGISTER_1: 0, 705: 0}
 #: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; its
 #: commercial reference, two characters a register
 IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
@@ -110,37 +105,31 @@ JUNK = (0x5A5A, 0x5A5A)
 
 class Starter:
     """
-    The motor behind the contactor: currents and thermal image.
+    The motor behind the contactor: currents, and a thermal image that trips.
 
-    Not a model of any real controller: an induction motor switched on directly, with an inrush
-    current, a load current and a thermal image that trips. Time is an argument.
+    Not a model of any real controller. Time is an argument.
 
     :ivar thermal: % of the thermal capacity.
     :ivar full_load_current: A.
     :ivar time_constant: s, of the thermal image.
+    :ivar on_for: s since it was switched on; infinity: it is off.
     """
 
     def __init__(self) -> None:
         self.thermal = 0.0
+        self.on_for = math.inf
         self.settings(100.0, 5.0)
-        self._on_for: float | None = None
 
     @property
     def current(self) -> float:
         """Mean current of the phases, in A."""
-        if self._on_for is None:
+        if self.on_for == math.inf:
             return 0.0
-        inrush = INRUSH_CURRENT - LOAD_CURRENT
-        return LOAD_CURRENT + inrush * math.exp(-self._on_for / INRUSH_TIME_CONSTANT)
+        return INRUSH_CURRENT if self.on_for < INRUSH_TIME else LOAD_CURRENT
 
     @property
     def ratio(self) -> float:
         return self.current / self.full_load_current
-
-    @property
-    def starting(self) -> bool:
-        """The motor was switched on a moment ago."""
-        return self._on_for is not None and self._on_for < START_TIME
 
     @property
     def alarm(self) -> bool:
@@ -173,18 +162,14 @@ class Starter:
         :param on: the contactor is closed.
         :return: the thermal capacity is used up, which has opened it.
         """
-        self._on_for = (self._on_for or 0.0) if on else None
-        steps = max(math.ceil(duration / STEP), 1)
-        for _ in range(min(steps, 10_000)):
-            step = duration / steps
-            if self._on_for is not None:
-                self._on_for += step
-            self.thermal += (self._final_level - self.thermal) * -math.expm1(
-                -step / self.time_constant)
-            if self._on_for is not None and self.thermal >= TRIP_LEVEL:
-                self._on_for = None
-                return True
-        return False
+        before = 0.0 if self.on_for == math.inf else self.on_for
+        self.on_for = before + duration if on else math.inf
+        self.thermal += (self._final_level - self.thermal) * -math.expm1(
+            -duration / self.time_constant)
+        tripped = on and self.thermal >= TRIP_LEVEL
+        if tripped:
+            self.on_for = math.inf
+        return tripped
 
     @property
     def _final_level(self) -> float:
@@ -358,15 +343,6 @@ class StarterPlant(Plant):
     def written(self, name: str, before: int, raw: int) -> None:
         if name == self._by_register[CONTROL_REGISTER_1]:
             self.operation.word_written(raw)
-        elif name == self._by_register.get(CONTROL_REGISTER_2):
-            appeared = raw & ~before
-            if appeared & (CLEAR_ALL | CLEAR_THERMAL_LEVEL):
-                self.starter.thermal = 0.0
-                self.operation.end_cause()
-            if appeared & (CLEAR_ALL | CLEAR_SETTINGS):
-                for register in (TRIP_CLASS, FULL_LOAD_RATIO, 653):
-                    if register in self._by_register:
-                        self.registers.reset(self._by_register[register])
 
     def _content(self, register: int) -> int:
         name = self._by_register.get(register)
@@ -393,7 +369,8 @@ class StarterPlant(Plant):
     def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""
         starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
-        found: dict[int | None, Figure] = {
+        power = math.sqrt(3.0) * MAINS_VOLTAGE / 100.0
+        return {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
             451: code,
             452: lambda: _bit_of(int(code())),
@@ -405,6 +382,9 @@ class StarterPlant(Plant):
             474: lambda: 100.0 * MAINS_FREQUENCY,
             475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
             481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
+            # active and reactive power, in 0.1 kW
+            482: lambda: power * POWER_FACTOR * starter.current,
+            483: lambda: power * math.sqrt(1.0 - POWER_FACTOR ** 2) * starter.current,
             511: lambda: min(starter.time_to_trip, NEVER),
             NODE_ADDRESS: lambda: self._node,
             # no trips and alarms of these groups, no inputs, nothing to ground
@@ -412,19 +392,12 @@ class StarterPlant(Plant):
             # outputs: one for each direction
             **dict.fromkeys((458, 459), lambda: (
                 1 << bool(self.operation.word & RUN_REVERSE) if self.operation.enabled else 0)),
+            # the average and the three phases, in % of the full load current, in V, in 0.01 A
+            **dict.fromkeys(range(466, 470), lambda: 100.0 * starter.ratio),
+            **dict.fromkeys(range(476, 480), lambda: (
+                MAINS_VOLTAGE * (1.0 + mains_swing(self.operation.now)))),
+            **dict.fromkeys((500, 502, 504, 506), lambda: 100.0 * starter.current),
         }
-        # active and reactive power, in 0.1 kW
-        for register, share in ((482, POWER_FACTOR), (483, math.sqrt(1.0 - POWER_FACTOR ** 2))):
-            found[register] = _scaled(math.sqrt(3.0) * MAINS_VOLTAGE * share / 100.0,
-                                      lambda: starter.current)
-        # the average and the three phases, in % of the full load current, in 0.01 A, in V
-        for place, share in enumerate((1.0, 1.01, 0.99, 1.0)):
-            found[466 + place] = _scaled(100.0 * share, lambda: starter.ratio)
-            found[500 + 2 * place] = _scaled(100.0 * share, lambda: starter.current)
-        for place, share in enumerate((1.0, 0.998, 1.002, 1.0)):
-            found[476 + place] = _scaled(MAINS_VOLTAGE * share,
-                                         lambda: 1.0 + mains_swing(self.operation.now))
-        return found
 
     def _status(self) -> int:
         operation, ratio = self.operation, self.starter.ratio
@@ -432,11 +405,8 @@ class StarterPlant(Plant):
         bits = (not faulted, operation.enabled, faulted, self.starter.alarm, faulted,
                 faulted and operation.reset_allowed, True, ratio > 0.1)
         word = sum(1 << number for number, wanted in enumerate(bits) if wanted)
-        return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | self.starter.starting << 15
-
-
-def _scaled(factor: float, figure: Figure) -> Figure:
-    return lambda: factor * figure()
+        return word | min(math.floor(32.0 * ratio + 0.5), 63) << 8 | (
+            self.starter.on_for < START_TIME) << 15
 
 
 def _bit_of(code: int) -> int:

@@ -254,7 +254,7 @@ class ServoPlant:
         self.operation: Operation = self.machine
         self.habits = Habits()
         self.shaft = Travel(BEGINNING)
-        self.motor = Motor(RATED_SPEED, 1.0, mechanics.load, self.shaft)
+        self.motor = Motor(RATED_SPEED, mechanics.load, self.shaft)
         self._zero = 0.0
         self._begin()
 

@@ -6,8 +6,8 @@ What no rule knows is plain memory; docs/simulation.md has the rules as a table.
 
 One setpoint moves the shaft: the first speed or position in the cyclic request, or else the first
 speed of the profile, or else the first position. Speeds and positions of the other kind are those
-of the shaft then. Any other pair of setpoint and actual value follows on its own, from 0 to its
-largest setpoint in a second.
+of the shaft then. Any other setpoint that has an actual value is followed on its own, from 0 to
+the largest in a second.
 
 A position goes to its setpoint with finite speed and acceleration. Without torque it rolls to a
 standstill, or sinks under its load.
@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 from functools import partial
 import math
 import random
-from typing import NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
@@ -78,7 +77,9 @@ class Travel:
     slope: float = 0.0
 
     def run(self, duration: float, target: float, rates: Rates) -> None:
-        """Go towards a speed for some time."""
+        """Go towards a speed for some time; in no time the slope stays."""
+        if duration <= 0.0:
+            return
         way = self.slope = 0.0
         while duration > 0.0 and self.speed != target:
             before, goal = self.speed, target if self.speed * target >= 0.0 else 0.0
@@ -91,7 +92,7 @@ class Travel:
                 self.speed += self.slope * duration
             way += (before + self.speed) / 2.0 * needed
             duration -= needed
-        self.position += way + self.speed * max(duration, 0.0)
+        self.position += way + self.speed * duration
 
     def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
         """Go towards a position for some time, as fast as possible and without overshoot."""
@@ -129,7 +130,6 @@ class Motor:
     Torque, current and temperature of a motor.
 
     :param rated_speed: in whatever unit its shaft moves.
-    :param revolutions: revolutions per unit of its way.
     :param load: share of the rated torque that a weight takes.
     :ivar torque: share of the rated torque, with sign.
     :ivar current: share of the rated current, a magnitude.
@@ -137,7 +137,6 @@ class Motor:
     """
 
     rated_speed: float
-    revolutions: float
     load: float = 0.0
     shaft: Travel = field(default_factory=Travel)
     torque: float = 0.0
@@ -145,17 +144,7 @@ class Motor:
     temperature: float = AMBIENT_TEMPERATURE
 
     @property
-    def speed(self) -> float:
-        """Speed in the unit of the setpoint."""
-        return self.shaft.speed
-
-    @property
-    def position(self) -> float:
-        """Revolutions since power was applied first."""
-        return self.shaft.position * self.revolutions
-
-    @property
-    def share_of_rated_speed(self) -> float:
+    def share(self) -> float:
         """Speed as a share of the rated one, with sign."""
         return self.shaft.speed / self.rated_speed
 
@@ -165,98 +154,13 @@ class Motor:
         goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
         self.temperature += (goal - self.temperature) * -math.expm1(
             -duration / TEMPERATURE_TIME_CONSTANT)
-        if not energised:
-            self.torque = self.current = 0.0
-            return
-        speed = self.share_of_rated_speed
-        friction = math.copysign(FRICTION_TORQUE, speed) if speed else 0.0
-        torque = (LOAD_TORQUE * speed + friction + self.load
-                  + INERTIA_TORQUE * self.shaft.slope / self.rated_speed)
-        self.torque = min(max(torque, -torque_max), torque_max)
-        self.current = math.hypot(MAGNETISING_CURRENT, self.torque)
-
-
-class Bounds:
-    """
-    The limits of one motor.
-
-    A motor that lacks torque speeds up more slowly than its ramp says, does not get to its speed,
-    and brakes hardly faster than it runs down. Like all of the motor, that is no model of a real
-    one.
-
-    :param parameters: those that may limit it.
-    :param moved: the setpoint that moves it.
-    """
-
-    def __init__(self, registers: Registers, parameters: Mapping[str, Parameter],
-                 moved: Parameter | None) -> None:
-        self._registers = registers
-        self._found = {
-            parameter.name: (parameter, quantity)
-            for parameter, quantity in quantities.limits(parameters)
-            if parameter is not moved and (
-                moved and parameter.unit == moved.unit if quantity is Quantity.SPEED
-                else quantities.measures(parameter.unit, quantity))}
-
-    def initial(self, name: str, rated_speed: float) -> float | None:
-        """Return what a new drive has in a limit of which its profile says nothing."""
-        parameter, quantity = self._found.get(name, (None, Quantity.SPEED))
-        if parameter is None or parameter.neutral is not None or parameter.maximum is not None:
-            return None
-        return (rated_speed if quantity is Quantity.SPEED
-                else quantities.full(parameter.unit, quantity))
-
-    @property
-    def speed(self) -> float:
-        """The largest speed, in the unit of the setpoint."""
-        return min((self._value(parameter) for parameter, quantity in self._found.values()
-                    if quantity is Quantity.SPEED), default=math.inf)
-
-    @property
-    def torque(self) -> float:
-        """The largest torque, as a share of the rated one."""
-        return min((self._torque(parameter, quantity)
-                    for parameter, quantity in self._found.values()
-                    if quantity is not Quantity.SPEED), default=math.inf)
-
-    def _value(self, parameter: Parameter) -> float:
-        return max(self._registers.commanded(parameter.name), 0.0)
-
-    def _torque(self, parameter: Parameter, quantity: Quantity) -> float:
-        share = self._value(parameter) / quantities.full(parameter.unit, quantity)
-        if quantity is Quantity.CURRENT:    # a part of it makes no torque
-            return math.sqrt(max(share ** 2 - MAGNETISING_CURRENT ** 2, 0.0))
-        return share
-
-
-class Reach(NamedTuple):
-    """
-    What a motor can do with the torque that it may have, as shares of the rated speed.
-
-    :param speed: how fast it gets at most; 0: it does not turn.
-    :param rising: how much faster per s at most.
-    :param falling: how much slower.
-    """
-
-    speed: float
-    rising: float
-    falling: float
-
-    @classmethod
-    def of(cls, torque: float, load: float, coast: float) -> 'Reach':
-        """
-        Return that of a torque.
-
-        :param load: share of the rated torque that a weight takes.
-        :param coast: how much slower it gets per s without torque.
-        """
-        spare = max(torque - FRICTION_TORQUE - load, 0.0)
-        return cls(spare / LOAD_TORQUE, spare / INERTIA_TORQUE, torque / INERTIA_TORQUE + coast)
-
-    def rates(self, rates: Rates, rated: float) -> Rates:
-        """Return how fast a speed may change that is to change as fast as a ramp says."""
-        return Rates(min(rates.rising, self.rising * rated),
-                     min(rates.falling, self.falling * rated))
+        self.torque = self.current = 0.0
+        if energised:
+            friction = math.copysign(FRICTION_TORQUE, self.share) if self.share else 0.0
+            torque = (LOAD_TORQUE * self.share + friction + self.load
+                      + INERTIA_TORQUE * self.shaft.slope / self.rated_speed)
+            self.torque = min(max(torque, -torque_max), torque_max)
+            self.current = math.hypot(MAGNETISING_CURRENT, self.torque)
 
 
 class MotorPlant:
@@ -296,32 +200,32 @@ class MotorPlant:
                          (RampUse.QUICK_STOP,)))
         # a setpoint whose actual value the profile lacks still moves the motor
         mover, quantity = quantities.mover(pairs, configuration.cyclic_request, control_name)
-        by_speed = quantity is Quantity.SPEED
-        self.speed_setpoint = speed = mover if by_speed else None
-        other_kind = Quantity.POSITION if by_speed else Quantity.SPEED
-        self._positioned = mover is not speed
-        self._bounds = Bounds(registers, parameters, mover)
-        self._travels: dict[str, tuple[Parameter, Travel]] = {}     # by setpoint
+        self._mover = mover
+        self.speed_setpoint = mover if quantity is Quantity.SPEED else None
+        self._bounds = {
+            parameter.name: (parameter, kind) for parameter, kind in quantities.limits(parameters)
+            if parameter is not mover and (
+                mover and parameter.unit == mover.unit if kind is Quantity.SPEED
+                else quantities.measures(parameter.unit, kind))}
+        rated = self._turns = 1.0     # revolutions per unit of the way
+        if mover is not None and quantity is Quantity.SPEED:
+            rated = quantities.rated_speed(mover)
+            self._turns = quantities.revolutions_per_unit(mover, rated)
+        elif mover is not None:
+            rated = quantities.travel_speed(mover)
+            self._turns = 1.0 / quantities.per_revolution(mover)
+        self.motor = Motor(rated, mechanics.load)
         self._followers: dict[str, tuple[Parameter, Travel]] = {}
         self._actuals: dict[str, Callable[[], float]] = {}
-        rated, turns, shaft = 1.0, 1.0, Travel()
-        if speed is not None:
-            rated = quantities.rated_speed(speed)
-            turns = quantities.revolutions_per_unit(speed, rated)
-        elif mover is not None:
-            self._travels[mover.name] = mover, shaft
-            rated, turns = quantities.travel_speed(mover), 1.0 / quantities.per_revolution(mover)
-        self.motor = Motor(rated, turns, mechanics.load, shaft)
         for setpoint, actual in pairs:
             kind = quantities.quantity_of(setpoint)
-            if actual is None or kind is other_kind and setpoint is not speed:
+            if actual is None:
                 continue
-            if setpoint is speed:
-                self._actuals[actual.name] = partial(getattr, self.motor, 'speed')
-            elif kind is Quantity.POSITION:
-                _, travel = self._travels.setdefault(setpoint.name, (setpoint, Travel()))
-                self._actuals[actual.name] = partial(getattr, travel, 'position')
-            else:
+            if setpoint is mover:
+                self._actuals[actual.name] = partial(
+                    getattr, self.motor.shaft,
+                    'speed' if quantity is Quantity.SPEED else 'position')
+            elif kind not in quantities.MOVING or kind is quantity:
                 _, follower = self._followers[setpoint.name] = setpoint, Travel()
                 self._actuals[actual.name] = partial(getattr, follower, 'speed')
 
@@ -330,17 +234,21 @@ class MotorPlant:
         return value
 
     def initial(self, parameter: Parameter) -> int:
-        if self.control is not None and parameter.name == self._control_name:
+        name, value = parameter.name, None
+        _, bound = self._bounds.get(name, (None, None))
+        if self.control is not None and name == self._control_name:
             return self.control.disable
-        if parameter.name in self._ramps:
-            value = self._initial_ramp(self._ramps[parameter.name])
-            return quantities.nearest_raw(parameter, value, parameter.raw_limits)
-        limit = self._bounds.initial(parameter.name, self.motor.rated_speed)
-        if limit is not None:
-            return quantities.nearest_raw(parameter, limit, parameter.raw_limits)
-        if parameter.name in self._setpoints and parameter.neutral is None:
+        if name in self._ramps:
+            value = self._initial_ramp(self._ramps[name])
+        elif bound and parameter.neutral is None and parameter.maximum is None:
+            # a new drive is not limited
+            value = self.motor.rated_speed if bound is Quantity.SPEED else quantities.full(
+                parameter.unit, bound)
+        elif name in self._setpoints and parameter.neutral is None:
             return quantities.clamp(0, parameter.raw_limits)
-        return quantities.plausible(parameter)
+        if value is None:
+            return quantities.plausible(parameter)
+        return quantities.nearest_raw(parameter, value, parameter.raw_limits)
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         ends, nearest = parameter.type.raw_range, quantities.nearest_raw
@@ -351,7 +259,8 @@ class MotorPlant:
         elif quantity is None and parameter.name in self._shown:
             quantity = quantities.BY_UNIT.get(parameter.unit)
         if quantity is Quantity.POSITION:
-            where = actual or (lambda: quantities.position_value(parameter, self.motor.position))
+            where = actual or (lambda: quantities.position_value(
+                parameter, self.motor.shaft.position * self._turns))
             return lambda: quantities.clamp(nearest(parameter, where(), ends) + self._jitter, ends)
         word = StatusWord(parameter, self.control)
         if actual is None and word:
@@ -364,17 +273,17 @@ class MotorPlant:
         motor, setpoint = self.motor, self.speed_setpoint
         if quantity is Quantity.SPEED:
             if setpoint is not None and parameter.unit == setpoint.unit:
-                return lambda: motor.speed
-            return lambda: quantities.speed_value(parameter, motor.speed * motor.revolutions,
-                                              motor.share_of_rated_speed)
+                return lambda: motor.shaft.speed
+            return lambda: quantities.speed_value(
+                parameter, motor.shaft.speed * self._turns, motor.share)
         if quantity is Quantity.TEMPERATURE:
-            return lambda: quantities.temperature_value(parameter, motor.temperature)
+            return lambda: motor.temperature
         if quantity is Quantity.FAULT_CODE:
             return lambda: self.operation.fault_code(self._fault_code)
         full = quantities.rating(parameter, quantity)
         shares: dict[Quantity, Callable[[], float]] = {
             Quantity.TORQUE: lambda: motor.torque,
-            Quantity.POWER: lambda: motor.torque * motor.share_of_rated_speed,
+            Quantity.POWER: lambda: motor.torque * motor.share,
             Quantity.LOAD: lambda: abs(motor.torque),
             Quantity.CURRENT: lambda: motor.current,
             Quantity.VOLTAGE: lambda: (
@@ -382,7 +291,7 @@ class MotorPlant:
         }
         share = shares[quantity]
         if quantity is Quantity.VOLTAGE and quantities.words_of(parameter) & {'motor', 'output'}:
-            share = lambda: 0.7 * abs(motor.share_of_rated_speed)  # noqa: E731
+            share = lambda: 0.7 * abs(motor.share)  # noqa: E731
         return lambda: full * share()
 
     def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
@@ -397,76 +306,78 @@ class MotorPlant:
         """The speed that is commanded."""
         if self.speed_setpoint is None:
             return 0.0
-        fastest = self._bounds.speed
+        fastest = self._bound(Quantity.SPEED)
         value = self.command(self.registers.commanded(self.speed_setpoint.name))
         return min(max(value, -fastest), fastest)
 
+    def _bound(self, *kinds: Quantity) -> float:
+        """Return the least of some limits: the speed, or a share of the rated torque."""
+        found = math.inf
+        for parameter, kind in self._bounds.values():
+            if kind in kinds:
+                value = max(self.registers.commanded(parameter.name), 0.0)
+                if kind is not Quantity.SPEED:
+                    value /= quantities.full(parameter.unit, kind)
+                if kind is Quantity.CURRENT:    # a part of it makes no torque
+                    value = math.sqrt(max(value ** 2 - MAGNETISING_CURRENT ** 2, 0.0))
+                found = min(found, value)
+        return found
+
     def advance(self, now: float) -> None:
-        operation = self.operation
+        operation, motor = self.operation, self.motor
         duration = operation.advance(now)
         energised = operation.powered and operation.enabled
-        load, noise = self._mechanics.load, self._mechanics.noise
-        if duration > 0.0 and noise:
-            self._jitter = self._noise.randint(-noise, noise)
-        motor, rated = self.motor, self.motor.rated_speed
-        torque = self._bounds.torque
-        reach = Reach.of(torque, load, 1.0 / COAST_TIME)
-        driven = energised and not operation.stopping and reach.speed > 0.0
-        falling = self._rate(self._falling, rated / RAMP_TIME)
-        rates = reach.rates(Rates(self._rate(self._rising, rated / RAMP_TIME), falling), rated)
-        held = not energised and self._mechanics.brake
-        # where to, and how fast, as shares of the rated speed, while nothing is commanded
-        drift = -SINKING_SPEED * load
-        if held or energised and torque >= load:
-            drift = 0.0
-        stop = 1.0 / COAST_TIME
-        if energised:
-            stop = min(reach.falling, self._rate(
-                self._quick_stop, max(rated / QUICK_STOP_TIME, falling)) / rated)
+        if duration > 0.0 and self._mechanics.noise:
+            self._jitter = self._noise.randint(-self._mechanics.noise, self._mechanics.noise)
+        torque = self._bound(Quantity.TORQUE, Quantity.CURRENT)
+        able = energised and torque > FRICTION_TORQUE + self._mechanics.load
         for name, (setpoint, follower) in self._followers.items():
             rate = quantities.rated_speed(setpoint) / RAMP_TIME
-            target = self.registers.commanded(name) if driven else 0.0
-            follower.run(duration, target, Rates(rate, rate))
-        for name, (setpoint, travel) in self._travels.items():
-            limit = quantities.travel_speed(setpoint)
-            if held:
-                travel.speed = 0.0
-            if driven:
-                travel.go(duration, self.registers.commanded(name),
-                          limit * min(reach.speed, 1.0),
-                          limit * rates.rising / rated)
-            else:
-                travel.run(duration, drift * limit, Rates(stop * limit, stop * limit))
-        if not self._positioned:
-            if held:
-                motor.shaft.speed = 0.0
-            if duration > 0.0:
-                fastest = reach.speed * rated
-                motor.shaft.run(
-                    duration,
-                    min(max(self.target, -fastest), fastest) if driven else drift * rated,
-                    rates if driven else Rates(stop * rated, stop * rated))
+            driven = able and not operation.stopping
+            follower.run(duration, self.registers.commanded(name) if driven else 0.0,
+                         Rates(rate, rate))
+        self._move(duration, energised=energised, able=able)
         motor.advance(duration, energised=energised, torque_max=min(torque, TORQUE_MAX))
-        if operation.state in ENDS and motor.speed == 0.0:
+        if operation.state in ENDS and motor.shaft.speed == 0.0:
             operation.standstill()
             motor.advance(0.0, energised=operation.enabled)
 
+    def _move(self, duration: float, *, energised: bool, able: bool) -> None:
+        """Move the shaft: by torque, if there is enough, else it runs down or sinks."""
+        shaft, rated = self.motor.shaft, self.motor.rated_speed
+        if self._mechanics.brake and not energised:
+            shaft.speed = shaft.slope = 0.0
+        elif not able:
+            coasting = rated / COAST_TIME
+            shaft.run(duration, -SINKING_SPEED * self._mechanics.load * rated,
+                      Rates(coasting, coasting))
+        elif self.operation.stopping:
+            rate = self._rate(self._quick_stop, rated / QUICK_STOP_TIME)
+            shaft.run(duration, 0.0, Rates(rate, rate))
+        else:
+            rates = Rates(*(self._rate(ramp, rated / RAMP_TIME)
+                            for ramp in (self._rising, self._falling)))
+            if self._mover is None or self.speed_setpoint is not None:
+                shaft.run(duration, self.target, rates)
+            else:
+                shaft.go(duration, self.registers.commanded(self._mover.name), rated,
+                         rates.rising)
+
     def power_off(self) -> None:
         """Stand still; the position is kept, as by an absolute encoder."""
-        self.motor.shaft.speed = self.motor.shaft.slope = 0.0
-        for _, travel in (*self._followers.values(), *self._travels.values()):
-            travel.speed = 0.0
+        for travel in (self.motor.shaft, *(each for _, each in self._followers.values())):
+            travel.speed = travel.slope = 0.0
 
     def power_on(self) -> None:
         """Stay where the axis is until a setpoint comes."""
-        for name, (_, travel) in self._travels.items():
-            self.registers.put(name, travel.position)
+        if self._mover is not None and self.speed_setpoint is None:
+            self.registers.put(self._mover.name, self.motor.shaft.position)
 
     def _report(self) -> Report:
         motor, operation = self.motor, self.operation
         return Report(operation, warning=motor.temperature > WARNING_TEMPERATURE,
-                      speed=motor.speed,
-                      setpoint_reached=operation.enabled and motor.speed == self.target)
+                      speed=motor.shaft.speed,
+                      setpoint_reached=operation.enabled and motor.shaft.speed == self.target)
 
     def _initial_ramp(self, ramp: RampParameter) -> float:
         """Return what a new drive has in a ramp parameter."""

@@ -55,7 +55,7 @@ _RATINGS = {
     Quantity.VOLTAGE: {'V': 560.0, 'mV': 560_000.0, 'kV': 0.56},
     Quantity.POWER: {'W': 3000.0, 'kW': 3.0},
 }
-_MOVING = (Quantity.SPEED, Quantity.POSITION)
+MOVING = (Quantity.SPEED, Quantity.POSITION)
 #: what a parameter that is exchanged cyclically means, if its name does not say it
 BY_UNIT = {
     **dict.fromkeys(('rpm', '1/min', 'min-1', 'rev/s', 'rad/s', 'deg/s', 'mm/s', 'm/s'),
@@ -127,10 +127,10 @@ def mover(found: Sequence[Pair], cyclic: Sequence[Parameter], control: str | Non
     """
     for parameter in cyclic:
         quantity = quantity_of(parameter) or BY_UNIT.get(parameter.unit)
-        if (quantity in _MOVING and parameter.name != control
+        if (quantity in MOVING and parameter.name != control
                 and not parameter.limit and not words_of(parameter) & _LIMIT_WORDS):
             return parameter, quantity
-    return next(((pair.setpoint, kind) for kind in _MOVING for pair in found
+    return next(((pair.setpoint, kind) for kind in MOVING for pair in found
                  if quantity_of(pair.setpoint) is kind), (None, None))
 
 
@@ -193,22 +193,6 @@ def likely_fault(codes: Sequence[tuple[int, str]]) -> int:
                 known[0] if known else 0)
 
 
-def crossings(parameters: Mapping[str, Parameter]) -> dict[str, list[tuple[str, str]]]:
-    """
-    Find settings of which one must not exceed the other: ``minimum_speed``, ``maximum_speed``.
-
-    :return: names of the lower and the upper end, by the name of either.
-    """
-    found: dict[str, list[tuple[str, str]]] = {}
-    for low in parameters.values():
-        name = re.sub('(^|_)min(imum)?(?=_|$)', r'\1max\2', low.name, count=1)
-        high = parameters.get(name) if name != low.name else None
-        if high is not None and low.writable and high.writable and low.unit == high.unit:
-            for end in (low, high):
-                found.setdefault(end.name, []).append((low.name, high.name))
-    return found
-
-
 def words_of(parameter: Parameter) -> frozenset[str]:
     return frozenset(parameter.name.split('_'))
 
@@ -260,12 +244,6 @@ def per_revolution(parameter: Parameter) -> float:
     """Return by how much a position changes in one revolution."""
     return _PER_REVOLUTION.get(
         parameter.unit, 1.0 if parameter.scaled else _INCREMENTS_PER_REVOLUTION)
-
-
-def temperature_value(parameter: Parameter, celsius: float) -> float:
-    if parameter.unit == 'K':
-        return celsius + 273.15
-    return celsius * 1.8 + 32.0 if parameter.unit in ('°F', 'degF', 'F') else celsius
 
 
 def mains_swing(now: float) -> float:

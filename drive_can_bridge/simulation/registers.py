@@ -16,7 +16,6 @@ from typing import Protocol
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.control import Operation
 from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw
@@ -27,7 +26,6 @@ class Refusal(Enum):
 
     READ_ONLY = 'read-only'
     OUT_OF_RANGE = 'out of range'
-    CROSSED = 'minimum above maximum'
     FORBIDDEN = 'a scripted fault'
     TOO_EARLY = 'another parameter has to be written first'
     UNTOLD = 'nobody is told, the value stays'
@@ -140,7 +138,6 @@ class Registers:
         self.wear: Counter[str] = Counter()
         self.stand_ins: dict[str, str] = {}
         self._volatile = volatile
-        self._crossings = quantities.crossings(parameters)
         self._raw: dict[str, int] = {}
         self._initial: dict[str, int] = {}
         self._kept: dict[str, int] = {}
@@ -190,11 +187,6 @@ class Registers:
             refusal = self._plant.refusal(parameter, raw)
             if refusal not in (None, Refusal.UNTOLD):
                 return refusal
-            for ends in self._crossings.get(name, ()):
-                low, high = (self.parameters[end].value_from_raw(raws.get(end, self._raw[end]))
-                             for end in ends)
-                if low > high:
-                    return Refusal.CROSSED
         return None
 
     def write(self, name: str, raw: int, *, keep: bool | None = None, wear: int = 0) -> None:
@@ -262,11 +254,6 @@ class Registers:
         for name, parameter in self.parameters.items():
             if parameter.writable:
                 self._kept[name] = self._raw[name]
-
-    def reset(self, name: str) -> None:
-        """Give a register back what a new drive has in it."""
-        self._kept.pop(name, None)
-        self._raw[name] = self._initial[name]
 
     def _store(self, name: str, raw: int, keep: bool) -> None:
         before, self._raw[name] = self._raw[name], raw

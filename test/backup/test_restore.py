@@ -44,22 +44,11 @@ class TestSettings:
         assert shop.drives['conveyor'].wear == {'rated_current': 1}
         assert shop.values('conveyor', 'rated_current') == (5.0,)
 
-    def test_ends_of_a_range_that_cross(self, shop: Shop) -> None:
-        conveyor = shop.drives['conveyor']
-        conveyor.set_value('minimum_speed', 1500.0)
-        file = shop.write_backup('conveyor', minimum_speed=300.0, maximum_speed=600.0)
-        with shop.reached('conveyor') as drive:
-            plan = planned(drive, file)
-            assert [change.name for change in plan.changes] == ['maximum_speed', 'minimum_speed']
-            result = restored(drive, file)
-        # the maximum was refused until the minimum was lower
-        assert (result.complete, result.written) == (True, ['minimum_speed', 'maximum_speed'])
-        assert conveyor.wear == {'minimum_speed': 1, 'maximum_speed': 1}
-
     @pytest.mark.parametrize(('name', 'first', 'second', 'value'), [
         ('mixer', 'acceleration_time', 'torque_current_limit', 12),
         ('pump', 'motor_trip_class', 'network_fallback', 10),
         ('lift', 'ramp_time', 'maximum_speed', 30),
+        ('conveyor', 'maximum_speed', 'minimum_speed', 600),
     ])
     def test_one_that_is_taken_after_another_one(self, shop: Shop, name: str, first: str,
                                                  second: str, value: int) -> None:

@@ -97,9 +97,8 @@ class Arm:
 
     def steps(self, name: str) -> int:
         """Return where an axis really is, in steps; the encoder's noise is not in it."""
-        axes: Any = self.one.played[name].drive.plant
-        (travel,) = (travel for _, travel in axes._travels.values())
-        return round(100 * travel.position)
+        axis: Any = self.one.played[name].drive.plant
+        return round(100 * axis.motor.shaft.position)
 
     def enable(self, name: str, wanted: bool = True) -> None:
         answer = self.client.call(f'/{name}/enable', SetBool, SetBool.Request(data=wanted))

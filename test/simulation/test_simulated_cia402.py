@@ -7,7 +7,7 @@ import cia402_builders
 from cia402_builders import BEGINNING, Servo
 import pytest
 
-from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
+from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.motor import MotorPlant
@@ -108,14 +108,6 @@ def test_a_mapping_is_changed_in_the_order_of_the_standard_only() -> None:
     assert servo.ask('080#') == [f'185#{BEGINNING.to_bytes(4, "little").hex().upper() * 2}']
 
 
-def test_what_is_received_has_to_be_writable() -> None:
-    servo = Servo()
-    servo.write(0x1400, 1, 0x80000205, 4)
-    servo.write(0x1600, 0, 0, 1)
-    assert servo.refused(0x1600, 1, 0x60640020, 4) == 0x06040041
-    servo.write(0x1600, 1, 0x607A0020, 4)
-
-
 @pytest.mark.parametrize(('habits', 'index', 'subindex', 'value', 'size', 'code'), [
     (Habits(fixed_mapping=True), 0x1A01, 0, 0, 1, 0x06010000),
     (Habits(types={254, 255}), 0x1801, 2, 1, 1, 0x06090030),
@@ -176,13 +168,6 @@ def test_tpdos_by_event_and_timer() -> None:
     servo.ask('000#8005')
     assert servo.at(0.3) == []
     assert servo.ask('205#0600') == []
-
-
-def test_mapped_as_configured_where_nobody_configures() -> None:
-    servo = Servo(mapping='verify')
-    assert [servo.read(0x1600, n) for n in range(3)] == [2, 0x60400010, 0x60FF0020]
-    assert [servo.read(0x1A00, n) for n in range(3)] == [2, 0x60410010, 0x606C0020]
-    assert servo.read(0x1400, 2) == servo.read(0x1800, 2) == 1
 
 
 def test_a_second_node_with_its_number_is_seen() -> None:
@@ -249,12 +234,6 @@ def test_sto_low_lets_no_torque_be() -> None:
     servo.drive.fault('sto', servo.now)
     assert servo.cycle()[0] & 0x4F == 0x40
     assert 0.5 < servo.speed < 1.0
-
-
-def test_only_drives_that_have_an_input_lose_torque_by_it() -> None:
-    import simulation_builders
-    with pytest.raises(ValueRefused, match='no input for safe torque off'):
-        simulation_builders.drive().fault('sto', 0.0)
 
 
 # -- modes ----------------------------------------------------------------------------------------
@@ -525,16 +504,6 @@ def test_the_bridge_is_missed(option: int, state: int, speed: float) -> None:
     assert servo.drive.take_notices()[-1] == 'axis: no heartbeat of node 127'
 
 
-def test_a_bridge_that_goes_on_is_not_missed_nor_one_that_is_not_watched_any_more() -> None:
-    servo = watched(1)
-    for _ in range(5):
-        servo.run(0.5)
-        servo.ask('77F#05')
-    servo.write(0x1016, 1, 0, 4)
-    servo.run(2.0)
-    assert servo.speed == 10.0
-
-
 def test_the_node_stopped_is_a_lost_connection() -> None:
     servo = running()
     servo.ask('000#0205')
@@ -569,24 +538,3 @@ def test_a_vertical_axis_falls_where_power_goes_and_not_where_it_stays() -> None
     servo.word = 0
     servo.run(1.0)
     assert servo.revolutions == held
-
-
-
-
-def test_it_does_not_matter_how_often_one_looks() -> None:
-    ends = []
-    for steps in (1, 7, 100):
-        servo = Servo(load=0.4)
-        servo.set_up(9)
-        servo.target = 50_000
-        servo.enable()
-        servo.run(0.5)
-        servo.word = 0x02
-        servo.cycle()
-        # brakes for 20 ms, then power goes, and it sinks
-        for step in range(steps):
-            servo.drive.plant.advance(servo.now + (step + 1) / steps)
-        ends.append((servo.revolutions, servo.speed))
-    assert ends[1] == pytest.approx(ends[0])
-    assert ends[2] == pytest.approx(ends[0])
-    assert ends[0][1] < -1.0

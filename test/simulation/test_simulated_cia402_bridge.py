@@ -253,18 +253,6 @@ def test_an_axis_stays_where_it_is_whatever_happens() -> None:
     assert targets == {BEGINNING.to_bytes(4, 'little').hex().upper()}
 
 
-def test_two_axes_share_one_sync() -> None:
-    cable = Cable(configuration(**CSP), configuration(name='other', station=6))
-    cable.run(1.0)
-    assert all(session.online for session in cable.sessions)
-    cable.sent.clear()
-    cable.run(0.1)
-    syncs = [at for at, text in cable.sent if text == '080#']
-    assert len(syncs) == 10
-    for station in ('205#', '206#'):
-        assert len([1 for _, text in cable.sent if text.startswith(station)]) == 10
-
-
 @pytest.mark.parametrize(('habits', 'keys', 'online'), [
     (Habits(fixed_mapping=True), {}, False),
     (Habits(fixed_mapping=True), {'mapping': 'verify'}, True),
@@ -337,13 +325,6 @@ def test_a_killed_bridge_is_missed_and_the_drive_stops() -> None:
     cable.run(0.61)
     assert cable.speed == 0.0
     assert cable.drives[0].value('fault_code') == 0x8130
-
-
-def test_a_bridge_that_lives_is_not_missed() -> None:
-    cable = running(Cable(configuration(**PV)))
-    cable.command(600.0, 5.0)
-    assert cable.speed == pytest.approx(10.0, rel=1e-3)
-    assert cable.drives[0].read_object(0x1016, 1) != bytes(4)
 
 
 @pytest.mark.parametrize(('option', 'message', 'state'), [
@@ -440,15 +421,6 @@ def test_modes_of_speed_and_torque(mode: str, setpoint: str, value: float, speed
     assert cable.speed == 0.0
     cable.command(value, 3.0)
     assert cable.speed == pytest.approx(speed, rel=0.01)
-
-
-def test_vl_stands_still_without_its_bits() -> None:
-    cable = Cable(configuration(mode='vl', request=('vl_target_velocity',), ramp_bits=False))
-    cable.run(1.0)
-    assert cable.control(ControlAction.ENABLE)[0]
-    cable.command(0.0)
-    cable.command(600.0, 1.0)
-    assert cable.speed == 0.0
 
 
 @pytest.mark.parametrize(('mode', 'setpoint'), [

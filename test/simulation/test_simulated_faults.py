@@ -180,26 +180,6 @@ class TestDrive:
         assert ask(made, POLL, 14.99) == []
         assert ask(made, POLL, 15.0) == [ANSWER]
 
-    def test_wear_by_parameter(self) -> None:
-        made = drive()
-        for now in (0.0, 0.02):
-            ask(made, '003001E1#00C8000000000000', now)     # ramp time, twice
-        ask(made, '003007A2#0033003200000000', 0.04)        # two entries of a map
-        ask(made, '003FFFF0#0000000000000000', 0.06)        # no EEPROM
-        assert made.wear == {'ramp_time': 2, 'p122': 1, 'p123': 1}
-        assert made.eeprom_writes == 4
-
-    def test_settings_whose_order_matters(self) -> None:
-        made = drive([*EXAMPLE, parameter('minimum_gain', 60, storage=RAM, maximum=100),
-                      parameter('maximum_gain', 61, storage=RAM, maximum=100)])
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 100)
-        ask(made, '003003D1#0032000000000000', 0.0)         # maximum 50
-        ask(made, '003003C1#003C000000000000', 0.0)         # minimum 60: not above the maximum
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (0, 50)
-        ask(made, '003003D1#0050000000000000', 0.0)         # maximum 80
-        ask(made, '003003C1#003C000000000000', 0.0)
-        assert (made.value('minimum_gain'), made.value('maximum_gain')) == (60, 80)
-
     def test_setting_that_needs_another_one_first(self) -> None:
         made = drive([*EXAMPLE, parameter('gain', 60, storage=RAM, maximum=100)])
         before = made.value('gain')
@@ -290,15 +270,6 @@ class TestDrive:
         assert made.value('control_word') == 0
         assert made.value('actual_speed') == 0.0
 
-    def test_restart_loses_late_answers(self) -> None:
-        made = drive()
-        made.fault('late=1', 0.0)
-        ask(made, POLL, 0.0)
-        made.fault('restart=0', 0.5)
-        made.handle_timer(2.0)
-        assert made.take_frames() == []
-        assert made.faults_text == 'late=1.0'
-
     def test_forget(self) -> None:
         made = drive()
         made.fault('forget=0.1', 0.0)
@@ -318,13 +289,6 @@ class TestDrive:
         assert ask(made, POLL, 3.4) == []
         assert ask(made, POLL, 3.5) == [ANSWER]
         assert made.faults_text == 'ok'
-
-    def test_changes_are_announced(self) -> None:
-        made = drive()
-        made.fault('late=0.15', 0.0)
-        made.fault('ok', 0.0)
-        assert made.take_notices() == ['conveyor: fault late=0.15', 'conveyor: no fault any more']
-        assert made.take_notices() == []
 
 
 def test_every_family_is_simulated() -> None:

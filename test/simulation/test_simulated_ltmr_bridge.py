@@ -146,17 +146,6 @@ def test_start() -> None:
     assert line.writes('C002') == ['0000']
 
 
-def test_reads_and_writes() -> None:
-    line = Line()
-    line.run(1.0)
-    assert line.outcome(read(RATIO, TRIP_CLASS)) == [33, 5]
-    assert line.outcome(write((RATIO, 50))) == ['written']
-    refused, = line.outcome(write((TRIP_CLASS, 7)))
-    assert '06090030h' in str(refused)
-    assert line.outcome(read(RATIO, TRIP_CLASS)) == [50, 5]
-    assert not line.ltmr.violations
-
-
 def test_run_trip_reset() -> None:
     line = Line(control_timeout=5.0)
     line.run(1.0)
@@ -209,16 +198,6 @@ def test_a_write_is_not_sent_into_the_unknown() -> None:
     assert str(answer).startswith('no answer')
     assert line.writes('8C02') == []
     assert line.ltmr.value('flc1_ratio') == 33.0
-
-
-def test_unasked_answers_are_rejected() -> None:
-    line = Line()
-    line.run(1.0)
-    line.fault('foreign')
-    line.run(5.0)
-    assert len(line.found(FrameRejected)) > 20
-    assert {event.raws for event in line.found(ProcessDataReceived)} == {(0x0041, 0, 0, 0)}
-    assert line.outcome(read(RATIO, TRIP_CLASS)) == [33, 5]
 
 
 @pytest.mark.parametrize('late', [0.05, 0.3, 0.6, 0.9])

@@ -1,266 +1,125 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The motor of the simulated drives, and how its quantities get into parameters by their names."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
-    ACTUAL_SPEED, CONTROL, CONTROL_WORD, EXAMPLE, INT16, motor, parameter, RAM, RO, SPEED_SETPOINT,
-    STATUS_WORD, WO,
+    ACTUAL_SPEED, ask, CONTROL, CONTROL_WORD, EXAMPLE, INT16, motor, parameter, RAM, RO,
+    SPEED_SETPOINT, STATUS_WORD, TORQUE_LIMIT, WO,
 )
 
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.profile import StatusPattern
 from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.motor import AMBIENT_TEMPERATURE, Motor, Rates, Travel
+from drive_can_bridge.simulation.motor import Rates, Travel
 from drive_can_bridge.simulation.quantities import Quantity, RampUse
+from drive_can_bridge.simulation.registers import Mechanics
 
-RATES = Rates(rising=10.0, falling=20.0)
+# 0.1 degrees a step; at most 1000 degrees a second, reached in a second
+WHERE = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg', minimum=-1000.0,
+                  maximum=1000.0)
+ANGLE = parameter('actual_position', 214, type=INT16, scale=0.1, unit='deg', access=RO)
+ENABLE, DISABLE, QUICK_STOP = 1, 0, 2
 
-
-class TestRamp:
-
-    def test_rises_and_falls_at_different_rates(self) -> None:
-        ramp = Travel()
-        ramp.run(0.5, 100.0, RATES)
-        assert (ramp.speed, ramp.slope) == (5.0, 10.0)
-        ramp.run(0.1, 0.0, RATES)
-        assert (ramp.speed, ramp.slope) == (3.0, -20.0)
-
-    def test_reversal_falls_to_zero_and_rises_from_there(self) -> None:
-        ramp = Travel(speed=10.0)
-        ramp.run(1.0, -50.0, RATES)
-        assert (ramp.speed, ramp.slope) == (-5.0, -10.0)
-
-    def test_integral(self) -> None:
-        # 1 s up to 10, 1 s at 10
-        ramp = Travel()
-        ramp.run(2.0, 10.0, RATES)
-        assert ramp.position == 15.0
-
-    def test_stays_at_its_target(self) -> None:
-        ramp = Travel()
-        ramp.run(100.0, 7.0, RATES)
-        assert (ramp.speed, ramp.slope) == (7.0, 0.0)
-
-    @given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(-100.0, 100.0)), max_size=20))
-    def test_it_does_not_matter_how_often_time_passes(
-            self, steps: list[tuple[float, float]]) -> None:
-        coarse, fine = Travel(), Travel()
-        for duration, target in steps:
-            coarse.position = fine.position = 0.0
-            coarse.run(duration, target, RATES)
-            for _ in range(4):
-                fine.run(duration / 4.0, target, RATES)
-            assert fine.speed == pytest.approx(coarse.speed, abs=1e-6)
-            assert fine.position == pytest.approx(coarse.position, abs=1e-6)
+# -- names ----------------------------------------------------------------------------------------
 
 
-def turn(motor: Motor, duration: float, target: float, rates: Rates, *,
-         energised: bool = True) -> None:
-    """Let a motor go towards a speed for some time."""
-    motor.shaft.run(duration, target, rates)
-    motor.advance(duration, energised=energised)
+@pytest.mark.parametrize(('name', 'quantity'), [
+    ('actual_speed', Quantity.SPEED), ('output_frequency', Quantity.SPEED),
+    ('current_position', Quantity.POSITION), ('torque_current', Quantity.TORQUE),
+    ('motor_current', Quantity.CURRENT), ('heatsink_temperature', Quantity.TEMPERATURE),
+    ('dc_link_voltage', Quantity.VOLTAGE), ('output_power', Quantity.POWER),
+    ('motor_load', Quantity.LOAD), ('fault_code', Quantity.FAULT_CODE),
+    ('rated_current', None), ('speed_limit', None), ('firmware_version', None),
+])
+def test_measured(name: str, quantity: Quantity | None) -> None:
+    assert quantities.measured(parameter(name, 1, access=RO)) is quantity
+    assert quantities.measured(parameter(name, 1)) is None
 
 
-class TestMotor:
-
-    def test_current_follows_acceleration_and_load(self) -> None:
-        motor = Motor(3000.0, 1.0 / 60.0)
-        rates = Rates(3000.0, 3000.0)
-        turn(motor, 0.0, 0.0, rates)
-        at_rest = motor.current
-        turn(motor, 0.5, 3000.0, rates)
-        accelerating = motor.current
-        turn(motor, 5.0, 3000.0, rates)
-        running = motor.current
-        turn(motor, 0.5, 0.0, rates)
-        assert at_rest < running < accelerating
-        assert motor.torque < 0.0
-
-    def test_position_integrates(self) -> None:
-        motor = Motor(3000.0, 1.0 / 60.0)
-        turn(motor, 2.0, 600.0, Rates(600.0, 600.0))
-        assert motor.position == pytest.approx(15.0)
-
-    def test_temperature_creeps(self) -> None:
-        motor = Motor(3000.0, 1.0 / 60.0)
-        rates = Rates(3000.0, 3000.0)
-        turn(motor, 10.0, 3000.0, rates)
-        turn(motor, 10.0, 3000.0, rates)
-        warm = motor.temperature
-        turn(motor, 600.0, 3000.0, rates)
-        assert AMBIENT_TEMPERATURE < warm < motor.temperature < 60.0
-
-    def test_without_torque(self) -> None:
-        motor = Motor(3000.0, 1.0 / 60.0)
-        turn(motor, 1.0, 3000.0, Rates(3000.0, 3000.0), energised=False)
-        assert (motor.torque, motor.current) == (0.0, 0.0)
+@pytest.mark.parametrize(('setpoint', 'actual'), [
+    ('speed_setpoint', 'actual_speed'), ('setpoint_speed', 'actual_speed'),
+    ('target_position', 'actual_position'), ('frequency_reference', 'frequency_actual'),
+    ('torque_command', 'torque_feedback'), ('setpoint_1', 'actual_value_1'),
+    ('speed', 'actual_speed'), ('speed_setpoint', 'motor_speed'),
+])
+def test_pairs(setpoint: str, actual: str) -> None:
+    table = {p.name: p for p in (parameter(setpoint, 1), parameter(actual, 2, access=RO))}
+    pair, = quantities.pairs(table)
+    assert (pair.setpoint.name, pair.actual.name) == (setpoint, actual)
+    assert quantities.pairs(table, without=setpoint) == []
 
 
-class TestNames:
-
-    @pytest.mark.parametrize(('name', 'quantity'), [
-        ('actual_speed', Quantity.SPEED), ('output_frequency', Quantity.SPEED),
-        ('current_position', Quantity.POSITION), ('torque_current', Quantity.TORQUE),
-        ('motor_current', Quantity.CURRENT), ('heatsink_temperature', Quantity.TEMPERATURE),
-        ('dc_link_voltage', Quantity.VOLTAGE), ('output_power', Quantity.POWER),
-        ('motor_load', Quantity.LOAD), ('fault_code', Quantity.FAULT_CODE),
-        ('rated_current', None), ('speed_limit', None), ('firmware_version', None),
-    ])
-    def test_measured(self, name: str, quantity: Quantity | None) -> None:
-        assert quantities.measured(parameter(name, 1, access=RO)) is quantity
-        assert quantities.measured(parameter(name, 1)) is None
-
-    @pytest.mark.parametrize(('setpoint', 'actual'), [
-        ('speed_setpoint', 'actual_speed'), ('setpoint_speed', 'actual_speed'),
-        ('target_position', 'actual_position'), ('frequency_reference', 'frequency_actual'),
-        ('torque_command', 'torque_feedback'), ('setpoint_1', 'actual_value_1'),
-        ('speed', 'actual_speed'), ('speed_setpoint', 'motor_speed'),
-    ])
-    def test_pairs(self, setpoint: str, actual: str) -> None:
-        table = {p.name: p for p in (parameter(setpoint, 1), parameter(actual, 2, access=RO))}
-        pair, = quantities.pairs(table)
-        assert (pair.setpoint.name, pair.actual.name) == (setpoint, actual)
-        assert quantities.pairs(table, without=setpoint) == []
-
-    @pytest.mark.parametrize(('name', 'unit', 'is_time', 'use'), [
-        ('ramp_time', 's', True, RampUse.BOTH),
-        ('acceleration_time', 'ms', True, RampUse.RISING),
-        ('ramp_down_time', 's', True, RampUse.FALLING),
-        ('deceleration', 'rpm/s', False, RampUse.FALLING),
-        ('acceleration', '', False, RampUse.RISING),
-        ('quick_stop_ramp', 's', True, RampUse.QUICK_STOP),
-    ])
-    def test_ramps(self, name: str, unit: str, is_time: bool, use: RampUse) -> None:
-        made = parameter(name, 1, unit=unit)
-        assert quantities.ramp_parameters({name: made}) == [(made, is_time, use)]
-
-    def test_what_is_no_ramp(self) -> None:
-        for made in (parameter('ramp_time', 1, access=RO), parameter('ramp_limit', 1),
-                     parameter('stop_mode', 1)):
-            assert quantities.ramp_parameters({made.name: made}) == []
+@pytest.mark.parametrize(('name', 'options', 'expected'), [
+    ('ramp_time', {'unit': 's'}, (True, RampUse.BOTH)),
+    ('acceleration_time', {'unit': 'ms'}, (True, RampUse.RISING)),
+    ('ramp_down_time', {'unit': 's'}, (True, RampUse.FALLING)),
+    ('deceleration', {'unit': 'rpm/s'}, (False, RampUse.FALLING)),
+    ('acceleration', {}, (False, RampUse.RISING)),
+    ('quick_stop_ramp', {'unit': 's'}, (True, RampUse.QUICK_STOP)),
+    ('ramp_time', {'access': RO}, None), ('ramp_limit', {}, None), ('stop_mode', {}, None),
+])
+def test_ramps(name: str, options: dict[str, Any], expected: object) -> None:
+    made = parameter(name, 1, **options)
+    assert [found[1:] for found in quantities.ramp_parameters({name: made})] == (
+        [expected] if expected else [])
 
 
-class TestPlant:
-
-    def test_speed_in_another_unit(self) -> None:
-        hertz = parameter('output_frequency', 3, scale=0.1, unit='Hz', access=RO)
-        percent = parameter('output_speed', 4, scale=0.1, unit='%', access=RO)
-        plant = running([*EXAMPLE, hertz, percent], 'speed_setpoint', 1500.0)
-        assert plant.value('output_frequency') == 25.0
-        assert plant.value('output_speed') == 50.0
-
-    def test_setpoint_without_actual_value_moves_the_motor(self) -> None:
-        position = parameter('position', 3, unit='rev', type=INT16, access=RO)
-        plant = running([SPEED_SETPOINT, position], 'speed_setpoint', 600.0)
-        assert plant.value('position') == pytest.approx(100.0, abs=2.0)
-
-    def test_position_is_that_of_the_shaft_where_a_speed_is_commanded(self) -> None:
-        plant = running(BOTH, 'speed_setpoint', 60.0, request=[SPEED_SETPOINT])
-        assert plant.value('actual_speed') == 60.0
-        before = plant.value('actual_position')
-        plant.handle_timer(10.5)
-        assert plant.value('actual_position') == pytest.approx(before + 180.0, abs=1.0)
-
-    def test_position_is_followed_where_a_position_is_commanded(self) -> None:
-        plant = running(BOTH, 'position_setpoint', 90.0, request=[POSITION_SETPOINT])
-        assert plant.value('actual_position') == 90.0
-        assert plant.value('actual_speed') == 0.0
-        plant.registers.write('position_setpoint', 30000)
-        # from rest with 3000 degrees per second squared, up to 3000 degrees per second: 500 rpm
-        plant.handle_timer(10.1)
-        assert plant.value('actual_position') == 105.0
-        assert plant.value('actual_speed') == 50.0
-        plant.handle_timer(10.5)
-        assert plant.value('actual_position') == 465.0
-        assert plant.value('actual_speed') == 250.0
-        plant.handle_timer(13.0)
-        assert plant.value('actual_position') == 3000.0
-        assert plant.value('actual_speed') == 0.0
-
-    def test_position_wraps_where_the_parameter_ends(self) -> None:
-        wrapped = parameter('position', 1, type=INT16, access=RO)
-        assert quantities.position_value(wrapped, 7.0) == 7 * 4096
-        assert quantities.position_value(wrapped, 9.0) == 9 * 4096 - 65536
-        limited = parameter('position', 1, type=INT16, unit='deg', minimum=0.0, maximum=359.0)
-        assert quantities.position_value(limited, 1.25) == 90.0
-        assert quantities.position_value(limited, -0.25) == 270.0
-
-    def test_values_never_leave_their_type(self) -> None:
-        small = parameter('actual_torque', 3, scale=0.0001, unit='Nm', type=INT16, access=RO)
-        plant = running([*EXAMPLE, small], 'speed_setpoint', -3000.0)
-        assert -3.2768 <= plant.value('actual_torque') < 0.0
-
-    def test_limits_in_any_direction(self) -> None:
-        upside_down = parameter('x', 1, type=INT16, scale=-0.5, minimum=-10.0, maximum=20.0)
-        nothing_between = parameter('w', 4, minimum=0.4, maximum=0.6)
-        registers = motor([upside_down, parameter('y', 2, maximum=15.0),
-                           parameter('z', 3, type=ParameterType.BOOL), nothing_between]).registers
-        assert [(registers.clamped(name, -50), registers.clamped(name, 50))
-                for name in 'xyzw'] == [(-40, 20), (0, 15), (0, 1), (0, 0)]
-
-    def test_rate_parameters(self) -> None:
-        rate = parameter('acceleration', 3, unit='rpm/s', storage=RAM)
-        plant = motor([*EXAMPLE[:-1], rate])
-        assert plant.value('acceleration') == 3000.0
-        plant.registers.write('acceleration', 600)
-        plant.registers.write('speed_setpoint', 30000)
-        plant.handle_timer(0.0)
-        plant.handle_timer(1.0)
-        assert plant.value('actual_speed') == 600.0
-
-    def test_power_cycle_keeps_what_eeprom_keeps(self) -> None:
-        gain = parameter('gain', 60, storage=RAM)
-        unknown = parameter('offset_angle', 61)
-        plant = motor([*EXAMPLE, gain, unknown])
-        initial = plant.registers.raw('gain')
-        for name, raw in (('gain', 999), ('offset_angle', 999), ('ramp_time', 500),
-                          ('speed_setpoint', 5000)):
-            plant.registers.write(name, raw)
-        plant.fault('restart=0', 1.0)
-        assert plant.registers.raw('gain') == initial
-        assert plant.registers.raw('offset_angle') == 999
-        assert plant.registers.raw('ramp_time') == 500
-        assert plant.registers.raw('speed_setpoint') == 0
-
-    def test_every_kind_of_parameter_has_an_initial_value(self) -> None:
-        table: list[Parameter] = [
-            parameter('switch', 1, type=ParameterType.BOOL),
-            parameter('command_word', 2, access=WO),
-            parameter('lower_limit', 3, minimum=5.0), parameter('current_limit', 4, unit='%'),
-            parameter('minimum_speed', 5, minimum=10.0, maximum=90.0),
-            parameter('gain', 6, scale=0.01, minimum=0.0, maximum=3.0),
-            parameter('position_setpoint', 7, neutral=1e9),
-            parameter('ramp_ms', 8, unit='ms'), parameter('warm_up', 9, minimum=200.0),
-            parameter('tension', 10, scale=0.5, neutral=5.0),
-        ]
-        plant = motor(table)
-        assert [plant.value(p.name) for p in table] == [
-            False, 0, 100, 100.0, 10.0, 1.0, 0, 1000.0, 200, 5.0]
+@pytest.mark.parametrize(('options', 'revolutions', 'value'), [
+    ({}, 7.0, 7 * 4096), ({}, 9.0, 9 * 4096 - 65536),
+    ({'unit': 'deg', 'minimum': 0.0, 'maximum': 359.0}, 1.25, 90.0),
+    ({'unit': 'deg', 'minimum': 0.0, 'maximum': 359.0}, -0.25, 270.0)])
+def test_position_wraps_where_the_parameter_ends(options: dict[str, Any], revolutions: float,
+                                                 value: float) -> None:
+    wrapped = parameter('position', 1, type=INT16, access=RO, **options)
+    assert quantities.position_value(wrapped, revolutions) == value
 
 
-POSITION_SETPOINT = parameter('position_setpoint', 53, type=INT16, scale=0.1, unit='deg',
-                              minimum=-3000.0, maximum=3000.0)
-ACTUAL_POSITION = parameter('actual_position', 214, type=INT16, scale=0.1, unit='deg', access=RO)
-BOTH = [SPEED_SETPOINT, POSITION_SETPOINT, ACTUAL_SPEED, ACTUAL_POSITION]
+def test_every_kind_of_parameter_has_an_initial_value() -> None:
+    table = {
+        parameter('switch', 1, type=ParameterType.BOOL): False,
+        parameter('command_word', 2, access=WO): 0,
+        parameter('lower_limit', 3, minimum=5.0): 100,
+        parameter('current_limit', 4, unit='%'): 100.0,
+        parameter('minimum_speed', 5, minimum=10.0, maximum=90.0): 10.0,
+        parameter('gain', 6, scale=0.01, minimum=0.0, maximum=3.0): 1.0,
+        parameter('position_setpoint', 7, neutral=1e9): 0,
+        parameter('ramp_ms', 8, unit='ms'): 1000.0, parameter('warm_up', 9, minimum=200.0): 200,
+        parameter('tension', 10, scale=0.5, neutral=5.0): 5.0}
+    made = motor(table)
+    assert {p: made.value(p.name) for p in table} == table
 
 
-def running(table: list[Parameter], setpoint: str, value: float,
-            request: Iterable[Parameter] = ()) -> SimulatedDataModelDrive:
+def test_limits_in_any_direction() -> None:
+    registers = motor([
+        parameter('x', 1, type=INT16, scale=-0.5, minimum=-10.0, maximum=20.0),
+        parameter('y', 2, maximum=15.0), parameter('z', 3, type=ParameterType.BOOL),
+        parameter('w', 4, minimum=0.4, maximum=0.6)]).registers
+    assert [(registers.clamped(name, -50), registers.clamped(name, 50))
+            for name in 'xyzw'] == [(-40, 20), (0, 15), (0, 1), (0, 0)]
+
+
+# -- a speed --------------------------------------------------------------------------------------
+
+
+def running(table: list[Parameter], setpoint: Parameter, value: float,
+            **options: Any) -> SimulatedDataModelDrive:
     """Make a drive that has followed a setpoint for ten seconds."""
-    plant = motor(table, request=request)
-    plant.set_value(setpoint, value)
-    plant.handle_timer(0.0)
-    plant.handle_timer(10.0)
-    return plant
+    made = motor(table, **options)
+    made.set_value(setpoint.name, value)
+    made.handle_timer(0.0)
+    made.handle_timer(10.0)
+    return made
 
 
 @pytest.mark.parametrize(('name', 'options', 'value'), [
+    ('output_frequency', {'scale': 0.1, 'unit': 'Hz'}, 25.0),
+    ('output_speed', {'scale': 0.1, 'unit': '%'}, 50.0),
     ('dc_link_voltage', {'scale': 0.1, 'unit': 'V'}, 560.0 * 0.993),
     ('output_voltage', {'scale': 0.1, 'unit': 'V'}, 560.0 * 0.7 / 2),
     ('actual_torque', {'scale': 0.1, 'unit': '%'}, 20.0),
@@ -268,97 +127,109 @@ def running(table: list[Parameter], setpoint: str, value: float,
     ('motor_load', {'unit': '%'}, 20.0),
     ('motor_current', {'scale': 0.01, 'unit': 'A'}, 2.83),
     ('motor_temperature', {'scale': 0.1, 'unit': 'degC'}, 25.3),
-    ('motor_temperature', {'scale': 0.1, 'unit': 'K'}, 298.5),
-    ('motor_temperature', {'scale': 0.1, 'unit': 'degF'}, 77.6),
+    ('position', {'unit': 'rev', 'type': INT16}, 243.75),
     ('fault_code', {}, 0),
     ('firmware_torque_limit', {'maximum': 40.0}, 40),
 ])
 def test_quantities_at_half_speed(name: str, options: dict[str, Any], value: float) -> None:
     made = parameter(name, 3, access=RO, **options)
-    plant = running([*EXAMPLE[:3], made], 'speed_setpoint', 1500.0)
+    plant = running([*EXAMPLE[:3], made], SPEED_SETPOINT, 1500.0)
     assert plant.value(name) == pytest.approx(value, abs=1.0 if name != 'fault_code' else 0.0)
 
 
-def test_torque_setpoint_is_followed_and_ends_with_a_fault() -> None:
+def test_values_never_leave_their_type() -> None:
+    small = parameter('actual_torque', 3, scale=0.0001, unit='Nm', type=INT16, access=RO)
+    plant = running([*EXAMPLE, small], SPEED_SETPOINT, -3000.0)
+    assert -3.2768 <= plant.value('actual_torque') < 0.0
+
+
+@pytest.mark.parametrize(('ramps', 'speeds'), [
+    ({}, [3000.0, 0.0]),
+    ({'acceleration': ('rpm/s', 600.0)}, [600.0, 0.0]),
+    ({'ramp_up_time': ('s', 2.0), 'ramp_down_time': ('s', 4.0)}, [1500.0, 750.0])])
+def test_ramps_by_use(ramps: dict[str, tuple[str, float]], speeds: list[float]) -> None:
+    made = motor([SPEED_SETPOINT, ACTUAL_SPEED, *(
+        parameter(name, 3 + place, unit=unit) for place, (name, (unit, _)) in enumerate(
+            ramps.items()))])
+    for name, (_, value) in ramps.items():
+        made.set_value(name, value)
+    made.handle_timer(0.0)
+    found = []
+    for now, target in ((1.0, 3000.0), (2.0, 0.0)):
+        made.set_value('speed_setpoint', target)
+        found.append(made.value('actual_speed', now))
+    assert found == speeds
+
+
+def test_current_follows_acceleration_and_load_and_ends_with_the_torque() -> None:
+    made = motor([*EXAMPLE, CONTROL_WORD], CONTROL)
+    made.set_value('speed_setpoint', 3000.0)
+    made.handle_timer(0.0)
+    made.registers.write('control_word', ENABLE)
+    # at rest, while it speeds up, again at that instant, at speed, in the quick stop, after it
+    currents = [made.value('motor_current', now) for now in (0.0, 0.5, 0.5, 2.0)]
+    made.registers.write('control_word', QUICK_STOP)
+    currents += [made.value('motor_current', now) for now in (2.1, 3.0)]
+    at_rest, rising, again, at_speed, braking, over = currents
+    assert at_rest < at_speed < rising == again
+    assert braking > over == 0.0
+    made.registers.write('control_word', DISABLE)
+    made.registers.write('control_word', ENABLE)
+    assert made.value('motor_current', 4.0) > 0.0
+    made.fault('trip', 4.0)
+    assert made.value('motor_current') == 0.0
+
+
+def test_another_setpoint_is_followed_and_ends_with_a_fault() -> None:
     setpoint = parameter('torque_setpoint', 3, unit='%', type=INT16)
     actual = parameter('actual_torque', 4, unit='%', type=INT16, access=RO)
-    plant = running([*EXAMPLE, setpoint, actual], 'torque_setpoint', 50.0)
+    plant = running([*EXAMPLE, setpoint, actual], setpoint, 50.0)
     assert plant.value('actual_torque') == 50.0
     plant.plant.operation.trip()
     plant.handle_timer(20.0)
     assert plant.value('actual_torque') == 0.0
 
 
-def test_ramps_by_use() -> None:
-    table = [SPEED_SETPOINT, ACTUAL_SPEED, parameter('ramp_up_time', 1, unit='s'),
-             parameter('ramp_down_time', 2, unit='s'),
-             parameter('quick_stop_ramp', 3, scale=0.1, unit='s')]
-    plant = motor(table)
-    assert plant.value('quick_stop_ramp') == pytest.approx(0.2)
-    plant.registers.write('ramp_up_time', 2)
-    plant.registers.write('ramp_down_time', 4)
-    plant.set_value('speed_setpoint', 3000.0)
-    plant.handle_timer(0.0)
-    plant.handle_timer(1.0)
-    assert plant.value('actual_speed') == 1500.0
-    plant.set_value('speed_setpoint', 0.0)
-    plant.handle_timer(2.0)
-    assert plant.value('actual_speed') == 750.0
+AMPS = parameter('current_limit', 60, scale=0.1, unit='A')
+FAST = parameter('maximum_speed', 61, scale=0.1, unit='rpm')
 
 
-@pytest.mark.parametrize('mover', [SPEED_SETPOINT, POSITION_SETPOINT])
-def test_a_brake_holds_at_once(mover: Parameter) -> None:
-    plant = motor([*BOTH, CONTROL_WORD], CONTROL, [mover], brake=1)
-    plant.handle_timer(0.0)
-    plant.registers.write('control_word', 1)
-    plant.set_value(mover.name, 3000.0)
-    plant.handle_timer(0.5)
-    assert plant.value('actual_speed') > 0.0
-    plant.registers.write('control_word', 0)
-    plant.handle_timer(0.5)
-    assert plant.value('actual_speed') == 0.0
+@pytest.mark.parametrize(('limit', 'value', 'target', 'load', 'speed'), [
+    (TORQUE_LIMIT, 100.0, 1500.0, 0.0, 1500.0), (TORQUE_LIMIT, 0.0, 1500.0, 0.0, 0.0),
+    (TORQUE_LIMIT, 20.0, 1500.0, 0.5, -150.0),          # it sinks
+    (AMPS, 2.0, 1500.0, 0.0, 0.0),                      # all of it magnetises
+    (AMPS, 10.0, 1500.0, 0.0, 1500.0),
+    (FAST, 300.0, 1500.0, 0.0, 300.0), (FAST, 300.0, -1500.0, 0.0, -300.0),
+    # what nobody can scale is a register; and a new drive is not limited
+    (parameter('torque_limit', 62, unit='s', scaled=True), 0.0, 1500.0, 0.0, 1500.0),
+    (parameter('torque_limit', 62, unit='%', scaled=True), None, 1500.0, 0.0, 1500.0),
+    (FAST, None, 1500.0, 0.0, 1500.0), (AMPS, None, 1500.0, 0.0, 1500.0)])
+def test_limits(limit: Parameter, value: float | None, target: float, load: float,
+                speed: float) -> None:
+    made = motor([SPEED_SETPOINT, ACTUAL_SPEED, limit], load=load)
+    if value is not None:
+        made.set_value(limit.name, value)
+    made.set_value('speed_setpoint', target)
+    made.handle_timer(0.0)
+    assert made.value('actual_speed', 3.0) == pytest.approx(speed)
 
 
-def test_no_current_as_soon_as_it_trips() -> None:
-    plant = motor(EXAMPLE)
-    plant.set_value('speed_setpoint', 3000.0)
-    plant.handle_timer(0.0)
-    plant.handle_timer(2.0)
-    assert plant.value('motor_current') > 0.0
-    plant.fault('trip', 2.0)
-    assert plant.value('motor_current') == 0.0
-
-
-def test_no_current_once_a_quick_stop_is_over() -> None:
-    plant = motor([*EXAMPLE, CONTROL_WORD], CONTROL)
-    plant.handle_timer(0.0)
-    plant.registers.write('control_word', 1)
-    plant.set_value('speed_setpoint', 3000.0)
-    plant.handle_timer(2.0)
-    plant.registers.write('control_word', 2)
-    plant.handle_timer(2.1)
-    assert plant.value('motor_current') > 0.0
-    plant.handle_timer(3.0)
-    assert (plant.value('actual_speed'), plant.value('motor_current')) == (0.0, 0.0)
-
-
-def test_torque_of_an_acceleration_is_still_there_at_the_same_instant() -> None:
-    plant = motor(EXAMPLE)
-    plant.set_value('speed_setpoint', 3000.0)
-    currents = []
-    for now in (0.0, 0.5, 0.5):
-        plant.handle_timer(now)
-        currents.append(plant.value('motor_current'))
-    assert currents[0] < currents[1] == currents[2]
+def test_without_torque_it_runs_down_instead_of_braking() -> None:
+    made = running([SPEED_SETPOINT, ACTUAL_SPEED, TORQUE_LIMIT], SPEED_SETPOINT, 1500.0)
+    made.set_value('torque_limit', 0.0)
+    made.set_value('speed_setpoint', 0.0)
+    assert made.value('actual_speed', 10.5) == pytest.approx(1125.0)     # 3000 rpm in 4 s
+    made.set_value('torque_limit', 100.0)
+    assert made.value('actual_speed', 11.0) == 0.0
 
 
 def test_time_never_runs_backwards() -> None:
     # a frame may have waited, and be told with the time of its arrival
-    plant = motor(EXAMPLE)
-    plant.set_value('speed_setpoint', 3000.0)
+    made = motor(EXAMPLE)
+    made.set_value('speed_setpoint', 3000.0)
     for now in (0.0, 0.5, 0.4, 0.5):
-        plant.handle_timer(now)
-    assert plant.value('actual_speed') == 1500.0
+        made.handle_timer(now)
+    assert made.value('actual_speed') == 1500.0
 
 
 def test_overlapping_status_patterns() -> None:
@@ -373,3 +244,133 @@ def test_overlapping_status_patterns() -> None:
     assert plant.registers.raw('status_word') == 3
     plant.plant.operation.trip()
     assert plant.registers.raw('status_word') == 4
+
+
+def test_power_cycle_keeps_what_eeprom_keeps() -> None:
+    made = motor([*EXAMPLE, parameter('gain', 60, storage=RAM), parameter('offset_angle', 61)])
+    initial = made.registers.raw('gain')
+    for name in ('gain', 'offset_angle', 'ramp_time', 'speed_setpoint'):
+        made.registers.write(name, 999)
+    made.fault('restart=0', 1.0)
+    assert [made.registers.raw(name) for name in (
+        'gain', 'offset_angle', 'ramp_time', 'speed_setpoint')] == [initial, 999, 999, 0]
+
+
+# -- a position -----------------------------------------------------------------------------------
+
+
+def axis(**mechanics: float) -> SimulatedDataModelDrive:
+    """Make a drive with a control word, a position setpoint and its actual value."""
+    return motor((WHERE, ANGLE, CONTROL_WORD, STATUS_WORD), CONTROL, (CONTROL_WORD, WHERE),
+                 (ANGLE, STATUS_WORD), **mechanics)
+
+
+def exchange(made: SimulatedDataModelDrive, word: int, target: float, now: float) -> float:
+    """Send control word and setpoint; return the position that is answered."""
+    target_raw = round(target * 10) & 0xFFFF
+    answer, = ask(made, f'003FFFF0#{word:04X}{target_raw:04X}00000000', now)
+    return int.from_bytes(bytes.fromhex(answer[9:13]), 'big', signed=True) / 10
+
+
+@pytest.mark.parametrize(('mechanics', 'steps'), [
+    # 1000 degrees per second squared; and without a load it stays where it is
+    ({}, [(DISABLE, 0.0, 0.0, 0.0), (ENABLE, 0.0, 0.0, 0.0), (ENABLE, 900.0, 1.0, 0.0),
+          (ENABLE, 900.0, 1.1, 5.0), (ENABLE, 900.0, 1.2, 20.0), (ENABLE, 900.0, 4.0, 900.0),
+          (DISABLE, 900.0, 5.0, 900.0), (DISABLE, 0.0, 60.0, 900.0)]),
+    # half the load: 50 degrees a second, reached in 0.2 s; it is caught again
+    ({'load': 0.5}, [(ENABLE, 500.0, 0.0, 0.0), (ENABLE, 500.0, 5.0, 500.0),
+                     (DISABLE, 500.0, 60.0, 500.0), (DISABLE, 500.0, 60.2, 495.0),
+                     (DISABLE, 500.0, 61.2, 445.0), (ENABLE, 445.0, 61.2, 445.0),
+                     (ENABLE, 445.0, 70.0, 445.0)]),
+    # a brake closes at once
+    ({'load': 1.0, 'brake': 1}, [(ENABLE, 500.0, 0.0, 0.0), (DISABLE, 500.0, 5.0, 500.0),
+                                 (DISABLE, 500.0, 60.0, 500.0)]),
+    # 500 degrees a second, at 5000 degrees per second squared
+    ({}, [(ENABLE, 1000.0, 0.0, 0.0), (QUICK_STOP, 1000.0, 0.5, 125.0),
+          (QUICK_STOP, 1000.0, 0.6, 150.0), (ENABLE, 1000.0, 5.0, 150.0)])])
+def test_axis(mechanics: dict[str, float],
+              steps: list[tuple[int, float, float, float]]) -> None:
+    made = axis(**mechanics)
+    assert [exchange(made, *step[:3]) for step in steps] == [step[3] for step in steps]
+
+
+@pytest.mark.parametrize(('fault', 'back'), [('power_cut=2', 12.0), ('power_cut', 15.0)])
+def test_sinks_without_power_and_does_not_jump_when_it_is_back(fault: str, back: float) -> None:
+    made = running([WHERE, ANGLE], WHERE, 700.0, request=(WHERE,), response=(ANGLE,), load=0.1)
+    assert made.value('actual_position') == 700.0
+    made.fault(fault, 10.0)
+    assert ask(made, '003FFFF0#0000000000000000', back - 0.01) == []
+    sunk = float(made.value('actual_position', back))
+    # 10 degrees a second
+    assert sunk == pytest.approx(700.0 - 10.0 * (back - 10.0), abs=0.5)
+    # a drive without a control word holds the place where it finds itself
+    assert made.value('position_setpoint') == sunk
+    assert made.value('actual_position', back + 100.0) == sunk
+
+
+def test_encoder_noise_is_the_same_each_time() -> None:
+    made, other = axis(noise=1), axis(noise=1)
+    for each in (made, other):
+        exchange(each, ENABLE, 500.0, 0.0)
+    seen = [exchange(made, ENABLE, 500.0, 10.0 + 0.01 * step) for step in range(100)]
+    assert set(seen) == {499.9, 500.0, 500.1}
+    assert seen == [exchange(other, ENABLE, 500.0, 10.0 + 0.01 * step) for step in range(100)]
+    # one measurement is one value, however often it is asked for
+    assert made.value('actual_position') == made.value('actual_position')
+
+
+def test_position_of_a_shaft_that_a_speed_moves() -> None:
+    speed = parameter('speed_setpoint', 50, type=INT16, unit='rpm', minimum=-600.0, maximum=600.0)
+    made = motor((speed, ANGLE, CONTROL_WORD), CONTROL, (CONTROL_WORD, speed), (ANGLE,), load=1.0)
+    made.handle_timer(0.0)
+    # 60 rpm are 360 degrees a second, reached in 0.4 s
+    assert made.value('actual_position', 1.4) == pytest.approx(-360.0 - 72.0, abs=0.1)
+
+
+def test_speed_of_a_shaft_that_a_position_moves() -> None:
+    made = running([SPEED_SETPOINT, WHERE, ACTUAL_SPEED, ANGLE], WHERE, 0.0, request=(WHERE,))
+    made.set_value('position_setpoint', 1000.0)
+    # 100 degrees a second after 0.1 s
+    assert made.value('actual_speed', 10.1) == pytest.approx(100.0 / 6.0, abs=0.1)
+
+
+def test_names_without_a_meaning_are_understood_by_their_units() -> None:
+    wanted = parameter('height_wanted', 53, type=INT16, scale=0.1, unit='mm', minimum=0.0,
+                       maximum=500.0)
+    measured = parameter('height', 214, type=INT16, scale=0.1, unit='mm', access=RO)
+    diameter = parameter('diameter', 215, unit='mm', access=RO)
+    made = motor((wanted, measured, diameter), None, (wanted,), (measured,))
+    before = made.value('diameter')
+    made.set_value('height_wanted', 300.0, 0.0)
+    made.handle_timer(10.0)
+    # what is not exchanged cyclically is left alone
+    assert (made.value('height'), made.value('diameter')) == (300.0, before)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(-50.0, 50.0)), max_size=20),
+       st.booleans())
+def test_it_does_not_matter_how_often_time_passes(steps: list[tuple[float, float]],
+                                                  by_position: bool) -> None:
+    coarse, fine = Travel(), Travel()
+    for duration, target in steps:
+        for travel, times in ((coarse, 1), (fine, 4)):
+            for _ in range(times):
+                if by_position:
+                    travel.go(duration / times, target, 10.0, 20.0)
+                    assert abs(travel.speed) <= 10.0 + 1e-9
+                else:
+                    travel.run(duration / times, target, Rates(rising=10.0, falling=20.0))
+        assert fine.position == pytest.approx(coarse.position, abs=1e-5)
+
+
+@pytest.mark.parametrize(('text', 'expected'), [
+    ('load=0.3', Mechanics(load=0.3)), ('noise=1,brake=1', Mechanics(noise=1, brake=1)),
+    (' load=1, noise=0', Mechanics(load=1.0)), *((text, None) for text in (
+        '', 'load', 'load=', 'load=2', 'load=nan', 'noise=0.5', 'brake=2', 'weight=1',
+        'load=-0.1'))])
+def test_options_of_an_axis(text: str, expected: Mechanics | None) -> None:
+    if expected is not None:
+        assert Mechanics.parse(text) == expected
+    else:
+        with pytest.raises(ValueRefused, match='load=0…1, noise=0…100, brake=0…1'):
+            Mechanics.parse(text)

@@ -113,10 +113,6 @@ class TestCommands:
             for received in adapter.receive_bytes(chunk):
                 assert received.identifier <= EXTENDED_IDENTIFIER_MAX
 
-    @given(st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.booleans()))
-    def test_what_one_adapter_writes_another_reads(self, sent: Frame) -> None:
-        assert opened().receive_bytes(opened().encode(sent, 0.0)) == [sent]
-
 
 def client(terminal: SlcanTerminal | str, **options: Any) -> can.BusABC:
     path = terminal if isinstance(terminal, str) else terminal.path
@@ -224,25 +220,6 @@ class TestTerminal:
         finally:
             os.close(reader)
 
-    def test_frames_are_dropped_while_closed(self, terminal: SlcanTerminal) -> None:
-        terminal.send(frame('123#'))
-        with client(terminal) as bus:
-            wait_open(terminal)
-            terminal.send(frame('321#'))
-            message = bus.recv(10.0)
-            assert message is not None
-            assert message.arbitration_id == 0x321
-
-    def test_no_echo(self, terminal: SlcanTerminal) -> None:
-        raw = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
-        try:
-            os.write(raw, b'O\rt1230\r')
-            assert receive(terminal) == frame('123#')
-            terminal.send(frame('321#'))
-            assert terminal.receive(0.05) is None
-        finally:
-            os.close(raw)
-
     def test_closed(self, terminal: SlcanTerminal) -> None:
         terminal.close()
         terminal.close()
@@ -264,12 +241,6 @@ class TestLink:
         terminal.close()
         assert not link.is_symlink()
         assert list(link.parent.iterdir()) == []
-
-    def test_replaces_an_old_link(self, terminal: SlcanTerminal, tmp_path: Path) -> None:
-        link = tmp_path / 'main'
-        link.symlink_to('/dev/pts/nowhere')
-        terminal.link(link)
-        assert os.readlink(link) == terminal.path
 
     def test_leaves_a_link_that_another_took_over(
             self, terminal: SlcanTerminal, tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
 CODES = {
     Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
-    Refusal.CROSSED: 0x06090036,
     Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
     Refusal.TOO_EARLY: abort_codes.DEVICE_STATE,
 }
