@@ -132,20 +132,24 @@ def module_exists(name: str) -> bool:
 
 
 @cache
-def tree_of(path: Path) -> ast.Module:
-    """Return what a file consists of."""
-    return ast.parse(path.read_text(encoding='utf-8'), str(path))
+def nodes_of(path: Path) -> list[ast.AST]:
+    """Return everything that a file consists of."""
+    return list(ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))))
 
 
-def imports_of(path: Path) -> Iterator[Import]:
-    """Go through the imports of a file; names of modules are complete."""
+@cache
+def imports_of(path: Path) -> list[Import]:
+    """Return the imports of a file; names of modules are complete."""
+    return list(_imports_of(path))
+
+
+def _imports_of(path: Path) -> Iterator[Import]:
     package = ['drive_can_bridge', *path.relative_to(PACKAGE).parent.parts]
     lazy_nodes: set[ast.AST] = set()
-    tree = tree_of(path)
-    for node in ast.walk(tree):
+    for node in nodes_of(path):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             lazy_nodes.update(ast.walk(node))
-    for node in ast.walk(tree):
+    for node in nodes_of(path):
         lazy = node in lazy_nodes
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -265,7 +269,7 @@ def classes() -> dict[str, Class]:
     """Return all classes of the package by name."""
     found: dict[str, Class] = {}
     for path in SOURCES:
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.ClassDef):
                 bases = [base.value if isinstance(base, ast.Subscript) else base
                          for base in node.bases]
@@ -318,7 +322,7 @@ def of_self(node: ast.AST) -> bool:
 def own_names(path: Path) -> set[str]:
     """Return the private names that the classes of a module give to what is their own."""
     names = set()
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.FunctionDef):
             names.add(node.name)
         elif (isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
@@ -332,7 +336,7 @@ def test_what_is_private_is_used_in_its_own_module_only(source: Path) -> None:
     elsewhere = set().union(*map(own_names, SOURCES)) - own_names(source) - set(dir(Import))
     wrong = [
         f'{source}:{node.lineno}: {ast.unparse(node)}'
-        for node in ast.walk(tree_of(source))
+        for node in nodes_of(source)
         if isinstance(node, ast.Attribute) and private(node) and not of_self(node)
         and node.attr in elsewhere and not ast.unparse(node).startswith('super()')]
     assert not wrong, '\n'.join(wrong)
@@ -346,7 +350,7 @@ def test_no_session_uses_anything_private_of_what_all_share() -> None:
             shared = base - own_names(found.source)
             wrong += [
                 f'{found.source}:{node.lineno}: {ast.unparse(node)}'
-                for node in ast.walk(tree_of(found.source))
+                for node in nodes_of(found.source)
                 if isinstance(node, ast.Attribute) and private(node) and node.attr in shared]
     assert not wrong, '\n'.join(wrong)
 
@@ -361,7 +365,7 @@ def test_whether_a_stop_is_owed_is_asked_of_the_session_only() -> None:
     wrong = [
         f'{source}:{node.lineno}: {ast.unparse(node)}'
         for source in SOURCES if source.relative_to(PACKAGE).as_posix() not in inside
-        for node in ast.walk(tree_of(source))
+        for node in nodes_of(source)
         if isinstance(node, ast.Attribute) and node.attr not in ('happened', 'channel', 'runs')
         and (isinstance(node.value, ast.Attribute) and node.value.attr == 'duty'
              or isinstance(node.value, ast.Name) and node.value.id == 'duty')]

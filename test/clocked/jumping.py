@@ -50,7 +50,8 @@ class Task:
         self.ticket = 0     # of its wait: what woke it before is out of date
         self._clock = clock
         self._run = run
-        self._turn = threading.Semaphore(0)
+        self._turn = threading.Lock()       # held until it is its turn
+        self._turn.acquire()
         self._begun = self._ended = False
         self._joining: list[Task] = []
 

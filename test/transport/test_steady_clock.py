@@ -2,6 +2,7 @@
 """Only the steady clock decides when something happens: the system clock may be set any time."""
 
 import ast
+from functools import cache
 from pathlib import Path
 import subprocess
 import sys
@@ -27,11 +28,16 @@ SYSTEM_CLOCK = {'time', 'time_ns', 'localtime', 'gmtime', 'strftime', 'ctime', '
                 'CLOCK_REALTIME', 'datetime'}
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    """Return everything that a module consists of."""
+    return list(ast.walk(ast.parse(path.read_text(encoding='utf-8'))))
+
+
 def looks(path: Path) -> int:
     """Count the places where a module looks at the system clock."""
-    tree = ast.parse(path.read_text(encoding='utf-8'))
     count = 0
-    for node in ast.walk(tree):
+    for node in nodes(path):
         if isinstance(node, ast.Attribute) and node.attr in SYSTEM_CLOCK and isinstance(
                 node.value, ast.Name) and node.value.id in ('time', 'datetime'):
             count += 1
@@ -82,7 +88,7 @@ WAYS = {'monotonic', 'monotonic_ns', 'perf_counter', 'sleep', 'thread_time', 'pr
 def test_everybody_else_is_handed_a_clock() -> None:
     found = set()
     for path in PACKAGE.rglob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        for node in nodes(path):
             if isinstance(node, ast.Attribute) and node.attr in WAYS and isinstance(
                     node.value, ast.Name) and node.value.id in ('time', 'threading', 'queue'):
                 found.add(path.relative_to(PACKAGE).as_posix())
