@@ -32,7 +32,7 @@ from rich.text import Text
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.ros.monitor.client import MonitorClient
-from drive_can_bridge.view.page import Choice, page, Setting
+from drive_can_bridge.view.live import Choice, page, Setting
 from drive_can_bridge.view.parts import TREND_SPAN
 
 HERE = Path(__file__).resolve().parent

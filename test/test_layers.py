@@ -46,7 +46,7 @@ INTERNAL: dict[str, set[str]] = {
     'ros.client': {'', 'clock', 'core', 'ros.recognition'},
     'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
-    'demo': {'', 'clock', 'core', 'configuration', 'process'},
+    'demo': {''},
     'client.drive': {'', 'core', 'process'},
     'client.bridge': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
     'client': {
@@ -84,7 +84,6 @@ EXTERNAL: dict[str, set[str]] = {
     'view': {'rich'},
     # an optional extra
     'panel': {'fastapi', 'nicegui', 'starlette', 'uvicorn'},
-    'demo': {'yaml'},
     # argcomplete: an optional extra
     'cli': {'argcomplete', 'rich'},
 }
@@ -92,7 +91,7 @@ EXTERNAL: dict[str, set[str]] = {
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
-        ('cli', 'view'), ('cli', 'panel'), ('cli', 'demo'), ('client', 'client.bridge')}
+        ('cli', 'view'), ('cli', 'panel'), ('client', 'client.bridge')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

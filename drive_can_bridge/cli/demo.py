@@ -2,23 +2,54 @@
 """
 ``drive_can demo``: simulated drives, a bridge and the live view, each a process of its own.
 
-Needs rclpy, but no hardware, no root and no kernel module.
+Needs rclpy, but no hardware, no root and no kernel module. First the drives start, so that the
+bridge finds its buses; the view at once, since it takes a while. At the end the bridge stops the
+drives, and only then do they lose their bus.
 """
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager, ExitStack
+from dataclasses import replace
+import os
 from pathlib import Path
+import signal
+import subprocess
 import sys
+import tempfile
+import termios
 from threading import Event
 
 from drive_can_bridge.cli.command import above_zero, of_drive, what_is_missing, whole, WrongUsage
+from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
+from drive_can_bridge.demo.child import Child
 from drive_can_bridge.process import environment
-from drive_can_bridge.process.signals import SignalWatcher
+from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.simulation import Simulation
 
 PARAMETER_FILE = 'demo.yaml'
+TITLE = 'drive_can demo'
+#: with which the view ends when the user has enough, and not somebody else of the view
+ENOUGH = 64
+#: s between two looks at the processes
+_LOOK_PERIOD = 0.1
+#: s that the simulated drives may take to appear
+_DRIVES_TIMEOUT = 60.0
+#: s that each process gets for its end. A bridge that has lost its drives tries for a while.
+_BRIDGE_PATIENCE = 10.0
+_PATIENCE = 5.0
+#: s that the view gets to end of its own accord, when all others have ended
+_VIEW_PATIENCE = 2.0
+#: leaves the view's screen, shows the cursor
+_RESTORE = '\x1b[?1049l\x1b[?25h'
+#: bit/s that SLCAN adapters know; any other is replaced by the next one above
+_BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 750_000, 1_000_000)
+#: s; who looks at the demo wants to see something soon
+_DIAGNOSTICS_PERIOD_MAX = 1.0
 
 
 def define(parser: argparse.ArgumentParser) -> None:
@@ -67,7 +98,6 @@ def run(args: argparse.Namespace) -> int:
             raise DriveCanError(what_is_missing('drive_can demo', error)) from error
         # imported late: it reads schemas, and --help needs none
         from drive_can_bridge.configuration.load import configuration_from_file
-        from drive_can_bridge.demo.run import Options, run as run_demo
         configuration = configuration_from_file(args.params_file or config_file(PARAMETER_FILE))
         for warning in configuration.warnings:
             print(f'warning: {warning}', file=sys.stderr)
@@ -77,6 +107,204 @@ def run(args: argparse.Namespace) -> int:
                 Simulation(configuration, args.clock).drives[name].fault(fault)
             except ValueRefused as error:
                 raise WrongUsage(f'--fault {text}: {error}') from None
-        return watcher.exit_code(run_demo(Options(
-            configuration, tuple(args.fault), args.drive, args.log_frames, args.duration),
-            watcher, suspension, args.clock))
+        return watcher.exit_code(_run(args, configuration, watcher, suspension))
+
+
+def _run(args: argparse.Namespace, configuration: BridgeConfiguration, watcher: SignalWatcher,
+         suspension: Event) -> int:
+    if args.log_frames is not None:
+        args.log_frames.write_bytes(b'')    # whether it can be written is known now
+    live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')
+    code = 1
+    with ExitStack() as stack:
+        directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='drive_can_')))
+        stack.enter_context(_terminal_restored())
+        demo = Demo(args, configuration, directory, suspension, live=live)
+        try:
+            try:
+                code = demo.watch(watcher) if demo.start(watcher) else 0
+            finally:
+                demo.stop(view_knows=watcher.interrupted)
+        finally:
+            demo.conclude(code)
+    return code
+
+
+def on_terminals(configuration: BridgeConfiguration, directory: Path) -> BridgeConfiguration:
+    """
+    Replace every bus by the pseudo-terminal at ``directory/BUS``, and waiting by a start.
+
+    Nothing of a bus that is replaced is kept but its bit rate.
+    """
+    buses = {name: replace(bus, interface='slcan', channel=str(directory / name), options={},
+                           bitrate=next((rate for rate in _BITRATES if rate >= bus.bitrate),
+                                        _BITRATES[-1]))
+             for name, bus in configuration.buses.items()}
+    period = min(configuration.diagnostics_period, _DIAGNOSTICS_PERIOD_MAX)
+    return replace(configuration, buses=buses, autostart=True, diagnostics_period=period)
+
+
+class Demo:
+    """
+    The processes of a demo.
+
+    :param configuration: its buses are replaced by pseudo-terminals.
+    :param directory: a place of its own.
+    :param suspension: set when somebody wants to suspend the demo.
+    :param live: there is a terminal that the view takes.
+    """
+
+    def __init__(self, args: argparse.Namespace, configuration: BridgeConfiguration,
+                 directory: Path, suspension: Event, *, live: bool) -> None:
+        self._clock: Clock = args.clock
+        self._args = args
+        self._configuration = on_terminals(configuration, directory)
+        self._directory = directory
+        self._suspension = suspension
+        # the view has the terminal: others tell what they have to tell afterwards
+        self._quiet = live and os.isatty(2)
+        self._live = live
+        self._children: list[Child] = []
+        self._view: Child | None = None
+        self._bridge: Child | None = None
+        self._drives: Child | None = None
+
+    def start(self, watcher: SignalWatcher) -> bool:
+        """
+        Start everything.
+
+        :return: False: a signal came first.
+        :raises DriveCanError: the drives do not start.
+        """
+        # imported late: it reads schemas, and --help needs none
+        from drive_can_bridge.configuration.load import write_parameter_file
+        args, directory = self._args, self._directory
+        # the view is in the terminal's foreground, too, and must not be suspended either
+        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        refusal = ['--refuse-to-suspend', NOT_SUSPENDED] if self._live else []
+        self._view = self._start('the view', 'drive_can', 'monitor', '--title', TITLE,
+                                 '--quit-code', str(ENOUGH), *refusal, view=True)
+        signal.signal(signal.SIGTSTP, before)
+        file = directory / PARAMETER_FILE
+        write_parameter_file(self._configuration, file)
+        arguments = ['--params-file', str(file), '--pty-link', str(directory)]
+        for fault in args.fault:
+            arguments += ['--fault', fault]
+        if args.log_frames is not None:
+            arguments += ['--log-frames', str(args.log_frames)]
+        self._drives = self._start('the simulation', 'drive_can', 'simulate', *arguments)
+        deadline = self._clock.now() + _DRIVES_TIMEOUT
+        while not all((directory / name).is_symlink() for name in self._configuration.buses):
+            if watcher.wait(_LOOK_PERIOD / 4) is not None:
+                return False
+            if self._drives.code is not None or self._clock.now() > deadline:
+                raise DriveCanError(f'{TITLE}: the simulated drives did not start')
+        self._bridge = self._start('the bridge', 'drive_can_bridge', '--ros-args',
+                                   '--params-file', str(file))
+        if args.drive:
+            self._start('the commander', 'commander', str(file))
+        return True
+
+    def watch(self, watcher: SignalWatcher) -> int:
+        """
+        Wait for the end.
+
+        :return: exit code: 0 after a signal, the duration, or when the user has enough.
+        """
+        begun, duration = self._clock.now(), self._args.duration
+        while True:
+            left = _LOOK_PERIOD if duration is None else min(
+                _LOOK_PERIOD, max(0.0, begun + duration - self._clock.now()))
+            if watcher.wait(left) is not None:
+                return 0
+            if self._suspension.is_set():
+                self._suspension.clear()
+                self._refuse_to_suspend()
+            for child in self._children:
+                if child.code is None or child.told:
+                    continue
+                if watcher.signalled or child is self._view and child.code == ENOUGH:
+                    return 0
+                if child.code > 0:  # of its own accord: it has said why, or will
+                    return 1
+                child.told = True
+                self._tell(child)
+            if duration is not None and self._clock.now() >= begun + duration:
+                return 0
+
+    def stop(self, *, view_knows: bool) -> None:
+        """
+        End everything, the drives after the bridge.
+
+        :param view_knows: it has got Ctrl-C itself: another signal would end it before it has
+            given the terminal back.
+        """
+        bridge, drives, view = self._bridge, self._drives, self._view
+        for child in self._children:
+            if child is not bridge and child is not drives and not (view_knows and child is view):
+                child.ask_to_end()
+        for process, signum, patience in ((bridge, signal.SIGINT, _BRIDGE_PATIENCE),
+                                          (drives, signal.SIGTERM, _PATIENCE)):
+            if process is not None:
+                process.ask_to_end(signum)
+                if not process.wait(patience):
+                    self._say(f'{process.what} did not end in {patience:g} s and was killed')
+        if view is not None and not view.ends(_VIEW_PATIENCE):
+            view.ask_to_end()
+        for child in self._children:
+            child.wait(_PATIENCE)
+
+    def conclude(self, code: int) -> None:
+        """Say what is left to say, now that the terminal is free."""
+        for child in self._children:
+            if code and child.errors():
+                sys.stderr.write(child.errors())
+        frame_log = self._args.log_frames
+        if self._live and frame_log is not None:
+            with frame_log.open('rb') as file:
+                count = sum(1 for _ in file)
+            print(f'{count} frames in {frame_log}')
+
+    # -- inside -----------------------------------------------------------------------------------
+
+    def _start(self, what: str, program: str, *arguments: str, view: bool = False) -> Child:
+        log = self._directory / f'{len(self._children)}.log' if self._quiet and not view else None
+        child = Child(what, program, *arguments, shared=view, log=log,
+                      output=None if view else subprocess.DEVNULL)
+        self._children.append(child)
+        return child
+
+    def _refuse_to_suspend(self) -> None:
+        """Say why, or have it said by the view, which has the terminal."""
+        if self._live and self._view is not None and self._view.code is None:
+            self._view.process.send_signal(signal.SIGTSTP)
+        else:
+            self._say(NOT_SUSPENDED)
+
+    def _tell(self, child: Child) -> None:
+        """Say that a process has ended, and that the others go on."""
+        if child is self._view:
+            if self._live:
+                sys.stdout.write(_RESTORE)
+                sys.stdout.flush()
+            self._say(f'the view has ended ({child.end}); bridge and drives run on until Ctrl-C, '
+                      f'and drive_can monitor shows them')
+        elif not (self._live and self._view is not None and self._view.code is None):
+            self._say(f'{child.what} has ended ({child.end}); the others run on until Ctrl-C')
+
+    def _say(self, text: str) -> None:
+        print(f'{TITLE}: {text}', file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _terminal_restored() -> Iterator[None]:
+    """Leave the keyboard as it was, whatever the view died of."""
+    try:
+        settings = termios.tcgetattr(0)
+    except termios.error:
+        yield
+        return
+    try:
+        yield
+    finally:
+        termios.tcsetattr(0, termios.TCSANOW, settings)

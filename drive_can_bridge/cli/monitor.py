@@ -92,8 +92,7 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
     if (not args.json and sys.stdout.isatty()
             and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')):
         try:
-            from drive_can_bridge.view.live import show
-            from drive_can_bridge.view.page import Setting
+            from drive_can_bridge.view.live import Setting, show
         except ImportError as error:
             print(f'{args.title}: no live view without the Python module {error.name}',
                   file=sys.stderr)

@@ -27,8 +27,7 @@ from starlette.routing import Route
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.core.words import counted
-from drive_can_bridge.monitor.snapshot import DriveSnapshot
-from drive_can_bridge.monitor.snapshot import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Outcome, Stop
 from drive_can_bridge.panel.access import ROLE, Role
 from drive_can_bridge.panel.feed import Feed
 
@@ -43,16 +42,9 @@ _BUSY = 'others are at it already: try again in a moment'
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
-    """
-    What a command has done.
+class Done(Outcome):
+    """What a command has done: ``file`` is what it wrote."""
 
-    :param text: what it said.
-    :param file: what it wrote.
-    """
-
-    ok: bool
-    text: str
     file: bytes = b''
 
 
@@ -203,7 +195,7 @@ class Actions:
     async def _backup(self, request: Request) -> Response:
         drive = self._drive(request.query_params.get('drive'))
         made = await self._backups.make(drive)
-        if not made.ok:
+        if not made.success:
             return Response(f'{made.text}\n', 503, media_type='text/plain')
         name = drive.name[1:].replace('/', '_')
         return Response(made.file, media_type='application/yaml', headers={
@@ -213,15 +205,13 @@ class Actions:
     async def _compare(self, request: Request) -> Response:
         _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
-        compared = await self._backups.compare(drive, await request.body())
-        return JSONResponse({'success': compared.ok, 'text': compared.text})
+        return _said(await self._backups.compare(drive, await request.body()))
 
     async def _restore(self, request: Request) -> Response:
         self._writer(request, 'restoring a backup')
         _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
-        restored = await self._backups.restore(drive, await request.body())
-        return JSONResponse({'success': restored.ok, 'text': restored.text})
+        return _said(await self._backups.restore(drive, await request.body()))
 
     def _writer(self, request: Request, what: str) -> None:
         _operator(request, what)

@@ -13,8 +13,9 @@ from typing import TypeVar
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.monitor.model import CONTROL_STATE, Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Snapshot
-from drive_can_bridge.monitor.snapshot import Operations, Outcome, Source, Stop
+from drive_can_bridge.monitor.snapshot import (
+    DriveSnapshot, Operations, Outcome, Snapshot, Source, Stop,
+)
 
 #: s between two looks, and while somebody waits for an answer
 PERIOD = 0.5

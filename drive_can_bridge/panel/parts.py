@@ -14,8 +14,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.element import Element
 
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot
-from drive_can_bridge.monitor.snapshot import Stop
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Stop
 from drive_can_bridge.monitor.summary import silence, Tone
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import stops

@@ -6,7 +6,7 @@ import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.view.page import Choice, closely, HINTS, Key, keys_in, Page
+from drive_can_bridge.view.live import Choice, closely, HINTS, Key, keys_in, Page
 
 
 @pytest.mark.parametrize(('width', 'height'), SIZES)

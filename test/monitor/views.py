@@ -16,7 +16,7 @@ from rich.console import Console
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Snapshot
-from drive_can_bridge.view.page import Choice, Page, page, Setting
+from drive_can_bridge.view.live import Choice, Page, page, Setting
 
 GOLDEN = Path(__file__).with_name('golden')
 SIZES = ((80, 24), (140, 50), (60, 20))
