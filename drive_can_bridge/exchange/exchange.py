@@ -216,6 +216,7 @@ class BusExchange:
         self._wake = clock.wake_event()
         self._wake_at = 0.0     # when the next pass is due
         self._back_at = -math.inf   # when the reader will look after that
+        self._asleep_until = -math.inf  # when the timer thread will
         self._meant_at = 0.0    # when the next pass was to be
         self._last_pass = 0.0
         self._tell_at = 0.0
@@ -374,8 +375,8 @@ class BusExchange:
                 if rung or self._clock() >= self._turn():
                     self._serve()
                 with self.lock:
-                    until = self._turn()
-                rung = self._wake.wait(until)
+                    self._asleep_until = self._turn()
+                rung = self._wake.wait(self._asleep_until)
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._fail(f'{type(error).__name__}: {error}')
 
@@ -391,6 +392,9 @@ class BusExchange:
         with self.lock:
             now = self._clock()
             self._back_at = min(self._wake_at, now + longest)
+            oversleeping = self._turn() < self._asleep_until
+        if oversleeping:    # it fell asleep when less was to be done
+            self._wake.ring()
         return max(0.0, self._back_at - now)
 
     def _serve(self) -> None:

@@ -373,6 +373,30 @@ def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: Jumpin
     exchange.close()
 
 
+def test_the_timer_thread_does_not_oversleep_what_the_reader_has_found_out(
+        clock: JumpingClock) -> None:
+    bench = Bench(drive(period=0.005), clock=clock)
+    exchange = bench.exchange
+    exchange.open()
+    exchange.bus_opened()
+    clock.wait(clock.now() + 0.3)       # nothing is to be done, and it sleeps for PASS_PERIOD
+    exchange._keep_time(0.02)
+    # as by a frame that makes something due
+    exchange._wake_at = exchange._members[0].due = due = clock.now() + 0.01
+    exchange._keep_time(0.02)
+    passed: list[float] = []
+    make = exchange._pass
+
+    def note() -> float:
+        passed.append(clock.now())
+        return make()
+    clock.wait(due - 0.005)
+    exchange._pass = note  # type: ignore[method-assign]
+    clock.wait(due + 0.1)       # the reader does not come back
+    assert passed[0] == pytest.approx(due + 0.02)
+    exchange.close()
+
+
 def test_what_a_frame_makes_due_wakes_nobody_but_the_reader() -> None:
     bench = Bench(drive(period=5.0, mapping='assume', parameter_retries=0,
                         parameter_timeout=0.02))
