@@ -18,6 +18,7 @@ STORE = 0x1010
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
 _NAMES_SHOWN = 12
+_OTHER_REFUSED = 'another value of this command is refused'
 #: octal to parameter files, and decimal to most people
 _AMBIGUOUS = re.compile(r'\s*[+-]?0[0-9]')
 
@@ -27,7 +28,8 @@ def define(parser: ArgumentParser) -> None:
     parser.description = (
         'Set parameters of a drive one after the other: through a running bridge, or '
         'directly with --params-file. Each one is acknowledged by the drive, or read '
-        'back. No setpoint, no control word.')
+        'back. Nothing is written where a name or a value is wrong. No setpoint, no control '
+        'word.')
     parser.epilog = (
         'Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
         'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
@@ -73,28 +75,35 @@ def _assignments(words: Sequence[str]) -> dict[str, str]:
 
 
 def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
+    checked = {(drive, name): _checked(drive, name, text)
+               for drive in drives.values() for name, text in wanted.items()}
+    if any(reason for _, reason in checked.values()):   # nobody wants half of a command
+        _show(args, drives, wanted, [
+            (drive, WriteOutcome(name, False, drive.find(name), reason or _OTHER_REFUSED))
+            for (drive, name), (_, reason) in checked.items()])
+        return FAILED
     outcomes: list[tuple[Drive, WriteOutcome]] = []
     try:
         for drive in drives.values():
             with Bar(f'writing {drive.name}', len(wanted), args.clock.now) as bar:
-                for name, text in wanted.items():
-                    _write_one(drive, name, text, outcomes)
+                for name in wanted:
+                    drive.write({name: checked[drive, name][0]},
+                                told=lambda outcome: outcomes.append((drive, outcome)))
                     bar.step()
     finally:    # also what was written before Ctrl-C, or before the bus was lost
         _show(args, drives, wanted, outcomes)
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
 
 
-def _write_one(drive: Drive, name: str, text: str,
-               outcomes: list[tuple[Drive, WriteOutcome]]) -> None:
+def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:
+    """Return the value, and what is wrong with it as far as nobody has to ask the drive."""
     parameter = drive.find(name)
-    value = None if parameter is None else _value(parameter, text)
-    if parameter is not None and value is None:
-        outcomes.append((drive, WriteOutcome(
-            name, False, parameter, f'wrong type: {text!r}, expected {_expected(parameter)}')))
-        return
-    drive.write({name: 0 if value is None else value},
-                told=lambda outcome: outcomes.append((drive, outcome)))
+    if parameter is None:
+        return 0, drive.check(name, 0)
+    value = _value(parameter, text)
+    if value is None:
+        return 0, f'wrong type: {text!r}, expected {_expected(parameter)}'
+    return value, drive.check(name, value)
 
 
 def _value(parameter: Parameter, text: str) -> Value | None:
