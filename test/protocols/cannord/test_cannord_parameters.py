@@ -187,8 +187,8 @@ def test_both_halves_of_a_double_word_are_acknowledged() -> None:
     talk = online()
     talk.submits(write((POSITION, 100000)), 10.003)
     talk.hears('203#655215000000A086', 10.004)
-    assert talk.events(FrameRejected) == [
-        FrameRejected('response to writing P613.21 with another value')]
+    what = 'response to writing P613.21 with another value'
+    assert talk.events(FrameRejected) == [FrameRejected(says('malformed', what=what))]
     talk.hears('203#655215000100A086', 10.005)
     assert talk.outcomes() == [['written']]
 
@@ -197,8 +197,8 @@ def test_an_acknowledgement_with_another_value_is_none() -> None:
     talk = online()
     talk.submits(write((ACCELERATION, 9999)), 10.003)
     talk.hears('203#6610000000006400', 10.004)
-    assert talk.events(FrameRejected) == [
-        FrameRejected('response to writing P102.0 with another value')]
+    what = 'response to writing P102.0 with another value'
+    assert talk.events(FrameRejected) == [FrameRejected(says('malformed', what=what))]
     talk.hears('203#6610000000000F27', 10.006)     # that was a late one, this is the right one
     assert talk.outcomes() == [['written']]
     talk.submits(write((ACCELERATION, 9999)), 10.007)
@@ -245,8 +245,8 @@ def test_reads_are_repeated() -> None:
     assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
     for at in (10.032, 10.033):     # two attempts were given up
         talk.hears('203#6610000000006700', at)
-    assert talk.events(FrameRejected) == [
-        FrameRejected('parameter response that nobody asked for')]
+    what = 'parameter response that nobody asked for'
+    assert talk.events(FrameRejected) == [FrameRejected(says('malformed', what=what))]
 
 
 def test_no_answer_after_all_attempts() -> None:

@@ -10,7 +10,6 @@ from pkw_builders import (
     IDLE, IDLE_ANSWER, LEVEL, online, POSITION, READ_0, READ_1, SPEED, SPEED_0, SPEED_1, START,
     started, STATUS, STILL_0, STILL_1, STOPPED, TORQUE,
 )
-import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.drive_state import DriveState
@@ -394,11 +393,3 @@ def test_lost_time_means_neutral() -> None:
     assert talk.hears('485#C60200AA00000000', 15.001) == []
     assert answered(talk, talk.at(15.05), 15.05) == ['C60200000000']
     assert talk.session.state is DriveState.NOT_ARMED
-
-
-@pytest.mark.parametrize('value', [-0.1, 500.1, math.nan, True])
-def test_bad_commands_change_nothing(value: float) -> None:
-    talk = armed(command_timeout=0.0)
-    with pytest.raises(ValueError, match='.'):
-        talk.commands(0, value, 10.065)
-    assert cycle(talk, 10.07) == ['C60264000000']

@@ -366,47 +366,6 @@ def test_one_alone_is_written_like_any_other() -> None:
 # -- refusals -------------------------------------------------------------------------------------
 
 
-def test_inactive_and_bus_down() -> None:
-    talk = Conversation(drive())
-    talk.submits(read(GAIN, DAMPING), 1.0)
-    talk.activate(2.0)
-    talk.submits(read(GAIN), 3.0)
-    assert talk.outcomes() == [['bridge inactive', 'bridge inactive'], ['bus down']]
-    assert talk.session.statistics.requests_failed == 3
-
-
-def test_open_requests_end_with_the_bus_and_with_activity() -> None:
-    talk = quiet()
-    talk.submits(read(GAIN, RAMP), 10.1)
-    talk.submits(write((GAIN, 7)), 10.1)
-    talk.bus_down(10.11)
-    assert talk.outcomes() == [['bus down', 'bus down'], ['bus down']]
-    talk.bus_up(11.0)
-    talk.submits(read(GAIN), 11.1)
-    talk.deactivate(11.11)
-    assert talk.outcomes() == [['bridge inactive']]
-    talk.submits(read(GAIN), 11.12)
-    assert talk.outcomes() == [['bridge inactive']]
-
-
-def test_queue_is_bounded() -> None:
-    talk = quiet()
-    for _ in range(66):
-        talk.submits(read(GAIN), 10.1)
-    assert talk.outcomes() == [['busy']]            # one is served, 64 wait
-    talk.hears('10200281#0001000000000000', 10.11)
-    talk.submits(read(GAIN), 10.12)
-    talk.submits(read(GAIN), 10.12)
-    assert talk.outcomes() == [[1], ['busy']]
-    served = 0
-    now = 10.13
-    while talk.hears('10200281#0001000000000000', now):
-        served += 1
-        now += 0.001
-    assert served == 64
-    assert talk.outcomes() == [[1]] * 65
-
-
 def test_every_request_is_answered_by_itself() -> None:
     talk = quiet()
     first, second = read(GAIN), read(GAIN)

@@ -7,7 +7,7 @@ from typing import Any
 from builders import (
     BOOL, CONTROL, Conversation, drive, FLAG, INT16, parameter, RAM, SPEED, WORD,
 )
-from extended_builders import ANSWER, checked, exchange, NEUTRAL, online, TICK
+from extended_builders import ANSWER, checked, exchange, NEUTRAL, online
 import pytest
 
 from drive_can_bridge.core.drive_state import DriveState
@@ -58,13 +58,6 @@ def test_what_arms(options: dict[str, Any], value: Value, outcome: CommandOutcom
     assert talk.commands(0, value, 10.003) is outcome
 
 
-def test_immediate() -> None:
-    talk = online(rearm_immediate=True)
-    assert talk.commands(0, 100.0, 10.003) is ARMED
-    assert talk.commands(0, 150.0, 10.004) is ACCEPTED
-    assert exchange(talk, 10.02) == '003FFFF0#05DC000000000000'
-
-
 def test_arming_is_per_setpoint() -> None:
     talk = online()
     talk.commands(0, 0.0, 10.003)
@@ -76,13 +69,6 @@ def test_arming_is_per_setpoint() -> None:
     assert talk.session.state is DriveState.ONLINE
     talk.commands(1, 100.0, 10.024)
     assert exchange(talk, 10.04) == '003FFFF0#03E803E800000000'
-
-
-def test_newest_command_wins() -> None:
-    talk = online(rearm_immediate=True)
-    for value in (1.0, 2.0, 3.0):
-        talk.commands(0, value, 10.003)
-    assert exchange(talk, 10.02) == '003FFFF0#001E000000000000'
 
 
 def test_commands_before_the_drive_is_online_do_not_arm() -> None:
@@ -110,31 +96,6 @@ def test_age_ends_at_the_timeout() -> None:
     assert talk.session.state is DriveState.NOT_ARMED
 
 
-def test_age_is_per_setpoint() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.1)
-    talk.commands(0, 100.0, 10.003)
-    talk.commands(1, 100.0, 10.003)
-    for cycle in range(1, 12):
-        now = 10.0 + 0.02 * cycle
-        talk.commands(1, 100.0, now - 0.01)
-        assert exchange(talk, now) == (
-            '003FFFF0#03E803E800000000' if now < 10.103 else '003FFFF0#000003E800000000')
-    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
-
-
-def test_after_a_timeout_it_wants_arming_again() -> None:
-    talk = online(command_timeout=0.05)
-    talk.commands(0, 0.0, 10.003)
-    talk.commands(0, 100.0, 10.004)
-    for cycle in range(1, 4):
-        exchange(talk, 10.0 + 0.02 * cycle)
-    assert talk.commands(0, 100.0, 10.07) is NOT_ARMED
-    assert exchange(talk, 10.08) == NEUTRAL
-    assert talk.commands(0, 0.0, 10.09) is ARMED
-    assert talk.commands(0, 100.0, 10.09) is ACCEPTED
-    assert exchange(talk, 10.1) == '003FFFF0#03E8000000000000'
-
-
 def test_timeout_between_two_cycles_counts_as_well() -> None:
     talk = online(command_timeout=0.05, period=1.0)
     talk.commands(0, 0.0, 10.003)
@@ -145,18 +106,6 @@ def test_timeout_between_two_cycles_counts_as_well() -> None:
     talk.until(11.0)
     assert talk.events(SetpointsExpired) == [
         SetpointsExpired(('speed_setpoint',))] * 2
-
-
-def test_timeout_zero_is_never() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.0)
-    talk.commands(0, 100.0, 10.003)
-    for cycle in range(1, 200):
-        now = 10.0 + 0.02 * cycle
-        talk.until(now + TICK)
-        talk.hears(ANSWER, now + 0.001)
-    assert talk.session.setpoints.items[0].armed
-    assert talk.session.setpoints.age(15.0) == pytest.approx(4.997)
-    assert talk.events(SetpointsExpired) == []
 
 
 def test_timeout_that_is_set_while_running() -> None:
