@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 import math
+from typing import Any
 
 from hypothesis import given, strategies as st
 from monitor_builders import (
@@ -10,10 +11,18 @@ from monitor_builders import (
     three_drives,
 )
 import pytest
+from transcripts import replayed, stories
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Level, Place, read_status, Status
 from drive_can_bridge.monitor.summary import balance, line, Lines
+
+STORIES = stories(__file__, 'lines.yaml')
+#: what diagnostics say of the drive
+STATES: dict[str, dict[str, Any]] = {
+    'diagnosed': {},
+    'fault': {'level': 2, 'state': 'fault',
+              'message': 'fault 7 overcurrent: remove its cause, then reset it'}}
 
 
 def test_diagnostics_tell_of_bridges_buses_and_drives_in_their_order() -> None:
@@ -73,68 +82,44 @@ def test_no_line_says_online_without_the_values(rate: int) -> None:
     assert lines.look(model.look(now, AT), now) == ['conveyor online actual_speed=1.2 rpm']
 
 
-def test_a_line_waits_a_moment_for_what_its_values_mean() -> None:
-    lines, model = Lines(), model_of([drive_status()])
-    model.sampled(['/conveyor'], NOW)
-    model.responded('/conveyor', [('actual_speed', 1.25)], NOW)
-    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor offline']
-    later = NOW + 2.1
-    assert lines.look(model.look(later, AT), later) == ['conveyor online actual_speed=1.250']
-    model.described('/conveyor', PARAMETERS)
-    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor online actual_speed=1.2 rpm']
 
 
-def test_a_line_of_a_drive_that_came_back_has_no_values_of_before() -> None:
+
+
+
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str) -> None:
     lines, model = Lines(), model_of([drive_status()])
+
+    def step(step: str) -> list[str]:
+        text, what, *words = step.split()
+        now = NOW + float(text)
+        if what == 'look':
+            return list(lines.look(model.look(now, AT), now))
+        if what == 'described':
+            model.described('/conveyor', PARAMETERS)
+        elif what == 'sampled':
+            model.sampled(['/conveyor'], now)
+        elif what == 'others':
+            model.sampled([], now)
+        elif what == 'responded':
+            model.responded('/conveyor', [(name, float(value)) for name, value in (
+                word.split('=') for word in words)], now)
+        elif what == 'went':
+            model.went_online('/conveyor', words == ['online'], now)
+        else:
+            model.diagnosed([drive_status(**STATES[what])], AT + float(text), now)
+        return []
+    assert replayed(STORIES[story], step) == STORIES[story]
+
+
+def test_values_of_before_are_not_shown_of_a_drive_that_came_back() -> None:
+    model = model_of([drive_status()])
     model.described('/conveyor', PARAMETERS)
-    model.sampled(['/conveyor'], NOW)
     model.responded('/conveyor', [('actual_speed', 1.0)], NOW + 0.1)
     model.went_online('/conveyor', False, NOW + 0.2)
     model.went_online('/conveyor', True, NOW + 0.3)
-    snapshot = model.look(NOW + 0.4, AT)
-    assert lines.look(snapshot, NOW + 0.4) == ['conveyor offline']
-    assert [shown.text for shown in snapshot.drives[0].values] == ['']
-    model.responded('/conveyor', [('actual_speed', 2.0)], NOW + 0.5)
-    assert lines.look(model.look(NOW + 0.6, AT), NOW + 0.6) == [
-        'conveyor online actual_speed=2.0 rpm']
-
-
-def test_samples_that_nobody_asked_for_are_not_waited_for() -> None:
-    lines, model = Lines(), model_of([drive_status()])
-    model.sampled(['/conveyor'], NOW)
-    assert lines.look(model.look(NOW, AT), NOW) == ['conveyor offline']
-    model.sampled([], NOW + 1.5)  # there are too many drives: the turn of others
-    assert lines.look(model.look(NOW + 2.1, AT), NOW + 2.1) == ['conveyor online']
-    model.sampled(['/conveyor'], NOW + 2.2)
-    assert lines.look(model.look(NOW + 2.3, AT), NOW + 2.3) == ['conveyor online']
-    # nor are those of before it went away written when it is back
-    model.responded('/conveyor', [('actual_speed', 1.0)], NOW + 2.4)
-    model.went_online('/conveyor', False, NOW + 2.5)
-    assert lines.look(model.look(NOW + 2.5, AT), NOW + 2.5) == [
-        'conveyor offline (it stopped answering)']
-    model.sampled([], NOW + 2.6)
-    model.went_online('/conveyor', True, NOW + 2.6)
-    assert lines.look(model.look(NOW + 2.6, AT), NOW + 2.6) == ['conveyor offline']
-    model.diagnosed([drive_status()], AT + 3.0, NOW + 3.0)
-    assert lines.look(model.look(NOW + 4.7, AT), NOW + 4.7) == ['conveyor online']
-
-
-def test_a_line_says_which_fault_there_is() -> None:
-    advice = 'fault 7 overcurrent: remove its cause, then reset it'
-    lines, model = Lines(), model_of([drive_status(level=2, state='fault', message=advice)])
-    model.described('/conveyor', PARAMETERS)
-    model.sampled(['/conveyor'], NOW)
-    model.responded('/conveyor', [('actual_speed', 0.0)], NOW + 0.1)
-    assert lines.look(model.look(NOW + 0.2, AT), NOW + 0.2) == [
-        f'conveyor online ({advice}) actual_speed=0.0 rpm']
-
-
-def test_a_drive_without_process_values_is_online_in_a_word() -> None:
-    lines, model = Lines(), model_of([drive_status()])
-    model.described('/conveyor', PARAMETERS)
-    model.sampled(['/conveyor'], NOW)
-    model.responded('/conveyor', [], NOW + 0.1)
-    assert lines.look(model.look(NOW + 0.1, AT), NOW + 0.1) == ['conveyor online']
+    assert [shown.text for shown in model.look(NOW + 0.4, AT).drives[0].values] == ['']
 
 
 def test_without_descriptors_values_are_shown_all_the_same() -> None:

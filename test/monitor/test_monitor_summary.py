@@ -1,15 +1,21 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Colours, order, counts and advice, the same for all views."""
 
+from collections.abc import Callable
+
 from monitor_builders import (
     AT, bus_status, drive_status, fifteen_drives, model_of, NOW, seen, three_drives,
 )
 import pytest
+from transcripts import replayed, stories
 
-from drive_can_bridge.monitor.snapshot import Snapshot
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.snapshot import Status
 from drive_can_bridge.monitor.summary import (
     counts, counts_in_words, in_order, silence, Tone, tone_of, troubles,
 )
+
+STORIES = stories(__file__, 'summary.yaml')
 
 
 @pytest.mark.parametrize(('state', 'level', 'tone'), [
@@ -36,53 +42,40 @@ def test_counts() -> None:
     assert counts(drives) == [
         (Tone.ERROR, 'fault', 1), (Tone.ERROR, 'offline', 3), (Tone.WARN, 'not armed', 4),
         (Tone.OFF, 'disabled', 2), (Tone.OK, 'online', 5)]
-    assert counts_in_words(drives) == (
-        '15 drives: 1 fault, 3 offline, 4 not armed, 2 disabled, 5 online')
-    assert counts_in_words([]) == '0 drives'
 
 
-def said(snapshot: Snapshot) -> list[str]:
-    return [f'{trouble.who}{trouble.text}' for trouble in troubles(snapshot)]
-
-
-def test_equal_advice_is_given_once_and_the_worst_first() -> None:
-    lines = said(seen(fifteen_drives()))
-    assert lines[0] == 'axis_3: fault 7 overcurrent: remove its cause, then reset it'
-    assert lines[1].startswith('2 drives silent since \N{HORIZONTAL ELLIPSIS}, was online before')
-    assert lines[1].endswith('(axis_8, axis_13)')
-    assert lines[2].startswith('axis_14: not seen since start')
-    assert lines[3:] == ['4 drives not armed: publish 0 to /\N{HORIZONTAL ELLIPSIS}/command/'
-                         'speed_setpoint (axis_1, axis_4, axis_6, axis_7)']
-
-
-def test_names_are_taken_out_of_advice_as_whole_words() -> None:
-    def unarmed(name: str) -> str:
-        return f'call ~/enable (drive_can enable {name}) of an online {name}.yaml'
-    lines = said(seen(model_of([
-        drive_status(name, level=1, state='not armed', message=unarmed(name))
-        for name in ('line', 'on')])))
-    assert len(lines) == 2      # a file of its own is nobody else's
-    lines = said(seen(model_of([bus_status(level=2, message='bus off'), *(
-        drive_status(name, level=1, state='not armed', message=f'enable {name}, online')
-        for name in ('line', 'on'))])))
-    assert lines == ['bus main: bus off',
-                     '2 drives enable \N{HORIZONTAL ELLIPSIS}, online (line, on)']
-
-
-def test_a_silent_bridge_is_told_of_once() -> None:
-    model = three_drives()
-    assert silence(seen(model), str) == []
-    snapshot = model.look(NOW + 7.0, AT)
-    line, = silence(snapshot, str)
-    assert line.startswith(f'bridge silent since {AT - 7.0}: ')
-    assert line.endswith(': its drives may still be running; stop buttons have no effect')
+def test_of_a_silent_bridge_drives_tell_nothing() -> None:
+    snapshot = three_drives().look(NOW + 7.0, AT)
+    assert silence(seen(three_drives()), str) == []
     assert troubles(snapshot) == []
     assert {tone_of(drive) for drive in snapshot.drives} == {Tone.UNKNOWN}
-    assert counts_in_words(snapshot.drives) == '3 drives: 3 unknown'
 
 
-def test_of_several_bridges_the_silent_one_is_named() -> None:
+def alike(text: str, *others: Status) -> Model:
+    """Return two drives with the same advice, but for their names."""
+    return model_of([*others, *(
+        drive_status(name, level=1, state='not armed', message=text.format(name))
+        for name in ('line', 'on'))])
+
+
+def two_bridges() -> Model:
+    """Return one that goes on, and one that does not."""
     model = model_of([drive_status(), drive_status('hoist', bridge='cell/drive_can_bridge')])
     model.diagnosed([drive_status()], AT + 7.0, NOW + 7.0)
-    line, = silence(model.look(NOW + 7.0, AT + 7.0), str)
-    assert line.startswith('bridge /cell/drive_can_bridge silent since ')
+    return model
+
+
+DRIVES: dict[str, Callable[[], Model]] = {
+    'fifteen': fifteen_drives, 'three': three_drives, 'nobody': Model, 'two_bridges': two_bridges,
+    'with_files': lambda: alike('call ~/enable (drive_can enable {0}) of an online {0}.yaml'),
+    'with_bus_off': lambda: alike('enable {}, online', bus_status(level=2, message='bus off'))}
+
+
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str) -> None:
+    def step(step: str) -> list[str]:
+        drives, text = step.split()
+        snapshot = DRIVES[drives]().look(NOW + float(text), AT + float(text))
+        return [*silence(snapshot, lambda time: str(time - AT)), counts_in_words(snapshot.drives),
+                *(f'{trouble.who}{trouble.text}' for trouble in troubles(snapshot))]
+    assert replayed(STORIES[story], step) == STORIES[story]

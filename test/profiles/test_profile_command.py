@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can profile`` as a user calls it."""
 
+import io
 import json
 import os
 from pathlib import Path
@@ -11,11 +12,14 @@ import sys
 from typing import Any
 
 import pytest
+from transcripts import replayed, stories
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.resources import profiles_directory
 
 CSV = 'Nr;Name;Einheit;Auflösung\n30;Rampe;s;0,01\n31;Höchstdrehzahl;1/min;0,1\nx;Kaputt;;\n'
+STORIES = stories(__file__, 'commands.yaml')
+GOOD = 'protocols: [cannord]\nparameters: {a: {number: 1, verified: true}}\n'
 BROKEN = """\
 protocols: [datamodel_extended, cannord]
 parameters:
@@ -37,6 +41,30 @@ def table(tmp_path: Path) -> Path:
 
 def documents(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
     return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str, table: Path, capsys: pytest.CaptureFixture[str],
+               monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(table.parent)
+    monkeypatch.setattr(sys, 'stdin', io.StringIO())     # nobody can be asked
+    Path('good.yaml').write_text(GOOD)
+    Path('bad.yaml').write_text(BROKEN)
+
+    def step(step: str) -> list[str]:
+        first, *words = step.split()
+        if first == 'files':
+            return [' '.join(sorted(os.listdir()))]
+        if first == 'head':
+            return Path(words[0]).read_text().splitlines()[:1]
+        if first == 'edit':
+            Path(words[0]).write_text('edited by hand')
+            return []
+        code = main([first, *words])
+        out, err = capsys.readouterr()
+        return [*out.splitlines(), *(f'! {line}' for line in err.splitlines()),
+                *([f'[{code}]'] if code else [])]
+    assert replayed(STORIES[story], step) == STORIES[story]
 
 
 class TestList:
@@ -65,10 +93,6 @@ class TestList:
         assert found['broken']['problems'] == 3
         assert set(found) == {'broken', *SHIPPED}
 
-    def test_no_such_directory(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert main(['profile', 'list', '--directory', '/nowhere']) == 1
-        assert capsys.readouterr().err == (
-            'drive_can profile: /nowhere is no directory\n')
 
 
 class TestShow:
@@ -118,22 +142,6 @@ class TestShow:
 
 class TestCheck:
 
-    def test_good_and_bad(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        good, bad = tmp_path / 'good.yaml', tmp_path / 'bad.yaml'
-        good.write_text('protocols: [cannord]\nparameters: {a: {number: 1, verified: true}}\n')
-        bad.write_text(BROKEN)
-        assert main(['profile', 'check', str(good)]) == 0
-        assert capsys.readouterr() == (
-            f'{good}: all right: 1 parameter, 1 verified, 0 not; cannord\n', '')
-        assert main(['profile', 'check', str(bad), str(good), '/nowhere.yaml']) == 1
-        out, err = capsys.readouterr()
-        assert out.startswith(f'{good}: all right')
-        assert err.replace(str(bad), 'bad.yaml').splitlines() == [
-            "bad.yaml:3: parameters.speed.tpye: unknown key, did you mean 'type'?",
-            'bad.yaml:4: parameters.wide.type: uint32 does not exist in datamodel_extended, '
-            'allowed are bool, int16, uint16',
-            'bad.yaml:5: parameters.far.number: 3000 is out of range, allowed is 0 to 2047',
-            '/nowhere.yaml: No such file or directory']
 
     def test_json(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         path = tmp_path / 'bad.yaml'
@@ -148,18 +156,6 @@ class TestCheck:
 
 class TestImport:
 
-    def test_tells_what_it_did(self, table: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        target = table.with_suffix('.yaml')
-        assert main(['profile', 'import', str(table), '-o', str(target)]) == 0
-        out, err = capsys.readouterr()
-        assert out == f'{target}: 2 of 3 entries of the file, 1 left out (see above), 2 with a ' \
-                      'remark in the profile; datamodel_extended, datamodel_standard, cannord, ' \
-                      'canopen_pkw\n'
-        assert err.splitlines() == [
-            f'{table}: columns: number=Nr, name=Name, unit=Einheit, scale=Auflösung',
-            f"{table}:4: x Kaputt: 'x' is no number"]
-        assert main(['profile', 'check', str(target)]) == 0
-        assert not list(table.parent.glob('.*'))  # nothing half written stays
 
     def test_json(self, table: Path, capsys: pytest.CaptureFixture[str]) -> None:
         target = table.with_suffix('.yaml')
@@ -179,21 +175,6 @@ class TestImport:
         assert main(['profile', 'import', str(table), '-o', str(target)]) == 0
         assert out == target.read_text()
 
-    def test_overwrites_what_differs_only_when_told(
-            self, table: Path, capsys: pytest.CaptureFixture[str],
-            monkeypatch: pytest.MonkeyPatch) -> None:
-        target = table.with_suffix('.yaml')
-        command = ['profile', 'import', str(table), '-o', str(target)]
-        with open('/dev/null') as nobody:
-            monkeypatch.setattr('sys.stdin', nobody)
-            assert main(command) == 0
-            assert main(command) == 0  # nothing would change
-            target.write_text('edited by hand')
-            assert main(command) == 2
-            assert '--yes overwrites it' in capsys.readouterr().err
-            assert target.read_text() == 'edited by hand'
-            assert main([*command, '--yes']) == 0
-        assert target.read_text().startswith('# Made from antrieb.csv')
 
     @pytest.mark.parametrize(('options', 'words'), [
         (['--columns', 'nr=Nr'], "'nr' is no column, there are: number, index"),
@@ -219,15 +200,7 @@ class TestImport:
         out = capsys.readouterr().out
         assert '  speed:\n    {number: 1, type: uint16,\n' in out
 
-    def test_missing_file(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert main(['profile', 'import', '/nowhere.csv']) == 1
-        assert capsys.readouterr().err == (
-            'drive_can profile: /nowhere.csv: No such file or directory\n')
 
-    def test_no_directory_to_write_to(self, table: Path,
-                                      capsys: pytest.CaptureFixture[str]) -> None:
-        assert main(['profile', 'import', str(table), '-o', '/nowhere/a.yaml']) == 1
-        assert 'No such file or directory' in capsys.readouterr().err
 
 
 def in_terminal(*arguments: str, **environment: str) -> str:
@@ -272,19 +245,6 @@ def test_what_goes_to_a_pipe_is_neither_cut_nor_wrapped() -> None:
     assert len(rows) == 95
     assert max(map(len, rows)) > 150 and '\x1b' not in shown.stdout
 
-
-def test_nobody_can_be_asked_about_a_file(table: Path, tmp_path: Path,
-                                          capsys: pytest.CaptureFixture[str],
-                                          monkeypatch: pytest.MonkeyPatch) -> None:
-    with open(os.devnull, encoding='ascii') as nobody:
-        monkeypatch.setattr(sys, 'stdin', nobody)
-        target = tmp_path / 'there.yaml'
-        target.write_text('something else')
-        assert main(['profile', 'import', str(table), '-o', str(target)]) == 2
-    assert capsys.readouterr().err.splitlines()[-1] == (
-        f'drive_can profile import: {target} exists and holds something else. Overwrite it? '
-        'Nothing was written: nobody can be asked here; --yes overwrites it')
-    assert target.read_text() == 'something else'
 
 
 def test_nothing_upsets_a_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

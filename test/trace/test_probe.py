@@ -12,6 +12,7 @@ from typing import Any
 from builders import parameter
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard
 import pytest
+from transcripts import replayed, stories
 from world import World
 
 from drive_can_bridge.cli import main as front_end
@@ -28,6 +29,7 @@ from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES, Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
+STORIES = stories(__file__, 'probe.yaml')
 Device = Callable[[Frame], list[Frame]]
 
 
@@ -99,29 +101,15 @@ def values(findings: Mapping[str, Finding]) -> dict[str, Any]:
 
 # -- bytes of the manuals -------------------------------------------------------------------------
 
-# P514 stands in no profile as an array; P102 is set dependent. BU 0060 page 54
-CANNORD = {
-    '0262000000000000': '0272000000000400',     # P514, array read: error 4 in PWE2
-    '0212000000000000': '0212000000000400',
-    '66600000FF000000': '',                     # not sent: byte 2 comes first
-    '6660FF0000000000': '6670FF0000000300',     # P102, sub-index 255 in byte 2: error 3
-    '666000FF00000000': '664000FF00006700',     # in byte 3: nothing, element 0 answers
-}
-
-
 def bare(drive: DriveConfiguration) -> DriveConfiguration:
     """Return a drive whose profile says nothing."""
     return replace(drive, profile=replace(drive.profile, parameters={}))
 
 
-def test_cannord_by_the_bytes_of_the_manual() -> None:
-    bench = Bench(scripted(CANNORD, 0x264, 0x265))
-    found = bench.probe(bare(INVERTER))
-    assert values(found) == {'value_order': 'high_first', 'index_byte': 'low'}
-    assert found['value_order'].reason == (
-        'array read of P514: error 4: not an array, in bytes 6, 7 (02 72 00 00 00 00 04 00); '
-        'read of P514: 4 (02 12 00 00 00 00 04 00)')
-    assert '66 70 FF 00 00 00 03 00' in found['index_byte'].reason
+
+#: drives of probe.yaml
+TOLD = {'inverter': bare(INVERTER), 'starter': STARTER, 'axis': AXIS, 'lift': LIFT,
+        'eleven': ELEVEN}
 
 
 def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
@@ -135,15 +123,6 @@ def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
              if sent.data[1] >> 4 == 6]
     assert list(dict.fromkeys(asked)) == [400, 514, 513, 401, 402, 102, 700]
 
-
-def test_cannord_the_other_way_round() -> None:
-    bench = Bench(scripted({
-        '0262000000000000': '0272000004000000',
-        '6660FF0000000000': '6640FF0067000000',
-        '666000FF00000000': '667000FF03000000'}, 0x264, 0x265))
-    found = bench.probe(bare(INVERTER))
-    assert values(found) == {'value_order': 'low_first', 'index_byte': 'high'}
-    assert 'in bytes 4, 5' in found['value_order'].reason
 
 
 @pytest.mark.parametrize(('answers', 'reason'), [
@@ -248,15 +227,6 @@ def test_a_frame_that_is_not_quite_the_answer_is_none(
                if 'comes first' not in finding.reason)
 
 
-def test_pkw_is_not_asked_where_the_receive_pdo_is_no_mailbox() -> None:
-    def node(frame: Frame) -> list[Frame]:
-        assert frame == Frame(0x605, bytes.fromhex('4003160100000000'), False)
-        return [Frame(0x585, bytes.fromhex('4300100010000030'), False),     # another object
-                Frame(0x585, bytes.fromhex('4303160110004060'), False)]     # 6040h, control word
-    found = Bench(node).probe(STARTER)
-    assert values(found) == {'layout': None, 'word_order': None, 'abort_code_order': None}
-    assert found['layout'].reason.startswith('receive PDO4 (1603h) maps 6040h')
-
 
 @pytest.mark.parametrize(('currents', 'order'), [
     (('00008403', '00008503'), 'high_first'),   # 9.00 A, section 8 of the notes
@@ -289,20 +259,6 @@ def maps(request: str, response: str, moved: int = 0) -> Device:
     return device
 
 
-def test_datamodel_maps_by_the_bytes_of_the_manual() -> None:
-    found = Bench(maps('0032003300000000', '00D100D200D30000')).probe(LIFT)
-    assert values(found) == {
-        'parameter_offset': 0, 'cyclic_request': ['speed_setpoint', 'torque_limit'],
-        'cyclic_response': ['actual_speed', 'motor_current', 'status_word']}
-    assert found['parameter_offset'].reason == (
-        'the maps of the file are there, 122 and 126 on: 50 51 0 0 | 209 210 211 0')
-
-
-def test_datamodel_maps_of_11_bits_are_low_byte_first() -> None:
-    answers = {'037A000400000000': '3200330000000000', '037E000400000000': 'D100D200D3000000'}
-    found = Bench(scripted(answers, 0x3F1, 0x7F1)).probe(ELEVEN)
-    assert found['parameter_offset'].reason == (
-        'the maps of the file are there, 122 and 126 on: 50 51 0 0 | 209 210 211 0')
 
 
 @pytest.mark.parametrize(('request_map', 'response_map', 'moved'), [
@@ -312,13 +268,6 @@ def test_datamodel_moved(request_map: str, response_map: str, moved: int) -> Non
     assert found['parameter_offset'].value == moved
     assert found['cyclic_request'].value == ['speed_setpoint', 'torque_limit']
 
-
-def test_datamodel_other_maps_where_nothing_else_answers() -> None:
-    found = Bench(maps('0032000000000000', '00D1006400000000')).probe(LIFT)
-    assert found['parameter_offset'].value == 0
-    assert found['cyclic_request'].value == ['speed_setpoint']
-    assert found['cyclic_response'].value is None       # what is P100?
-    assert 'the profile lacks P100' in found['cyclic_response'].reason
 
 
 def test_silence_after_a_read_whose_late_answer_nobody_could_tell() -> None:
@@ -335,9 +284,6 @@ def test_datamodel_undecided() -> None:
     assert values(found) == dict.fromkeys(
         ('parameter_offset', 'cyclic_request', 'cyclic_response'))
     assert 'more than eight numbers answer' in found['parameter_offset'].reason
-    found = Bench(lambda frame: []).probe(LIFT)
-    assert set(values(found).values()) == {None}
-    assert found['parameter_offset'].reason == 'no answer: check station and bit rate'
 
 
 # -- simulated drives, set to each variant --------------------------------------------------------
@@ -408,29 +354,45 @@ def test_simulated_datamodel(drive: DriveConfiguration, offset: int, told: int) 
         assert not found
 
 
-def test_simulated_servo_as_it_leaves_the_factory_and_as_configured() -> None:
-    bench = Bench(simulated(AXIS))
-    found = bench.probe(AXIS)
-    assert values(found) == {'mode': 'csp', 'mapping': 'configure',
-                             'disable_word': 'disable_operation', 'bridge_heartbeat': 0.2}
-    assert found['mapping'].reason == (
-        '1600h holds 6040h.00h 16 bits and not 6040h.00h 16 bits, 607Ah.00h 32 bits')
-    assert found['disable_word'].reason == '605Ch is 1, 605Bh is 0: 0007h brakes by ramp'
+def test_a_servo_as_configured() -> None:
     verified = configured('cia402.yaml', 'slide', mapping='verify')
     assert Bench(simulated(verified)).probe(AXIS)['mapping'].value == 'verify'
 
 
-def test_a_servo_that_lacks_the_mode_and_coasts() -> None:
-    def prepare(drive: SimulatedDrive) -> None:
-        for name, value in (('supported_modes', 0x2D), ('disable_option', 0),
-                            ('shutdown_option', 1), ('abort_connection_option', 0)):
-            drive.set_value(name, value)
+class Story:
+    """Does the steps of a transcript."""
 
-    found = Bench(simulated(AXIS, prepare)).probe(AXIS)
-    assert values(found) == {'mode': None, 'mapping': 'configure', 'disable_word': 'shutdown',
-                             'bridge_heartbeat': 0.2}
-    assert found['mode'].reason == '6502h is 0000002Dh: pp, pv, tq'
-    assert found['bridge_heartbeat'].reason.endswith('misses the bridge; write 6007h')
+    def __init__(self) -> None:
+        self.answers: dict[tuple[int, bytes], list[Frame]] = {}
+        self.device: Device = lambda frame: self.answers.get((frame.identifier, frame.data), [])
+
+    def step(self, step: str) -> list[str]:
+        first, *words = step.split()
+        if first == 'answers':
+            self.request, self.response = (int(word, 16) for word in words)
+        elif first == 'answer':
+            request, *answers = map(bytes.fromhex, words)
+            self.answers[self.request, request] = [
+                Frame(self.response, data, self.response > 0x7FF) for data in answers]
+        elif first == 'simulated':
+            registers = [word.split('=') for word in words[1:]]
+
+            def prepare(made: SimulatedDrive) -> None:
+                for name, value in registers:
+                    made.set_value(name, int(value))
+            self.device = simulated(TOLD[words[0]], prepare)
+        elif first == 'asked':
+            return list(dict.fromkeys(map(str, self.bench.sent)))
+        else:
+            self.bench = Bench(self.device)
+            return [f'{key} {finding.value}: {finding.reason}'
+                    for key, finding in self.bench.probe(TOLD[words[0]]).items()]
+        return []
+
+
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str) -> None:
+    assert replayed(STORIES[story], Story().step) == STORIES[story]
 
 
 def test_a_node_that_says_nothing_and_one_that_has_nothing() -> None:

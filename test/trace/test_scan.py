@@ -10,6 +10,7 @@ from random import Random
 from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
 import pytest
 from test_trace_agrees import running
+from transcripts import replayed, stories
 from world import World
 
 from drive_can_bridge.cli import main as front_end
@@ -25,6 +26,7 @@ from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
+STORIES = stories(__file__, 'scan.yaml')
 BITRATE = 125_000
 
 
@@ -153,20 +155,15 @@ def heard(protocol: str, *frames: tuple[float, str]) -> list[str]:
     return [sighting.text for sighting in scanned(protocol, *frames).sightings.values()]
 
 
-def test_one_pair_of_others_may_be_chance() -> None:
-    request, answer, late = (0.0, '0C8#7F040020'), (0.01, '0C9#370F0020'), (0.2, '0C9#370F0020')
-    task, response = (0.5, '2C8#6610000000000000'), (0.51, '2C9#6610000000006700')
-    other = (0.51, '2C9#6510000000006700')
-    assert heard('cannord', request, answer) == []
-    assert heard('cannord', request, answer, request, answer) == [
-        'process data, state "operation enabled"']
-    assert heard('cannord', request, answer, task, response) == ['answers to tasks for P102']
-    assert heard('cannord', request, answer, task, other) == []
-    assert heard('cannord', request, answer, request, late) == []
-    assert heard('cannord', request, answer, request, (0.01, '0C9#370F002000000000')) == []
-    # each service has a request under way
-    assert heard('cannord', (0.0, task[1]), request, answer, (0.02, response[1])) == [
-        'answers to tasks for P102']
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str) -> None:
+    def step(step: str) -> list[str]:
+        protocol, *words = step.split()
+        scanner = scanned(protocol, *zip(map(float, words[::2]), words[1::2]))
+        found = [f'{each.station} {each.certainty.value}: {each.text}'
+                 for each in scanner.sightings.values()]
+        return [*found, f'master: {scanner.master}'] if scanner.master else found
+    assert replayed(STORIES[story], step) == STORIES[story]
 
 
 #: answers of stations 42 and 1
@@ -263,14 +260,8 @@ def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
     assert survey.scanners['cia402'].settings(6) == {'mode': 'pv'}
 
 
-def test_a_servo_that_another_master_drives() -> None:
+def test_a_servo_that_another_master_drives_otherwise() -> None:
     cycle = ((0.0, '205#0F0000000000'), (0.0, '080#'), (0.001, '185#371200000000'))
-    assert heard('cia402', *cycle, *cycle) == []
-    scanner = scanned('cia402', *cycle, *cycle, *cycle)
-    assert list(scanner.sightings.values()) == [(
-        'cia402', 5, 'status word 1237h (operation enabled), answered with SYNC',
-        Certainty.LIKELY)]
-    assert scanner.master == 'process data for node 5'
     # without SYNC, and with words that are none
     assert heard('cia402', *(cycle[0], cycle[2]) * 9) == []
     assert heard('cia402', *((0.0, '205#7F0400000000'), *cycle[1:]) * 9) == []

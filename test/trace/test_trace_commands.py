@@ -4,14 +4,17 @@
 from collections.abc import Callable, Iterator
 import csv
 import json
+import os
 from pathlib import Path
 
 from builders import frame
 import pytest
+from transcripts import replayed, stories
 from world import World
 
 from drive_can_bridge.cli import main as front_end
 
+STORIES = stories(__file__, 'commands.yaml')
 FILE = """
 /**/drive_can_bridge:
   ros__parameters:
@@ -52,33 +55,34 @@ def drive_can(*arguments: object) -> int:
     return front_end.main([str(argument) for argument in arguments])
 
 
-def test_decode(file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert drive_can('decode', trace, '--params-file', file) == 0
-    assert capsys.readouterr() == ("""\
-0.000000 +0.000 main conveyor > cyclic request: speed_setpoint 500.0 rpm, torque_limit 100.0 %
-0.001000 +0.000 main conveyor < cyclic response: actual_speed -150.0 rpm, motor_current 0.05 A, \
-status_word 0003h (ready, enabled) [1.0 ms]
-0.010000 +0.000 main conveyor > read: ramp_time
-0.020000 +0.020 main conveyor > cyclic request: speed_setpoint 500.0 rpm, torque_limit 100.0 %
-0.021000 +0.020 main conveyor < cyclic response: actual_speed -150.0 rpm, motor_current 0.05 A, \
-status_word 0003h (ready, enabled) [1.0 ms]
-0.030000 +0.000 main error frame: SUSPICIOUS: error-passive (sending)
-0.040000 +0.020 main conveyor > cyclic request: speed_setpoint 0.0 rpm, torque_limit 100.0 %
-0.050000 +0.000 main 123#00
-0.080000 +0.059 main conveyor < cyclic response: LOST: no answer in 40 ms
-0.110000 +0.000 main conveyor < read: ramp_time: LOST: no answer
-0.200000 +0.160 main conveyor > cyclic request: speed_setpoint 0.0 rpm, torque_limit 100.0 %
-""", '')
 
 
-def test_decode_errors_of_one_drive(file: Path, trace: Path,
-                                    capsys: pytest.CaptureFixture[str]) -> None:
-    assert drive_can('decode', '--only', 'errors', trace, '--params-file', file, '--drive',
-                     'con*') == 0
-    assert capsys.readouterr().out == """\
-0.080000 +0.000 main conveyor < cyclic response: LOST: no answer in 40 ms
-0.110000 +0.000 main conveyor < read: ramp_time: LOST: no answer
-"""
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
+               monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(file.parent)
+    written = {file.name: file.read_text(), 'trace.log': TRACE}
+
+    def step(step: str) -> list[str]:
+        first, *words = step.split()
+        if first == 'trace':
+            Path(words[0]).write_text(TRACE)
+        elif first == 'frames':
+            Path(words[0]).write_text(''.join('({}) can0 {} {}\n'.format(*word.split('_'))
+                                              for word in words[1:]))
+        elif first == 'link':
+            Path(words[0]).symlink_to(words[1])
+        elif first == 'files':
+            return [' '.join(sorted(os.listdir()))]
+        elif first == 'unchanged':
+            return [str(all(Path(name).read_text() == written[name] for name in words))]
+        else:
+            code = drive_can(first, *words, '--params-file', file.name)
+            out, err = capsys.readouterr()
+            return [*out.splitlines(), *(f'! {line}' for line in err.splitlines()),
+                    *([f'[{code}]'] if code else [])]
+        return []
+    assert replayed(STORIES[story], step) == STORIES[story]
 
 
 def test_summary(file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -109,32 +113,7 @@ def test_csv(file: Path, trace: Path, tmp_path: Path) -> None:
     assert list(rows[1].values()) == ['0.001000', '', '', '-150', '0.05', '3']
 
 
-@pytest.mark.parametrize('option', ['--csv', '--plot'])
-def test_what_is_read_is_not_written_over(file: Path, trace: Path, option: str, tmp_path: Path,
-                                          capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / 'link').symlink_to(file)
-    for taken in (trace, tmp_path / 'link'):
-        assert drive_can('decode', trace, '--params-file', file, option, taken) == 2
-        assert 'would be written over, choose another name' in capsys.readouterr().err
-    assert trace.read_text() == TRACE
-    assert file.read_text().startswith('\n/**/drive_can_bridge')
 
-
-def test_a_picture_without_a_suffix(file: Path, trace: Path, tmp_path: Path,
-                                    capsys: pytest.CaptureFixture[str]) -> None:
-    assert drive_can('decode', trace, '--params-file', file, '--plot', tmp_path / 'values') == 2
-    assert capsys.readouterr() == ('', (
-        f'drive_can decode: --plot {tmp_path}/values: its suffix says what is written: .png, '
-        '.svg, .pdf, …\n'))
-    assert not list(tmp_path.glob('values*'))
-
-
-def test_a_table_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
-                                capsys: pytest.CaptureFixture[str]) -> None:
-    table = tmp_path / 'values.csv'
-    table.symlink_to('/dev/full')
-    assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 1
-    assert capsys.readouterr() == ('', f'drive_can decode: {table}: No space left on device\n')
 
 
 def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
@@ -221,21 +200,6 @@ def test_a_clock_that_was_set_back(file: Path, trace: Path,
 (1699996400.539999) can0 003FFFF0#138803E800000000 T
 (1699996400.600000) can0 123#00 R
 """)
-    assert drive_can('decode', trace, '--params-file', file) == 0
-    lines = [line.replace(': speed_setpoint 500.0 rpm, torque_limit 100.0 %', '').replace(
-        ': actual_speed -150.0 rpm, motor_current 0.05 A, status_word 0003h (ready, enabled)', '')
-        for line in capsys.readouterr().out.splitlines()]
-    assert lines == [
-        '0.000000 +0.000 main conveyor > cyclic request',
-        '0.000000 +0.000 main time: SUSPICIOUS: goes back by 3599.500000 s: the clock was set, or '
-        'two traces are in one',
-        '0.000000 +0.000 main conveyor < cyclic response [0.0 ms]',
-        '0.020000 +0.020 main conveyor > cyclic request',
-        '0.021000 +0.021 main conveyor < cyclic response [1.0 ms]',
-        '0.040000 +0.000 main 123#00',
-        '0.039999 +0.020 main conveyor > cyclic request',
-        '0.079999 +0.059 main conveyor < cyclic response: LOST: no answer in 40 ms',
-        '0.100000 +0.060 main 123#00']
     assert drive_can('decode', trace, '--params-file', file, '--summary', '--json') == 0
     summary = json.loads(capsys.readouterr().out.splitlines()[0])
     assert (summary['exchanges'], summary['latency_max_ms']) == (2, 1.0)
