@@ -131,8 +131,8 @@ def test_two_joints_of_one_name(tmp_path: Path) -> None:
     text += '        joint: {name: a, velocity: actual}\n'
     assert problems(tmp_path, text) == [
         at('f.yaml:26: drives.lift.joint.name', 'joint_of_other', name='a', owner='conveyor')]
-    assert problems(tmp_path, text[:-len('{name: a, velocity: actual}\n')]
-                    + '{name: b, velocity: actual}\n') == []
+    other = text.removesuffix('{name: a, velocity: actual}\n') + '{name: b, velocity: actual}\n'
+    assert problems(tmp_path, other) == []
 
 
 def test_pole_pairs_without_a_frequency(tmp_path: Path) -> None:

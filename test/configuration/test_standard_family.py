@@ -294,18 +294,19 @@ def test_eeprom_parameters_are_no_setpoints(tmp_path: Path) -> None:
 
 
 def test_there_has_to_be_something_to_poll(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(MIXED, '[actual, current, status]', '[]')) == [
+    line = '        cyclic_response: [actual, current, status]\n'
+    empty = changed(MIXED, line, '        cyclic_response: []\n')
+    assert found(tmp_path, empty) == [
         at('f.yaml:17: drives.conveyor.cyclic_response', 'empty_list',
            family='datamodel_standard')]
-    assert found(tmp_path, changed(MIXED, '        cyclic_response: [actual, current, status]\n',
-                                   '')) == [
+    assert found(tmp_path, changed(MIXED, line, '')) == [
         at('f.yaml:10: drives.conveyor.cyclic_response', 'empty_list',
            family='datamodel_standard')]
 
 
 def test_there_need_not_be_setpoints(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(MIXED, 'cyclic_request: [speed, limit]',
-                                   'cyclic_request: []')) == []
+    text = changed(MIXED, 'cyclic_request: [speed, limit]', 'cyclic_request: []')
+    assert found(tmp_path, text) == []
 
 
 def test_more_than_four_of_each(tmp_path: Path) -> None:
@@ -318,7 +319,8 @@ def test_more_than_four_of_each(tmp_path: Path) -> None:
 
 
 def test_write_only_parameters_are_not_polled(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(MIXED, '[actual, current, status]', '[actual, order]')) == [
+    text = changed(MIXED, '[actual, current, status]', '[actual, order]')
+    assert found(tmp_path, text) == [
         at('f.yaml:17: drives.conveyor.cyclic_response', 'write_only', name='order')]
 
 
