@@ -68,11 +68,11 @@ class _FileReader:
         for _, root in documents:
             if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
                 # a line for everything in it would not help
-                self._note(root.line, (), says('is_profile', key=PARAMETERS_KEY))
+                self._note(root.line, (), says('is_profile', entry=PARAMETERS_KEY))
             elif root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
-                self._note(root.line, (), says('no_mapping', key=PARAMETERS_KEY))
+                self._note(root.line, (), says('no_mapping', entry=PARAMETERS_KEY))
 
     def sections_with(self, key: str) -> list[Section]:
         """Return the sections that have a key, or one that begins with it and a dot."""
@@ -92,7 +92,7 @@ class _FileReader:
                 continue
             here = (*path, key.text)
             if has_parameters:
-                self._note(key.line, here, says('beside_parameters', key=PARAMETERS_KEY))
+                self._note(key.line, here, says('beside_parameters', entry=PARAMETERS_KEY))
             if here in self._lines:
                 self._note(key.line, here, says('duplicate_key', first=self._lines[here]))
                 continue
@@ -108,7 +108,7 @@ class _FileReader:
                 self._names(value, here)
             else:
                 hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
-                    says('allowed_below', key=PARAMETERS_KEY)
+                    says('allowed_below', entry=PARAMETERS_KEY)
                 self._note(key.line, here, says('no_mapping_refused', hint=hint))
 
     def _parameters(self, node: Node, path: Path, line: int) -> None:
@@ -116,7 +116,7 @@ class _FileReader:
         for part in map(str, path):
             name += part if not name or name.endswith('/') else f'/{part}'
         if not path:
-            self._note(line, (PARAMETERS_KEY,), says('no_node_name_above', key=PARAMETERS_KEY))
+            self._note(line, (PARAMETERS_KEY,), says('no_node_name_above', entry=PARAMETERS_KEY))
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
             self._note(line, path, says('no_node_name', name=name))
         if node.kind is not Kind.MAPPING:

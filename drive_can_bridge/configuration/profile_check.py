@@ -63,7 +63,7 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
                                                            type=parameter.type.value))
     for key, word in words.items():     # nothing but ~/enable starts a drive
         if key != 'enable' and word == words.get('enable'):
-            tree.wrong(('control', 'words', 'enable'), says('word_twice', word=word, key=key))
+            tree.wrong(('control', 'words', 'enable'), says('word_twice', word=word, entry=key))
     if isinstance(control.get('status'), dict):
         _check_status(tree, control['status'], parameters, names)
 
@@ -150,9 +150,9 @@ def check_names(tree: Tree, path: Path, given: dict[str, Any],
         here, number = (*path, key), int(key, 0)
         low, high = (-2**31, 2**32 - 1) if parameter is None else parameter.type.raw_range
         if not low <= number <= high:
-            tree.wrong(here, says('does_not_fit', key=key, low=low, high=high))
+            tree.wrong(here, says('does_not_fit', entry=key, low=low, high=high))
         elif number in numbers:
-            tree.wrong(here, says('number_twice', key=key, other=numbers[number]))
+            tree.wrong(here, says('number_twice', entry=key, other=numbers[number]))
         numbers.setdefault(number, key)
         if isinstance(name, bool):
             word = 'true, on or yes' if name else 'false, off or no'
@@ -417,7 +417,7 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
         for key in ('scale', 'offset', 'unit', 'minimum', 'maximum', 'neutral_from',
                     'arming_tolerance'):
             if key in entry:
-                tree.wrong((*path, key), says('bool_has_no', key=key))
+                tree.wrong((*path, key), says('bool_has_no', entry=key))
         if 'neutral' in entry and not isinstance(entry['neutral'], bool):
             tree.wrong((*path, 'neutral'), says('no_bool', value=entry['neutral']))
     else:

@@ -22,7 +22,7 @@ WORDS = {
     'near': " (did you mean '{word}'?)",
     'allowed': 'allowed: {words}',
     'nothing_allowed': 'nothing is allowed here',
-    'allowed_below': 'allowed is {key} below it',
+    'allowed_below': 'allowed is {entry} below it',
     'list_empty': '{listed} is empty',
     'no_profile_at_all': 'there is no profile at all',
     # -- values and keys
@@ -62,18 +62,18 @@ WORDS = {
         'in a second section, {section}; allowed is one section that holds it (the first is '
         '{first})',
     'is_profile':
-        'a profile, allowed is NODE_NAME: {{{key}: …}}; drive_can profile check looks at '
+        'a profile, allowed is NODE_NAME: {{{entry}: …}}; drive_can profile check looks at '
         'profiles',
-    'no_mapping': 'no mapping, allowed is NODE_NAME: {{{key}: …}}',
+    'no_mapping': 'no mapping, allowed is NODE_NAME: {{{entry}: …}}',
     'no_mapping_refused': 'no mapping (rcl refuses the file), {hint}',
     'no_parameters': 'no mapping, allowed are parameters',
-    'no_node_name_above': 'no node name above it, allowed is NODE_NAME: {{{key}: …}}',
+    'no_node_name_above': 'no node name above it, allowed is NODE_NAME: {{{entry}: …}}',
     'no_node_name':
         '{name!r} is no node name (rcl refuses the file), allowed is for example '
         '/**/drive_can_bridge',
     'key_no_node_name': 'a key that is no name, allowed are node names',
     'beside_parameters':
-        'stands beside {key} (rcl refuses or garbles the file), allowed is a section of its '
+        'stands beside {entry} (rcl refuses or garbles the file), allowed is a section of its '
         'own',
     'misspelt': 'misspelt, allowed is {allowed}',
     'other_node_name':
@@ -206,10 +206,10 @@ WORDS = {
     'above_maximum': '{minimum!r} is above the maximum, allowed is at most {maximum!r}',
     'narrowed': '{limit!r} is not representable in {type}, narrowed to {end}',
     'read_only_one': '{name!r} is read-only, allowed is one with access rw or wo',
-    'word_twice': '{word!r} is the word for {key} too, allowed is another one',
+    'word_twice': '{word!r} is the word for {entry} too, allowed is another one',
     'mask_too_large': 'mask {mask} does not fit {name}, allowed is 1 to {largest} ({type})',
     'mask_of_nothing': 'mask 0 looks at no bit, allowed is a mask with at least one',
-    'does_not_fit': '{key} does not fit, allowed is {low} to {high}',
+    'does_not_fit': '{entry} does not fit, allowed is {low} to {high}',
     'word_is_bool': '{word} without quotes is a bool, allowed is text: write it in quotes',
     'no_bit': '{bit!r} is no bit of {name}, {hint}',
     'name_taken': '{name!r} is taken by the node of the drive, allowed is any other name',
@@ -225,7 +225,7 @@ WORDS = {
     'outside_mask':
         'value {value} has bits outside of mask {mask} and never matches, allowed are bits of'
         ' the mask',
-    'number_twice': '{key} stands twice (as {other}), allowed is once',
+    'number_twice': '{entry} stands twice (as {other}), allowed is once',
     'is_number': '{name!r} is a number, allowed is text',
     'fault_without_bit':
         'bit is missing: without a control section nothing says when there is a fault, '
@@ -233,7 +233,7 @@ WORDS = {
     'raw_name':
         '{name!r} reads as a raw parameter, allowed are names other than p<digits> and '
         'x<hexadecimal digits>',
-    'bool_has_no': 'a bool has no {key}, allowed is to leave it out',
+    'bool_has_no': 'a bool has no {entry}, allowed is to leave it out',
     'no_integer': '{limit!r} is no integer, allowed without scale, offset and unit are integers',
     'no_name':
         '{name!r} is no name, allowed are at most {longest} characters that begin with no '

@@ -5,9 +5,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+from saying import says
+
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: the families as a sentence lists them
@@ -90,20 +93,40 @@ def load(folder: Path, text: str = FILE, profile: str = PROFILE,
 
 
 def problems(folder: Path, text: str = FILE, profile: str = PROFILE,
-             adapters: Any = None) -> list[str]:
+             adapters: Any = None) -> list[Sentence]:
     """Return what is wrong with the texts, without the directory."""
     try:
         load(folder, text, profile, adapters)
     except ConfigurationError as error:
-        return [line.replace(f'{folder}/', '') for line in error.problems]
+        return local(folder, error.problems)
     return []
 
 
 def warnings(folder: Path, text: str = FILE, profile: str = PROFILE,
-             adapters: Any = None) -> list[str]:
+             adapters: Any = None) -> list[Sentence]:
     """Return what is suspicious about the texts, without the directory."""
-    found = load(folder, text, profile, adapters).warnings
-    return [line.replace(f'{folder}/', '') for line in found]
+    return local(folder, load(folder, text, profile, adapters).warnings)
+
+
+def local(folder: Path, lines: Any) -> list[Sentence]:
+    """Take a directory out of lines and out of their fields."""
+    found = []
+    for line in lines:
+        text = Sentence(line.replace(f'{folder}/', ''))
+        text.code = line.code
+        text.fields = {name: value.replace(f'{folder}/', '') if type(value) is str else value
+                       for name, value in line.fields.items()}
+        found.append(text)
+    return found
+
+
+def at(place: str, code: str, **fields: Any) -> says:
+    """Return what a problem at ``FILE:LINE: KEY`` is equal to, or one at ``KEY``."""
+    if ':' not in place:
+        return says(code, file='', key=place, **fields)
+    file, line, key = place.replace(' ', '', 1).split(':', 2)
+    return says(code, file=file, line=int(line), key=key, **fields)
+
 
 #: plain scalars and what rcl makes of them
 SCALARS: list[tuple[str, object]] = [

@@ -3,8 +3,9 @@
 
 from pathlib import Path
 
-from configuration_builders import changed, FILE, load, problems, warnings, write
+from configuration_builders import at, changed, FILE, load, local, problems, warnings, write
 import pytest
+from saying import says
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.errors import ConfigurationError
@@ -12,30 +13,31 @@ from drive_can_bridge.core.sentences import Sentence, uncoded
 
 CASES = [
     ('bitrate: 125000', 'bitrate: 10000',
-     ['f.yaml:5: buses.main: worst-case load 332.8 % at 10000 bit/s (conveyor 166.4 %, lift '
-      '166.4 %), allowed is 100 %: use longer periods, fewer drives or a higher bit rate']),
+     [at('f.yaml:5: buses.main', 'overload', load=332.8, bitrate=10000,
+         parts='conveyor 166.4 %, lift 166.4 %', most=100.0)]),
     ('bitrate: 125000', 'bitrate: 26000',
-     ['f.yaml:5: buses.main: worst-case load 128.0 % at 26000 bit/s (conveyor 64.0 %, lift '
-      '64.0 %), allowed is 100 %: use longer periods, fewer drives or a higher bit rate']),
+     [at('f.yaml:5: buses.main', 'overload', load=128.0, bitrate=26000,
+         parts='conveyor 64.0 %, lift 64.0 %', most=100.0)]),
     ('bitrate: 125000', 'bitrate: fast',
-     ["f.yaml:8: buses.main.bitrate: 'fast' is a string, allowed is an integer of 1000 to "
-      '1000000']),
+     [at('f.yaml:8: buses.main.bitrate', 'wrong_type', value='fast', kind='a string',
+         allowed='an integer of 1000 to 1000000')]),
     ('bitrate: 125000', 'bitrate: 1.25e5',
-     ['f.yaml:8: buses.main.bitrate: 125000.0 is a number, allowed is an integer of 1000 to '
-      '1000000']),
+     [at('f.yaml:8: buses.main.bitrate', 'wrong_type', value=125000.0, kind='a number',
+         allowed='an integer of 1000 to 1000000')]),
     ('bitrate: 125000', 'bitrate: 2000000',
-     ['f.yaml:8: buses.main.bitrate: 2000000 is out of range, allowed is an integer of 1000 to '
-      '1000000']),
+     [at('f.yaml:8: buses.main.bitrate', 'out_of_range', value=2000000,
+         allowed='an integer of 1000 to 1000000')]),
     ('bitrate: 125000', 'bitrat: 125000',
-     ["f.yaml:8: buses.main.bitrat: unknown key, did you mean 'bitrate'?"]),
+     [at('f.yaml:8: buses.main.bitrat', 'unknown_key',
+         hint=says('did_you_mean', word='bitrate'))]),
     ('bitrate: 125000', 'can_filter: 1',
-     ["f.yaml:8: buses.main.can_filter: unknown key, did you mean 'can_filters'? It is set by the "
-      'bridge itself']),
+     [at('f.yaml:8: buses.main.can_filter', 'unknown_key_of_bridge', word='can_filters')]),
     ('bitrate: 125000', 'reconect_period: 1',
-     ["f.yaml:8: buses.main.reconect_period: unknown key, did you mean 'reconnect_period'?"]),
+     [at('f.yaml:8: buses.main.reconect_period', 'unknown_key',
+         hint=says('did_you_mean', word='reconnect_period'))]),
     ('bitrate: 125000', 'reconnect_period: 0',
-     ['f.yaml:8: buses.main.reconnect_period: 0 is out of range, allowed is a number of 0.01 '
-      'to 3600']),
+     [at('f.yaml:8: buses.main.reconnect_period', 'out_of_range', value=0,
+         allowed='a number of 0.01 to 3600')]),
     ('bitrate: 125000', 'fd: true',
      ['f.yaml:8: buses.main.fd: set by the bridge itself, allowed is to leave it out']),
     ('bitrate: 125000', 'can_filters: []',
@@ -46,36 +48,44 @@ CASES = [
     ('bitrate: 125000', 'ignore_config: true',
      ['f.yaml:8: buses.main.ignore_config: set by the bridge itself, allowed is to leave it out']),
     ('bitrate: 125000', 'rx_queue_size: .nan',
-     ['f.yaml:8: buses.main.rx_queue_size: nan is not a finite number, allowed is a string or '
-      'a number or true or false or a list']),
+     [at('f.yaml:8: buses.main.rx_queue_size', 'not_finite',
+         allowed='a string or a number or true or false or a list')]),
     ('bitrate: 125000', 'extra: {a: 1}',
-     ['f.yaml:8: buses.main.extra: a mapping, allowed is a string or a number or true or false '
-      'or a list']),
+     [at('f.yaml:8: buses.main.extra', 'wrong_kind', kind='a mapping',
+         allowed='a string or a number or true or false or a list')]),
     ('channel: demo', 'channel: 1.5',
-     ['f.yaml:7: buses.main.channel: 1.5 is a number, allowed is a string or an integer']),
+     [at('f.yaml:7: buses.main.channel', 'wrong_type', value=1.5, kind='a number',
+         allowed='a string or an integer')]),
     ('channel: demo', 'channel: ""',
-     ['f.yaml:7: buses.main.channel: an empty string, allowed is text']),
+     [at('f.yaml:7: buses.main.channel', 'empty_string')]),
     ('        channel: demo\n', '',
-     ['f.yaml:5: buses.main.channel: missing, allowed is a string or an integer']),
+     [at('f.yaml:5: buses.main.channel', 'missing', allowed='a string or an integer')]),
     ('interface: virtual', 'interfaces: virtual',
-     ['f.yaml:5: buses.main.interface: missing, allowed is a string',
-      "f.yaml:6: buses.main.interfaces: unknown key, did you mean 'interface'?"]),
+     [at('f.yaml:5: buses.main.interface', 'missing', allowed='a string'),
+      at('f.yaml:6: buses.main.interfaces', 'unknown_key',
+         hint=says('did_you_mean', word='interface'))]),
     ('interface: virtual', 'interface: yes',
-     ['f.yaml:6: buses.main.interface: true is a bool, allowed is a string']),
+     [at('f.yaml:6: buses.main.interface', 'wrong_type', value=True, kind='a bool',
+         allowed='a string')]),
     ('      main:\n', '      "ma in":\n',
-     ["f.yaml:5: buses.ma in: 'ma in' is wrong, allowed is a name of letters, digits, _ and -, "
-      'at most 100 characters',
-      "f.yaml:11: drives.conveyor.bus: 'main' is unknown, did you mean 'ma in'?",
-      "f.yaml:20: drives.lift.bus: 'main' is unknown, did you mean 'ma in'?"]),
+     [at('f.yaml:5: buses.ma in', 'wrong', value='ma in',
+         allowed='a name of letters, digits, _ and -, at most 100 characters'),
+      at('f.yaml:11: drives.conveyor.bus', 'unknown', name='main',
+         hint=says('did_you_mean', word='ma in')),
+      at('f.yaml:20: drives.lift.bus', 'unknown', name='main',
+         hint=says('did_you_mean', word='ma in'))]),
     ('    drives:\n', '    drivers:\n',
-     ["f.yaml:9: drivers: unknown key, did you mean 'drives'?"]),
+     [at('f.yaml:9: drivers', 'unknown_key', hint=says('did_you_mean', word='drives'))]),
     ('    drives:\n', '    diagnostics_period: 0\n    autostart: 1\n    drives:\n',
-     ['f.yaml:9: diagnostics_period: 0 is out of range, allowed is a number of 0.01 to 3600',
-      'f.yaml:10: autostart: 1 is an integer, allowed is true or false']),
+     [at('f.yaml:9: diagnostics_period', 'out_of_range', value=0,
+         allowed='a number of 0.01 to 3600'),
+      at('f.yaml:10: autostart', 'wrong_type', value=1, kind='an integer',
+         allowed='true or false')]),
     ('    drives:\n', '    autostart: maybe\n    drives:\n',
-     ["f.yaml:9: autostart: 'maybe' is a string, allowed is true or false"]),
+     [at('f.yaml:9: autostart', 'wrong_type', value='maybe', kind='a string',
+         allowed='true or false')]),
     ('    drives:\n', '    use_sim_tim: true\n    drives:\n',
-     ["f.yaml:9: use_sim_tim: unknown key, did you mean 'use_sim_time'?"]),
+     [at('f.yaml:9: use_sim_tim', 'unknown_key', hint=says('did_you_mean', word='use_sim_time'))]),
 ]
 
 
@@ -111,7 +121,8 @@ class Adapters:
     # close to a key of ours, but the adapter knows it
     ('bitrate: 125000', 'bitrates: 5', []),
     ('bitrate: 125000', 'bitrats: 5',
-     ["f.yaml:8: buses.main.bitrats: unknown key, did you mean 'bitrate'?"]),
+     [at('f.yaml:8: buses.main.bitrats', 'unknown_key',
+         hint=says('did_you_mean', word='bitrate'))]),
 ])
 def test_what_adapters_know(tmp_path: Path, old: str, new: str, expected: list[str]) -> None:
     assert problems(tmp_path, changed(FILE, old, new), adapters=Adapters()) == expected
@@ -120,10 +131,9 @@ def test_what_adapters_know(tmp_path: Path, old: str, new: str, expected: list[s
 def test_key_that_the_adapter_does_not_name(tmp_path: Path) -> None:
     text = changed(FILE, 'bitrate: 125000', 'rx_queue_siz: 5\n        other: 1')
     assert warnings(tmp_path, text, adapters=Adapters()) == [
-        'f.yaml:8: buses.main.rx_queue_siz: the adapter for virtual does not name this key (did '
-        "you mean 'rx_queue_size'?); it is handed over all the same",
-        'f.yaml:9: buses.main.other: the adapter for virtual does not name this key; it is handed '
-        'over all the same']
+        at('f.yaml:8: buses.main.rx_queue_siz', 'adapter_does_not_name', interface='virtual',
+           near=says('near', word='rx_queue_size')),
+        at('f.yaml:9: buses.main.other', 'adapter_does_not_name', interface='virtual', near='')]
     # nothing is known about this one
     assert warnings(tmp_path, changed(text, 'virtual', 'closed'), adapters=Adapters()) == []
     assert warnings(tmp_path, text) == []
@@ -150,8 +160,8 @@ def test_load_close_to_the_limit(tmp_path: Path) -> None:
     # two drives with 16000 + 640 bits a second each
     assert warnings(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 47543')) == []
     assert warnings(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 47542')) == [
-        'f.yaml:5: buses.main: worst-case load 70.0 % at 47542 bit/s (conveyor 35.0 %, lift 35.0 '
-        '%), recommended is at most 70 %']
+        at('f.yaml:5: buses.main', 'high_load', load=70.00126204198392, bitrate=47542,
+           parts='conveyor 35.0 %, lift 35.0 %', most=70.0)]
     assert problems(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 33280')) == []
     assert len(problems(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 33279'))) == 1
 
@@ -174,8 +184,7 @@ def test_bus_that_is_opened_twice(tmp_path: Path) -> None:
     text = changed(FILE, '    drives:\n',
                    '      other: {interface: virtual, channel: demo}\n    drives:\n')
     assert warnings(tmp_path, text) == [
-        "f.yaml:9: buses.other.channel: 'demo' is also the channel of bus main; identifiers and "
-        'load are checked for each bus alone']
+        at('f.yaml:9: buses.other.channel', 'channel_of_other_bus', channel='demo', bus='main')]
 
 
 def test_bus_with_the_name_of_another_channel(tmp_path: Path) -> None:
@@ -185,13 +194,12 @@ def test_bus_with_the_name_of_another_channel(tmp_path: Path) -> None:
     drives:
 """)
     assert warnings(tmp_path, text) == [
-        'f.yaml:5: buses.main: bus twin has a channel of this name: decode takes what other '
-        "programs' traces have of it for this bus"]
+        at('f.yaml:5: buses.main', 'name_of_other_channel', bus='twin')]
 
 
 def test_no_drives(tmp_path: Path) -> None:
     assert warnings(tmp_path, FILE[:FILE.index('    drives:')]) == [
-        'f.yaml:3: drives: no drive is configured']
+        at('f.yaml:3: drives', 'no_drive')]
 
 
 def test_settings_of_the_bridge(tmp_path: Path) -> None:
@@ -207,8 +215,8 @@ def test_profile_directory_that_is_none(tmp_path: Path) -> None:
     path = write(tmp_path)
     text = path.read_text().replace(f'[{tmp_path}]', f"['', {tmp_path}, /nowhere/at/all]")
     path.write_text(text)
-    assert configuration_from_file(path).warnings == (
-        f"{path}:3: profile_directories: '/nowhere/at/all' is no directory",)
+    assert local(tmp_path, configuration_from_file(path).warnings) == [
+        at('f.yaml:3: profile_directories', 'no_directory', name='/nowhere/at/all')]
 
 
 def test_earlier_directory_wins(tmp_path: Path) -> None:
@@ -220,5 +228,4 @@ def test_earlier_directory_wins(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as caught:
         configuration_from_file(path)
     assert caught.value.problems == [
-        f'{first}/table.yaml:1: yaml: no mapping, allowed are protocols, parameters, control, '
-        'description']
+        at(f'{first}/table.yaml:1: yaml', 'no_profile')]

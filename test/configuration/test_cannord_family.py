@@ -4,7 +4,7 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from configuration_builders import changed, load, problems, warnings
+from configuration_builders import at, changed, load, problems, warnings
 import pytest
 
 from drive_can_bridge.cli.main import main
@@ -14,6 +14,7 @@ from drive_can_bridge.protocols.cannord.family import Cannord
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = Cannord()
+LEADER = 'drive lift, which leads its broadcast group'
 #: whoever has maps to compare
 MAPPED = ', '.join(name for name, family in FAMILIES.items()
                    if 'mapping' in family.options_schema)
@@ -125,7 +126,8 @@ def test_five_entries_with_extra_setpoints(tmp_path: Path) -> None:
                                     '        extra_setpoints: true')
     assert problems(tmp_path, text, PROFILE) == []
     assert problems(tmp_path, changed(text, 'fifth]', 'fifth, sixth]'), PROFILE) == [
-        'f.yaml:16: drives.lift.cyclic_request: 6 parameters are too many, allowed are at most 5']
+        at('f.yaml:16: drives.lift.cyclic_request', 'too_many_parameters', count=6, most=5,
+           more='')]
 
 
 def test_stations_at_the_ends(tmp_path: Path) -> None:
@@ -157,7 +159,7 @@ def test_process_data_are_volatile(tmp_path: Path) -> None:
 def test_control_is_built_in(tmp_path: Path) -> None:
     with_control = PROFILE + CANOPEN.replace('index: 0x2000, subindex: 1', 'number: 5')
     assert problems(tmp_path, FILE, with_control) == [
-        'table.yaml:14: control: control is built in for cannord, allowed is to leave it out']
+        at('table.yaml:14: control', 'control_built_in', family='cannord')]
 
 
 def test_a_profile_for_several_protocols(tmp_path: Path) -> None:
@@ -171,8 +173,8 @@ def test_short_periods_are_suspicious(tmp_path: Path) -> None:
     text = changed(changed(FILE, 'bitrate: 125000', 'bitrate: 1000000'), 'period: 0.02',
                    'period: 0.002')
     assert warnings(tmp_path, text, PROFILE) == [
-        'f.yaml:15: drives.lift.period: 0.002 s is short: inverters take 1 to 3 ms to answer; '
-        'recommended is at least 0.003 s']
+        at('f.yaml:15: drives.lift.period', 'inverters_are_slow', period=0.002, answer=3.0,
+           least=0.003)]
 
 
 # -- identifiers ----------------------------------------------------------------------------------
@@ -200,16 +202,16 @@ def test_broadcast_identifiers_are_shared(tmp_path: Path, broadcast: str, extend
 
 def test_members_that_differ(tmp_path: Path) -> None:
     assert problems(tmp_path, second(together(), '[speed]', '[second]'), PROFILE) == [
-        'f.yaml:25: drives.hoist.cyclic_request: differs from that of drive lift, which leads its '
-        'broadcast group, allowed is the same']
+        at('f.yaml:25: drives.hoist.cyclic_request', 'request_differs',
+           leader=LEADER)]
     assert problems(tmp_path, second(together(), 'period: 0.02', 'period: 0.05'), PROFILE) == [
-        'f.yaml:24: drives.hoist.period: 0.05 s differs from 0.02 s of drive lift, which leads '
-        'its broadcast group, allowed is the same']
+        at('f.yaml:24: drives.hoist.period', 'period_differs', period=0.05, other=0.02,
+           leader=LEADER)]
     joint = ('broadcast: group\n        joint: {name: j, velocity: actual, '
              'velocity_command: speed}')
     assert problems(tmp_path, second(together(), 'broadcast: group', joint), PROFILE) == [
-        'f.yaml:28: drives.hoist.joint.velocity_command: commands go to drive lift, which leads '
-        'its broadcast group, allowed is to leave it out']
+        at('f.yaml:28: drives.hoist.joint.velocity_command', 'led_by_other',
+           leader=LEADER)]
     assert problems(tmp_path, changed(together(), 'broadcast: group', joint), PROFILE) == []
 
 
@@ -231,14 +233,14 @@ def test_group_and_all_on_one_bus(tmp_path: Path, first: str, other: str) -> Non
 def test_status_word_is_built_in(tmp_path: Path, entry: str) -> None:
     path = 'status_word' if entry[0] == 's' else 'flags.bits.status_word'
     assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [
-        f"table.yaml:13: parameters.{path}: 'status_word' is built in for cannord, allowed is any "
-        'other name']
+        at(f'table.yaml:13: parameters.{path}', 'built_in', name='status_word', family='cannord')]
 
 
 def test_a_wrong_station_makes_no_further_problems(tmp_path: Path) -> None:
     text = second(second(together(), 'station: 2', 'station: 300'), 'period: 0.02', 'period: 0.5')
     assert problems(tmp_path, text, PROFILE) == [
-        'f.yaml:22: drives.hoist.station: 300 is out of range, allowed is 0 to 255 (cannord)']
+        at('f.yaml:22: drives.hoist.station', 'value_out_of_range', value=300, least=0, most=255,
+           remark=' (cannord)')]
 
 
 def test_members_on_another_bus_are_strangers(tmp_path: Path) -> None:

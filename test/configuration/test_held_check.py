@@ -3,8 +3,9 @@
 
 from pathlib import Path
 
-from configuration_builders import changed, FILE, load, problems, PROFILE
+from configuration_builders import at, changed, FILE, load, problems, PROFILE
 import pytest
+from saying import says
 
 HELD = changed(PROFILE, 'type: int16, unit: deg}', 'type: int16, unit: rev, minimum: 10, '
                'neutral_from: position, arming_tolerance: 2}')
@@ -13,37 +14,31 @@ AXIS = changed(changed(FILE, '[speed, limit]', '[angle]'), '[actual, current, st
 
 PROFILES = [
     ('arming_tolerance: 2', 'arming_tolerance: -1',
-     ['table.yaml:8: parameters.angle.arming_tolerance: -1 is out of range, allowed is a number '
-      'of at least 0']),
+     [at('table.yaml:8: parameters.angle.arming_tolerance', 'out_of_range', value=-1,
+         allowed='a number of at least 0')]),
     (', arming_tolerance: 2', '',
-     ['table.yaml:8: parameters.angle.neutral_from: needs arming_tolerance: how far a command may '
-      'be from where the axis is and still arm, allowed is to give it too']),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'no_arming_tolerance')]),
     ('minimum: 10', 'neutral: 0',
-     ['table.yaml:8: parameters.angle.neutral: stands beside neutral_from, allowed is one of '
-      'them']),
+     [at('table.yaml:8: parameters.angle.neutral', 'beside_neutral_from')]),
     ('neutral_from: position', 'neutral_from: positon',
-     ["table.yaml:8: parameters.angle.neutral_from: 'positon' is not in the profile, did you mean "
-      "'position'?"]),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'not_in_profile', name='positon',
+         hint=says('did_you_mean', word='position'))]),
     ('neutral_from: position', 'neutral_from: actual',
-     ["table.yaml:8: parameters.angle.neutral_from: 'actual' has the unit 'rpm', allowed is an "
-      "actual value with the unit 'rev', that of 'angle'"]),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'other_unit', name='actual',
+         unit="the unit 'rpm'", wanted="the unit 'rev'", parameter='angle')]),
     ('neutral_from: position', 'neutral_from: order',
-     ["table.yaml:8: parameters.angle.neutral_from: 'order' is no actual value, allowed is one "
-      'that can be read']),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'no_actual_value', name='order')]),
     ('neutral_from: position', 'neutral_from: flag',
-     ["table.yaml:8: parameters.angle.neutral_from: 'flag' is a bool, allowed is a number"]),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'is_bool', name='flag')]),
     ('neutral_from: position', 'neutral_from: angle',
-     ["table.yaml:8: parameters.angle.neutral_from: 'angle' is no actual value, allowed is one "
-      'that can be read']),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'no_actual_value', name='angle')]),
     ('neutral_from: position', 'access: ro, neutral_from: position',
-     ["table.yaml:8: parameters.angle.neutral_from: 'angle' is read-only, allowed in parameters "
-      'with access rw or wo']),
+     [at('table.yaml:8: parameters.angle.neutral_from', 'read_only_in', name='angle')]),
     ('flag: {number: 53, type: bool}',
      'flag: {number: 53, type: bool, neutral_from: status, arming_tolerance: 1}',
-     ['table.yaml:7: parameters.flag.neutral_from: a bool has no neutral_from, allowed is to '
-      'leave it out',
-      'table.yaml:7: parameters.flag.arming_tolerance: a bool has no arming_tolerance, allowed is '
-      'to leave it out']),
+     [at('table.yaml:7: parameters.flag.neutral_from', 'bool_has_no', entry='neutral_from'),
+      at('table.yaml:7: parameters.flag.arming_tolerance', 'bool_has_no',
+         entry='arming_tolerance')]),
 ]
 
 
@@ -61,11 +56,11 @@ def test_limits_do_not_bound_it(tmp_path: Path) -> None:
 
 DRIVES = [
     ('[position, status]', '[actual, status]',
-     ["f.yaml:16: drives.conveyor.cyclic_request: 'angle' is neutral at 'position', which is not "
-      'in cyclic_response, allowed is to add it there']),
+     [at('f.yaml:16: drives.conveyor.cyclic_request', 'measured_not_listed', name='angle',
+         measured='position')]),
     ('rearm: neutral', 'rearm: immediate',
-     ["f.yaml:18: drives.conveyor.rearm: 'immediate' would let 'angle' jump from 'position', "
-      "allowed with neutral_from is 'neutral'"]),
+     [at('f.yaml:18: drives.conveyor.rearm', 'immediate_jumps', name='angle',
+         measured='position')]),
 ]
 
 
@@ -79,5 +74,5 @@ def test_no_broadcast_group(tmp_path: Path) -> None:
                                                                  'broadcast: group')
     profile = HELD.replace('datamodel_extended', 'cannord, datamodel_extended')
     assert problems(tmp_path, text, profile)[0] == (
-        "f.yaml:15: drives.conveyor.broadcast: 'group' sends the same 'angle' to several axes, "
-        'allowed with neutral_from is none')
+        at('f.yaml:15: drives.conveyor.broadcast', 'broadcast_held', broadcast='group',
+           name='angle'))

@@ -4,54 +4,58 @@
 import math
 from pathlib import Path
 
-from configuration_builders import changed, FILE, load, problems, warnings
+from configuration_builders import at, changed, FILE, load, local, problems, warnings
 import pytest
+from saying import says
 
 from drive_can_bridge.core.units import convertible_units, Quantity, si_factor
 
 CASES = [
     ('rearm: neutral', 'joint: {velocity: actual}',
-     ['f.yaml:18: drives.conveyor.joint.name: missing, allowed is a string']),
+     [at('f.yaml:18: drives.conveyor.joint.name', 'missing', allowed='a string')]),
     ('rearm: neutral', 'joint: {name: a}',
-     ['f.yaml:18: drives.conveyor.joint: names no quantity, allowed is at least one of '
-      'position, velocity, effort, position_command, velocity_command, effort_command']),
+     [at('f.yaml:18: drives.conveyor.joint', 'no_quantity',
+         allowed='position, velocity, effort, position_command, velocity_command, '
+                 'effort_command')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actul}',
-     ["f.yaml:18: drives.conveyor.joint.velocity: 'actul' is not in cyclic_response, did you "
-      "mean 'actual'?"]),
+     [at('f.yaml:18: drives.conveyor.joint.velocity', 'not_in_list', name='actul',
+         listed='cyclic_response', hint=says('did_you_mean', word='actual'))]),
     ('rearm: neutral', 'joint: {name: a, velocity: speed}',
-     ["f.yaml:18: drives.conveyor.joint.velocity: 'speed' is not in cyclic_response, allowed: "
-      'actual, current, status']),
+     [at('f.yaml:18: drives.conveyor.joint.velocity', 'not_in_list', name='speed',
+         listed='cyclic_response', hint=says('allowed', words='actual, current, status'))]),
     ('rearm: neutral', 'joint: {name: a, velocity: current}',
-     ["f.yaml:18: drives.conveyor.joint.velocity: 'current' has the unit 'A', which does not "
-      'convert; allowed is one of rad/s, deg/s, rpm, Hz']),
+     [at('f.yaml:18: drives.conveyor.joint.velocity', 'does_not_convert', name='current',
+         unit="the unit 'A'", allowed='rad/s, deg/s, rpm, Hz')]),
     ('rearm: neutral', 'joint: {name: a, position: actual}',
-     ["f.yaml:18: drives.conveyor.joint.position: 'actual' has the unit 'rpm', which does not "
-      'convert; allowed is one of rad, deg, rev']),
+     [at('f.yaml:18: drives.conveyor.joint.position', 'does_not_convert', name='actual',
+         unit="the unit 'rpm'", allowed='rad, deg, rev')]),
     ('rearm: neutral', 'joint: {name: a, velocity_command: limit}',
-     ["f.yaml:18: drives.conveyor.joint.velocity_command: 'limit' has no unit, which does not "
-      'convert; allowed is one of rad/s, deg/s, rpm, Hz']),
+     [at('f.yaml:18: drives.conveyor.joint.velocity_command', 'does_not_convert', name='limit',
+         unit='no unit', allowed='rad/s, deg/s, rpm, Hz')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: 0}',
-     ['f.yaml:18: drives.conveyor.joint.gear_ratio: 0 is useless, allowed is any other number']),
+     [at('f.yaml:18: drives.conveyor.joint.gear_ratio', 'useless', value=0)]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: .inf}',
-     ['f.yaml:18: drives.conveyor.joint.gear_ratio: inf is not a finite number, allowed is a '
-      'number']),
+     [at('f.yaml:18: drives.conveyor.joint.gear_ratio', 'not_finite', value=math.inf,
+         allowed='a number')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, pole_pairs: 0}',
-     ['f.yaml:18: drives.conveyor.joint.pole_pairs: 0 is out of range, allowed is an integer '
-      'of 1 to 1000']),
+     [at('f.yaml:18: drives.conveyor.joint.pole_pairs', 'out_of_range', value=0,
+         allowed='an integer of 1 to 1000')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, velocty: actual}',
-     ["f.yaml:18: drives.conveyor.joint.velocty: unknown key, did you mean 'velocity'?"]),
+     [at('f.yaml:18: drives.conveyor.joint.velocty', 'unknown_key',
+         hint=says('did_you_mean', word='velocity'))]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, effort: actual}',
-     ["f.yaml:18: drives.conveyor.joint.effort: 'actual' is the velocity already, allowed is "
-      'another parameter']),
+     [at('f.yaml:18: drives.conveyor.joint.effort', 'quantity_already', name='actual',
+         quantity='velocity')]),
     ('rearm: neutral', 'joint: {name: 5, velocity: actual}',
-     ['f.yaml:18: drives.conveyor.joint.name: 5 is an integer, allowed is a string']),
+     [at('f.yaml:18: drives.conveyor.joint.name', 'wrong_type', value=5, kind='an integer',
+         allowed='a string')]),
     ('rearm: neutral', 'joint: {name: "", velocity: actual}',
-     ['f.yaml:18: drives.conveyor.joint.name: an empty string, allowed is text']),
+     [at('f.yaml:18: drives.conveyor.joint.name', 'empty_string')]),
     ('rearm: neutral', 'joint: x',
-     ["f.yaml:18: drives.conveyor.joint: 'x' is a string, allowed is a mapping"]),
+     [at('f.yaml:18: drives.conveyor.joint', 'wrong_type', value='x', kind='a string',
+         allowed='a mapping')]),
     ('rearm: neutral', 'joint: {}',
-     ['f.yaml:18: drives.conveyor.joint: an empty mapping (rcl garbles what follows), allowed '
-      'is to leave the key out']),
+     [at('f.yaml:18: drives.conveyor.joint', 'garbling_mapping')]),
 ]
 
 
@@ -77,23 +81,24 @@ def test_empty_list(tmp_path: Path) -> None:
     text = changed(FILE, '[speed, limit]', '[]')
     text = changed(text, 'rearm: neutral', 'joint: {name: a, effort_command: limit}')
     assert problems(tmp_path, text) == [
-        "f.yaml:18: drives.conveyor.joint.effort_command: 'limit' is not in cyclic_request, "
-        'cyclic_request is empty']
+        at('f.yaml:18: drives.conveyor.joint.effort_command', 'not_in_list', name='limit',
+           listed='cyclic_request', hint=says('list_empty', listed='cyclic_request'))]
 
 
 def test_no_complaint_about_what_follows_from_another(tmp_path: Path) -> None:
     text = changed(FILE, '[speed, limit]', '[1]')
     text = changed(text, 'rearm: neutral', 'joint: {name: a, velocity_command: speed}')
     assert problems(tmp_path, text) == [
-        'f.yaml:16: drives.conveyor.cyclic_request: 1 is an integer, allowed is a string']
+        at('f.yaml:16: drives.conveyor.cyclic_request', 'wrong_type', value=1, kind='an integer',
+           allowed='a string')]
 
 
 def test_no_complaint_about_a_name_that_is_misspelt_in_the_list(tmp_path: Path) -> None:
     text = changed(FILE, '[speed, limit]', '[sped]')
     text = changed(text, 'rearm: neutral', 'joint: {name: a, velocity_command: speed}')
     assert problems(tmp_path, text) == [
-        "f.yaml:16: drives.conveyor.cyclic_request: 'sped' is not in the profile, did you mean "
-        "'speed'?"]
+        at('f.yaml:16: drives.conveyor.cyclic_request', 'not_in_profile', name='sped',
+           hint=says('did_you_mean', word='speed'))]
 
 
 def test_factors(tmp_path: Path) -> None:
@@ -105,9 +110,9 @@ def test_factors(tmp_path: Path) -> None:
         'gear_ratio: -4, pole_pairs: 3}'))
     configuration = load(tmp_path, text)
     joint = configuration.drives['conveyor'].joint
-    assert [line.partition('f.yaml:')[2] for line in configuration.warnings] == [
-        "18: drives.conveyor.joint.position_command: 'angle' has no neutral_from: without a "
-        'command the axis goes to 0.0 deg, wherever it stands']
+    assert local(tmp_path, configuration.warnings) == [
+        at('f.yaml:18: drives.conveyor.joint.position_command', 'no_neutral_from', name='angle',
+           neutral=0.0, unit='deg')]
     assert joint is not None
     assert (joint.name, joint.gear_ratio, joint.pole_pairs) == ('arm', -4.0, 3)
     assert (joint.position, joint.velocity_command) == ('position', 'speed')
@@ -125,17 +130,15 @@ def test_two_joints_of_one_name(tmp_path: Path) -> None:
     text = changed(FILE, 'rearm: neutral', 'joint: {name: a, velocity: actual}')
     text += '        joint: {name: a, velocity: actual}\n'
     assert problems(tmp_path, text) == [
-        "f.yaml:26: drives.lift.joint.name: 'a' is the joint of drives.conveyor already, allowed "
-        'is a name of its own']
-    assert problems(tmp_path, text[:-len('{name: a, velocity: actual}\n')]
-                    + '{name: b, velocity: actual}\n') == []
+        at('f.yaml:26: drives.lift.joint.name', 'joint_of_other', name='a', owner='conveyor')]
+    other = text.removesuffix('{name: a, velocity: actual}\n') + '{name: b, velocity: actual}\n'
+    assert problems(tmp_path, other) == []
 
 
 def test_pole_pairs_without_a_frequency(tmp_path: Path) -> None:
     text = changed(FILE, 'rearm: neutral', 'joint: {name: a, velocity: actual, pole_pairs: 2}')
     assert warnings(tmp_path, text) == [
-        'f.yaml:18: drives.conveyor.joint.pole_pairs: has no effect: no parameter of the joint '
-        'has the unit Hz']
+        at('f.yaml:18: drives.conveyor.joint.pole_pairs', 'no_effect', unit='Hz')]
 
 
 def test_no_joint(tmp_path: Path) -> None:

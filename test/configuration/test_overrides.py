@@ -5,8 +5,9 @@ from array import array
 from pathlib import Path
 from typing import Any
 
-from configuration_builders import changed, PROFILE
+from configuration_builders import at, changed, PROFILE
 import pytest
+from saying import says
 
 from drive_can_bridge.configuration.load import configuration_from_overrides, tree_from_overrides
 from drive_can_bridge.core.errors import ConfigurationError
@@ -50,45 +51,47 @@ def test_good(good: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
     ('drives.conveyor.statoin', 1,
-     ["drives.conveyor.statoin: unknown key, did you mean 'station'?"]),
+     [at('drives.conveyor.statoin', 'unknown_key', hint=says('did_you_mean', word='station'))]),
     ('drives.conveyor.station', 200,
-     ['drives.conveyor.station: 200 is out of range, allowed is 1 to 127 (datamodel_extended)']),
+     [at('drives.conveyor.station', 'value_out_of_range', value=200, least=1, most=127,
+         remark=' (datamodel_extended)')]),
     ('drives.conveyor.station', True,
-     ['drives.conveyor.station: true is a bool, allowed is an integer']),
+     [at('drives.conveyor.station', 'wrong_type', value=True, kind='a bool',
+         allowed='an integer')]),
     ('drives.conveyor.station', None,
-     ['drives.conveyor.station: an empty list, allowed is an integer']),
+     [at('drives.conveyor.station', 'wrong_kind', kind='an empty list', allowed='an integer')]),
     ('drives.conveyor.station', b'\x01',
-     ['drives.conveyor.station: a bytes, allowed is an integer']),
+     [at('drives.conveyor.station', 'wrong_kind', kind='a bytes', allowed='an integer')]),
     ('drives.conveyor.period', float('nan'),
-     ['drives.conveyor.period: nan is not a finite number, allowed is a number of 0.001 to 60']),
+     [at('drives.conveyor.period', 'not_finite', allowed='a number of 0.001 to 60')]),
     ('drives.conveyor.cyclic_request', ['sped'],
-     ["drives.conveyor.cyclic_request: 'sped' is not in the profile, did you mean 'speed'?"]),
+     [at('drives.conveyor.cyclic_request', 'not_in_profile', name='sped',
+         hint=says('did_you_mean', word='speed'))]),
     ('drives.conveyor.bus', 'mian',
-     ["drives.conveyor.bus: 'mian' is unknown, did you mean 'main'?"]),
+     [at('drives.conveyor.bus', 'unknown', name='mian', hint=says('did_you_mean', word='main'))]),
     ('drives.conveyor', 5,
-     ["drives.conveyor: has a value, and 'bus' below it; allowed is one of them",
-      'drives.conveyor: 5 is an integer, allowed is a mapping']),
+     [at('drives.conveyor', 'value_and_below', below='bus'),
+      at('drives.conveyor', 'wrong_type', value=5, kind='an integer', allowed='a mapping')]),
     ('drives', None,
-     ["drives: has a value, and 'conveyor' below it; allowed is one of them",
-      'drives: an empty list, allowed is a mapping']),
+     [at('drives', 'value_and_below', below='conveyor'),
+      at('drives', 'wrong_kind', kind='an empty list', allowed='a mapping')]),
     ('unknown.key', 5,
-     ['unknown: unknown key, allowed: autostart, diagnostics_period, joint_state_rate, '
-      'profile_directories, buses, '
-      'drives, use_sim_time, start_type_description_service']),
+     [at('unknown', 'unknown_key',
+         hint=says('allowed', words='autostart, diagnostics_period, joint_state_rate, profile_directories, buses, drives, use_sim_time, start_type_description_service'))]),
 ])
 def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
     assert problems({**good, name: value}) == expected
 
 
 def test_nothing_at_all() -> None:
-    assert problems({}) == ['buses: missing, allowed is a mapping']
+    assert problems({}) == [at('buses', 'missing', allowed='a mapping')]
 
 
 def test_problem_inside_a_profile(good: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / 'table.yaml').write_text(changed(PROFILE, 'access: wo', 'access: w'))
     assert problems(good) == [
-        f"{tmp_path}/table.yaml:9: parameters.order.access: 'w' is unknown (did you mean 'wo'?), "
-        'allowed is ro, rw or wo']
+        at(f'{tmp_path}/table.yaml:9: parameters.order.access', 'unknown_word', value='w',
+           near=says('near', word='wo'), allowed='ro, rw or wo')]
 
 
 @pytest.mark.parametrize('empty', [None, [], (), array('q')])

@@ -4,7 +4,7 @@
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from configuration_builders import changed, load, problems, warnings
+from configuration_builders import at, changed, load, problems, warnings
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -12,6 +12,8 @@ from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
 
 FAMILY = CanopenPkw()
+#: how two uses of an identifier are told
+ONE = 'one identifier'
 
 FILE = """\
 /**/drive_can_bridge:
@@ -113,9 +115,9 @@ def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: st
     (tmp_path / 'other.yaml').write_text(
         'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
     assert problems(tmp_path, text, PROFILE) == [
-        'f.yaml:21: drives.fan.station: 1 collides with drive pump (station 5) on bus main: both '
-        f'use one identifier, 11-bit identifier {purpose[:4]} here and {purpose}; predefined_set) '
-        'there; allowed is a station of its own']
+        at('f.yaml:21: drives.fan.station', 'collides', station=1, other='pump', other_station=5,
+           bus='main', purpose=f'{ONE}, 11-bit identifier {purpose[:4]} here and {purpose}; '
+                               'predefined_set) there')]
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -132,9 +134,9 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
 """
     (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
     assert problems(tmp_path, text, PROFILE) == [
-        'f.yaml:21: drives.fan.station: 64 collides with drive pump (station 5) on bus main: both '
-        'use one identifier, process data to station 64 here and 080h (SYNC; predefined_set) '
-        'there; allowed is a station of its own']
+        at('f.yaml:21: drives.fan.station', 'collides', station=64, other='pump', other_station=5,
+           bus='main', purpose=f'{ONE}, process data to station 64 here and 080h (SYNC; '
+                               'predefined_set) there')]
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -162,8 +164,8 @@ def test_shortest_period_with_a_status_that_is_no_response(drive: DriveConfigura
 def test_round_that_does_not_fit(tmp_path: Path) -> None:
     assert problems(tmp_path, changed(FILE, 'period: 0.1', 'period: 0.00624'), PROFILE) == []
     assert problems(tmp_path, changed(FILE, 'period: 0.1', 'period: 0.006'), PROFILE) == [
-        'f.yaml:15: drives.pump.period: 0.006 s is too short for a round of polling at 250000 '
-        'bit/s, allowed is at least 0.00624 s']
+        at('f.yaml:15: drives.pump.period', 'period_too_short', period=0.006, bitrate=250000,
+           least=0.00624)]
 
 
 @pytest.mark.parametrize(('old', 'new', 'problem'), [
@@ -196,21 +198,21 @@ def test_values_out_of_range(tmp_path: Path, line: str) -> None:
 
 @pytest.mark.parametrize(('addressing', 'old', 'new', 'problem'), [
     ('register', 'number: 455, ', '',
-     'table.yaml:3: parameters.status.number: missing, allowed in canopen_pkw with addressing '
-     'register is a number'),
+     at('table.yaml:3: parameters.status.number', 'address_missing', family='canopen_pkw',
+        addressing='register', what='a number')),
     ('canopen', 'index: 0x2004, subindex: 6, ', '',
-     'table.yaml:3: parameters.status.index: missing, allowed in canopen_pkw with addressing '
-     'canopen is an index with a subindex'),
+     at('table.yaml:3: parameters.status.index', 'address_missing', family='canopen_pkw',
+        addressing='canopen', what='an index with a subindex')),
     ('canopen', 'index: 0x2004, subindex: 6, ', 'index: 0x2004, ',
-     'table.yaml:3: parameters.status.subindex: missing, allowed with index is 0 to 255'),
+     at('table.yaml:3: parameters.status.subindex', 'subindex_missing', most=255)),
     ('register', 'index: 0x2004, subindex: 6, ', 'index: 0x2004, ',
-     'table.yaml:3: parameters.status.subindex: missing, allowed with index is 0 to 255'),
+     at('table.yaml:3: parameters.status.subindex', 'subindex_missing', most=255)),
     ('register', 'number: 500', 'number: 65535',
-     'table.yaml:5: parameters.current.type: uint32 takes two registers and register 65535 is '
-     'the last one, allowed is a 16-bit type'),
+     at('table.yaml:5: parameters.current.type', 'last_register', type='uint32',
+        address='register 65535')),
     ('canopen', 'subindex: 0x33', 'subindex: 0xFF',
-     'table.yaml:5: parameters.current.type: uint32 takes two registers and 2004h.FFh is the '
-     'last one, allowed is a 16-bit type'),
+     at('table.yaml:5: parameters.current.type', 'last_register', type='uint32',
+        address='2004h.FFh')),
 ])
 def test_addresses(tmp_path: Path, addressing: str, old: str, new: str, problem: str) -> None:
     text = changed(FILE, 'period: 0.1', f'period: 0.1\n        addressing: {addressing}')
@@ -240,14 +242,13 @@ def test_setpoints_that_overwrite_each_other(tmp_path: Path, request_: str, prob
 def test_setpoint_that_overwrites_the_control_word(tmp_path: Path) -> None:
     profile = changed(PROFILE, 'number: 710, index: 0x2008, subindex: 11', 'number: 704')
     assert problems(tmp_path, FILE, profile) == [
-        "f.yaml:16: drives.pump.cyclic_request: 'speed' and 'word' share a register, allowed is "
-        'one of them']
+        at('f.yaml:16: drives.pump.cyclic_request', 'shared_register', name='speed', other='word')]
 
 
 def test_empty_round_is_refused(tmp_path: Path) -> None:
     found = problems(tmp_path, changed(FILE, '[status, status_2, current]', '[]'), PROFILE)
-    assert found == ['f.yaml:17: drives.pump.cyclic_response: empty, allowed in canopen_pkw is '
-                     'at least one parameter']
+    assert found == [at('f.yaml:17: drives.pump.cyclic_response', 'empty_list',
+                        family='canopen_pkw')]
 
 
 # -- raw names ------------------------------------------------------------------------------------
@@ -284,20 +285,19 @@ def test_station_names_the_frames(drive: DriveConfiguration) -> None:
         '085h (emergency messages of node 5)', '705h (heartbeats of node 5)', '000h (NMT)']
 
 
-@pytest.mark.parametrize('keys, text', [
+@pytest.mark.parametrize('keys, taken', [
     # receive PDO1: of a TeSys T the command register, as delivered
-    ('request_cob_id: 0x205', 'request_cob_id: 205h is receive PDO1 of node 5'),
-    ('request_cob_id: 0x605', 'request_cob_id: 605h is SDO requests to node 5'),
-    ('request_cob_id: 0x80', 'request_cob_id: 080h is SYNC'),
-    ('response_cob_id: 0x185', 'response_cob_id: 185h is transmit PDO1 of node 5'),
+    ('request_cob_id: 0x205', 'receive PDO1 of node 5'),
+    ('request_cob_id: 0x605', 'SDO requests to node 5'),
+    ('request_cob_id: 0x80', 'SYNC'),
+    ('response_cob_id: 0x185', 'transmit PDO1 of node 5'),
 ])
-def test_mailbox_where_a_device_has_something_else_as_delivered(keys: str, text: str,
+def test_mailbox_where_a_device_has_something_else_as_delivered(keys: str, taken: str,
                                                                 tmp_path: Path) -> None:
     file = changed(FILE, 'period: 0.1', f'period: 0.1\n        {keys}')
     assert warnings(tmp_path, file, PROFILE) == [
-        f'f.yaml:16: drives.pump.{text} in the predefined connection set: a device that was '
-        'not set up for it takes or sends something else there; predefined_set: false says that '
-        'this one was']
+        at(f'f.yaml:16: drives.pump.{keys.split(":")[0]}', 'predefined_identifier',
+           identifier=int(keys.split(':')[1], 0), taken=taken)]
     assert not warnings(tmp_path, changed(file, 'period: 0.1',
                                           'period: 0.1\n        predefined_set: false'), PROFILE)
 

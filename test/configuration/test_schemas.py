@@ -9,12 +9,14 @@ from typing import Any
 
 from jsonschema import Draft202012Validator
 import pytest
+from saying import says
 import yaml
 
 from drive_can_bridge.configuration import schema
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.problems import Tree
 from drive_can_bridge.configuration.schema import check_schema
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import share_directory
 
@@ -120,17 +122,17 @@ def test_keys_of_several_families() -> None:
     document = schema.compose(schema.load('base.json'), families)
     Draft202012Validator.check_schema(document)
 
-    def wrong(**keys: object) -> list[str]:
+    def wrong(**keys: object) -> list[Sentence]:
         drive = {'bus': 'main', 'station': 1, 'profile': 'x', **keys}
         tree = Tree(drive)
         check_schema(tree, document, 'drive')
-        return [f'{problem.key}: {problem.message}' for problem in tree.problems]
+        return [problem.text for problem in tree.problems]
 
     assert wrong(protocol='other', mapping=2, layout='b') == []
     assert wrong(protocol='datamodel_extended', mapping='assume') == []
     assert wrong(protocol='other', mapping='assume') == [
-        "mapping: 'assume' is a string, allowed is an integer"]
+        says('wrong_type', key='mapping', value='assume', kind='a string', allowed='an integer')]
     assert wrong(protocol='datamodel_extended', layout='a') == [
-        'layout: a key of other, allowed with datamodel_extended is to leave it out']
+        says('key_of_others', key='layout', owners='other', family='datamodel_extended')]
     assert wrong(protocol='other', length_policy='strict') == [
-        'length_policy: a key of datamodel_extended, allowed with other is to leave it out']
+        says('key_of_others', key='length_policy', owners='datamodel_extended', family='other')]

@@ -5,8 +5,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 import re
 
-from configuration_builders import changed, FILE, load, problems, PROFILE, warnings
+from configuration_builders import at, changed, FILE, load, problems, PROFILE, warnings
 import pytest
+from saying import says
 
 from drive_can_bridge.configuration.checks import bus_shares
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
@@ -21,7 +22,7 @@ TABLE = changed(PROFILE, 'protocols: [datamodel_extended]',
 BOTH = FILE.replace('protocol: datamodel_extended', 'protocol: datamodel_standard')
 #: conveyor with 11 bits, lift with 29
 MIXED = changed(FILE, 'protocol: datamodel_extended', 'protocol: datamodel_standard')
-STATION = 'f.yaml:13: drives.conveyor.station: '
+STATION = 'f.yaml:13: drives.conveyor.station'
 
 
 def with_keys(*lines: str, text: str = MIXED) -> str:
@@ -101,8 +102,8 @@ def test_values_out_of_range(tmp_path: Path, key: str, allowed: str) -> None:
 
 def test_a_profile_of_the_other_protocol_is_refused(tmp_path: Path) -> None:
     assert problems(tmp_path, MIXED) == [
-        "f.yaml:14: drives.conveyor.profile: 'table' is for datamodel_extended, allowed is a "
-        'profile for datamodel_standard']
+        at('f.yaml:14: drives.conveyor.profile', 'profile_for_others', name='table',
+           protocols='datamodel_extended', family='datamodel_standard')]
 
 
 # -- stations and identifiers ---------------------------------------------------------------------
@@ -113,25 +114,25 @@ def test_stations_with_the_default_bases(tmp_path: Path, station: int) -> None:
     assert found(tmp_path, changed(MIXED, 'station: 1', f'station: {station}')) == []
 
 
-@pytest.mark.parametrize(('station', 'total'), [(16, '800h'), (17, '801h'), (127, '86Fh')])
+@pytest.mark.parametrize(('station', 'total'), [(16, 0x800), (17, 0x801), (127, 0x86F)])
 def test_what_does_not_fit_11_bits_is_refused_with_the_sum(tmp_path: Path, station: int,
-                                                           total: str) -> None:
+                                                           total: int) -> None:
     assert found(tmp_path, changed(MIXED, 'station: 1', f'station: {station}')) == [
-        f'{STATION}{station} is out of range: the identifier of responses, 7F0h + {station} = '
-        f'{total}, does not fit 11 bits; allowed is 1 to 15 with these bases']
+        at(STATION, 'identifier_too_long', station=station, direction='response', base=0x7F0,
+           identifier=total, most=15)]
 
 
 def test_station_0_is_refused(tmp_path: Path) -> None:
     assert found(tmp_path, changed(MIXED, 'station: 1', 'station: 0')) == [
-        f'{STATION}0 is out of range, allowed is 1 to 15 (datamodel_standard)']
+        at(STATION, 'station_out_of_range', station=0, most=15, family='datamodel_standard')]
 
 
 def test_the_request_identifier_has_to_fit_too(tmp_path: Path) -> None:
     text = changed(with_keys('request_id_base: 0x7F8', 'response_id_base: 0x100'),
                    'station: 1', 'station: 8')
     assert found(tmp_path, text) == [
-        f'{STATION}8 is out of range: the identifier of requests, 7F8h + 8 = 800h, does not fit '
-        '11 bits; allowed is 1 to 7 with these bases']
+        at(STATION, 'identifier_too_long', station=8, direction='request', base=0x7F8,
+           identifier=0x800, most=7)]
 
 
 def test_custom_bases(tmp_path: Path) -> None:
@@ -143,8 +144,8 @@ def test_custom_bases(tmp_path: Path) -> None:
 
 
 def test_equal_bases_are_refused(tmp_path: Path) -> None:
-    line, = found(tmp_path, with_keys('response_id_base: 0x3F0'))
-    assert line.startswith('f.yaml:18: drives.conveyor.response_id_base: 1008 is request_id_base')
+    assert found(tmp_path, with_keys('response_id_base: 0x3F0')) == [
+        at('f.yaml:18: drives.conveyor.response_id_base', 'same_base', base=1008)]
 
 
 def test_claims(drive: DriveConfiguration) -> None:
@@ -164,22 +165,22 @@ def test_claims(drive: DriveConfiguration) -> None:
 
 def test_the_same_station_twice(tmp_path: Path) -> None:
     assert found(tmp_path, changed(BOTH, 'station: 2', 'station: 1')) == [
-        'f.yaml:22: drives.lift.station: 1 collides with drive conveyor (station 1) on bus main: '
-        'both use 11-bit identifier 3F1h; allowed is a station of its own']
+        at('f.yaml:22: drives.lift.station', 'collides', station=1, other='conveyor',
+           other_station=1, bus='main', purpose='11-bit identifier 3F1h')]
 
 
 def test_the_request_of_one_is_the_response_of_another(tmp_path: Path) -> None:
     # answers of station 1 on 3F8h + 1 = 3F9h, requests to station 9 on 3F0h + 9 = 3F9h
     text = changed(with_keys('response_id_base: 0x3F8', text=BOTH), 'station: 2', 'station: 9')
     assert found(tmp_path, text) == [
-        'f.yaml:22: drives.lift.station: 9 collides with drive conveyor (station 1) on bus main: '
-        'both use 11-bit identifier 3F9h; allowed is a station of its own']
+        at('f.yaml:22: drives.lift.station', 'collides', station=9, other='conveyor',
+           other_station=1, bus='main', purpose='11-bit identifier 3F9h')]
     # and the other way round: the later drive answers where the earlier one is asked
     text = changed(changed(BOTH, 'station: 1', 'station: 9'), 'station: 2',
                    'station: 1\n        response_id_base: 0x3F8')
     assert found(tmp_path, text) == [
-        'f.yaml:22: drives.lift.station: 1 collides with drive conveyor (station 9) on bus main: '
-        'both use 11-bit identifier 3F9h; allowed is a station of its own']
+        at('f.yaml:22: drives.lift.station', 'collides', station=1, other='conveyor',
+           other_station=9, bus='main', purpose='11-bit identifier 3F9h')]
 
 
 def test_the_same_station_with_other_bases_is_another_drive(tmp_path: Path) -> None:
@@ -226,8 +227,8 @@ def test_a_period_that_is_too_short(tmp_path: Path, bitrate: int, period: str,
                                     shortest: float) -> None:
     text = changed(changed(MIXED, 'period: 0.02', f'period: {period}'), 'bitrate: 125000',
                    f'bitrate: {bitrate}')
-    assert f'f.yaml:15: drives.conveyor.period: {period} s is too short for a round of polling ' \
-        f'at {bitrate} bit/s, allowed is at least {shortest:g} s' in found(tmp_path, text)
+    assert at('f.yaml:15: drives.conveyor.period', 'period_too_short', period=float(period),
+              bitrate=bitrate, least=pytest.approx(shortest, abs=5e-6)) in found(tmp_path, text)
 
 
 LISTS = {
@@ -262,8 +263,7 @@ def test_the_manual_s_5_ms(tmp_path: Path) -> None:
     text = changed(changed(MIXED, 'period: 0.02', 'period: 0.004'), 'bitrate: 125000',
                    'bitrate: 1000000')
     assert found(tmp_path, text) == [
-        'f.yaml:15: drives.conveyor.period: 0.004 s is too fast, allowed is at least 0.005 s '
-        'unless allow_fast_cycle is true']
+        at('f.yaml:15: drives.conveyor.period', 'period_too_fast', period=0.004, least=0.005)]
     text = changed(text, 'rearm: neutral', 'allow_fast_cycle: true')
     assert found(tmp_path, text) == []
 
@@ -288,24 +288,25 @@ def test_reads_of_a_round(tmp_path: Path, response: str, frames: int) -> None:
 
 
 def test_eeprom_parameters_are_no_setpoints(tmp_path: Path) -> None:
-    line, = found(tmp_path, changed(MIXED, 'cyclic_request: [speed, limit]',
-                                    'cyclic_request: [speed, ramp]'))
-    assert line.startswith("f.yaml:16: drives.conveyor.cyclic_request: 'ramp' is kept in EEPROM")
+    text = changed(MIXED, 'cyclic_request: [speed, limit]', 'cyclic_request: [speed, ramp]')
+    assert found(tmp_path, text) == [
+        at('f.yaml:16: drives.conveyor.cyclic_request', 'kept_in_eeprom', name='ramp')]
 
 
 def test_there_has_to_be_something_to_poll(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(MIXED, '[actual, current, status]', '[]')) == [
-        'f.yaml:17: drives.conveyor.cyclic_response: empty, allowed in datamodel_standard is at '
-        'least one parameter']
-    assert found(tmp_path, changed(MIXED, '        cyclic_response: [actual, current, status]\n',
-                                   '')) == [
-        'f.yaml:10: drives.conveyor.cyclic_response: empty, allowed in datamodel_standard is at '
-        'least one parameter']
+    line = '        cyclic_response: [actual, current, status]\n'
+    empty = changed(MIXED, line, '        cyclic_response: []\n')
+    assert found(tmp_path, empty) == [
+        at('f.yaml:17: drives.conveyor.cyclic_response', 'empty_list',
+           family='datamodel_standard')]
+    assert found(tmp_path, changed(MIXED, line, '')) == [
+        at('f.yaml:10: drives.conveyor.cyclic_response', 'empty_list',
+           family='datamodel_standard')]
 
 
 def test_there_need_not_be_setpoints(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(MIXED, 'cyclic_request: [speed, limit]',
-                                   'cyclic_request: []')) == []
+    text = changed(MIXED, 'cyclic_request: [speed, limit]', 'cyclic_request: []')
+    assert found(tmp_path, text) == []
 
 
 def test_more_than_four_of_each(tmp_path: Path) -> None:
@@ -318,8 +319,9 @@ def test_more_than_four_of_each(tmp_path: Path) -> None:
 
 
 def test_write_only_parameters_are_not_polled(tmp_path: Path) -> None:
-    line, = found(tmp_path, changed(MIXED, '[actual, current, status]', '[actual, order]'))
-    assert line.startswith("f.yaml:17: drives.conveyor.cyclic_response: 'order' is write-only")
+    text = changed(MIXED, '[actual, current, status]', '[actual, order]')
+    assert found(tmp_path, text) == [
+        at('f.yaml:17: drives.conveyor.cyclic_response', 'write_only', name='order')]
 
 
 def test_32_bits_do_not_exist(tmp_path: Path) -> None:
@@ -327,8 +329,8 @@ def test_32_bits_do_not_exist(tmp_path: Path) -> None:
                                                                   'type: int32')
     lines = problems(tmp_path, BOTH, table)
     assert lines
-    assert all('table.yaml:' in line and 'int32 does not exist in datamodel_standard' in line
-               for line in lines)
+    assert all(line == says('no_such_type', file='table.yaml', type='int32',
+                            family='datamodel_standard') for line in lines)
 
 
 # -- load -----------------------------------------------------------------------------------------
@@ -347,12 +349,12 @@ def test_load_of_mixed_drives(tmp_path: Path) -> None:
 def test_overload_of_mixed_drives(tmp_path: Path) -> None:
     text = changed(MIXED, 'bitrate: 125000', 'bitrate: 50000')
     assert warnings(tmp_path, text, TABLE) == [
-        'f.yaml:5: buses.main: worst-case load 87.3 % at 50000 bit/s (conveyor 54.0 %, lift '
-        '33.3 %), recommended is at most 70 %']
+        at('f.yaml:5: buses.main', 'high_load', load=87.28, bitrate=50000,
+           parts='conveyor 54.0 %, lift 33.3 %', most=70.0)]
     text = changed(MIXED, 'bitrate: 125000', 'bitrate: 40000')
     assert found(tmp_path, text) == [
-        'f.yaml:5: buses.main: worst-case load 109.1 % at 40000 bit/s (conveyor 67.5 %, lift '
-        '41.6 %), allowed is 100 %: use longer periods, fewer drives or a higher bit rate']
+        at('f.yaml:5: buses.main', 'overload', load=109.1, bitrate=40000,
+           parts='conveyor 67.5 %, lift 41.6 %', most=100.0)]
 
 
 # -- names ----------------------------------------------------------------------------------------

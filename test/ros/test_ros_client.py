@@ -18,6 +18,7 @@ from waiting import clock, pause
 
 from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.drive import Drive, Enabled
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
@@ -89,19 +90,24 @@ def _values(conveyor: Drive, bridge: Bridge) -> None:
     assert (raw.listed, raw.access, raw.storage) == (False, Access.READ_WRITE, Storage.EEPROM)
 
 
+RAMP_RANGE = '0.01 to 60 s'
+
+
 def _refusals(conveyor: Drive, lift: Drive, bridge: Bridge) -> None:
     assert reasons(conveyor.write({
         'ramp_tim': 1.0, 'actual_speed': 1.0, 'ramp_time': 99.0, 'speed_setpoint': 5.0,
         'p122': 50})) == {
-        'ramp_tim': 'unknown parameter ramp_tim, did you mean ramp_time?',
-        'actual_speed': 'read-only', 'ramp_time': '99 is out of range: 0.01 to 60 s',
-        'speed_setpoint': 'sent cyclically: publish ~/command/speed_setpoint',
-        'p122': 'mapping parameter: not written while the bridge is active'}
+        'ramp_tim': sentences.unknown_parameter('ramp_tim', 'ramp_time'),
+        'actual_speed': sentences.read_only(),
+        'ramp_time': sentences.out_of_range('99', RAMP_RANGE),
+        'speed_setpoint': sentences.sent_cyclically('speed_setpoint'),
+        'p122': sentences.mapping_parameter()}
     assert reasons(lift.write({'control_word': 1})) == {'control_word': 'use ~/enable'}
     assert conveyor.role('speed_setpoint') is Role.CYCLIC
     bridge.played['conveyor'].fault('stuck=jog_speed')
     outcome = conveyor.write({'jog_speed': 12.5})['jog_speed']
-    assert (outcome.ok, outcome.reason) == (False, 'read back -100 instead of 12.5')
+    assert (outcome.ok, outcome.reason) == (
+        False, sentences.read_back_differs('-100', '12.5'))
 
 
 def test_what_fails_says_why(bridge: StartBridge) -> None:
@@ -110,12 +116,12 @@ def test_what_fails_says_why(bridge: StartBridge) -> None:
     with open_drives() as drives:
         conveyor = drives['conveyor']
         assert reasons(conveyor.read('p9999', 'ramp_time', 'bogus')) == {
-            'p9999': 'no answer in 0.2 s, 3 attempts', 'ramp_time': '',
-            'bogus': 'unknown parameter bogus'}
+            'p9999': sentences.no_answer(0.2, 3), 'ramp_time': '',
+            'bogus': sentences.unknown_parameter('bogus')}
         one.played['conveyor'].fault('silent')
         wait_until(lambda: not one.node.drives['conveyor'].session.online)
         assert reasons(conveyor.read('ramp_time', 'maximum_speed')) == {
-            'ramp_time': 'no answer; drive offline', 'maximum_speed': 'no answer; drive offline'}
+            name: sentences.no_answer_offline() for name in ('ramp_time', 'maximum_speed')}
         one.node.trigger_deactivate()
         assert reasons(conveyor.read('ramp_time')) == {'ramp_time': 'bridge inactive'}
         assert conveyor.write({'ramp_time': 2.0})['ramp_time'].reason == 'bridge inactive'

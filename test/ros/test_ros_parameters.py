@@ -9,7 +9,12 @@ import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameterTypes, ListParameters
 
+from drive_can_bridge.core import sentences
+
 DRIVE = 'drive_can_bridge: drive conveyor'
+JOG_RANGE = '-300 to 300 rpm'
+RAMP_RANGE = '0.01 to 60 s'
+SPEED_RANGE = '0 to 3000 rpm'
 
 
 def test_get(bridge: StartBridge, client: Client) -> None:
@@ -32,7 +37,8 @@ def test_get(bridge: StartBridge, client: Client) -> None:
     client.wait_logged('conveyor: read ramp_tim: unknown parameter ramp_tim, did you mean '
                        'ramp_time?')
     status = client.diagnostics(DRIVE, lambda drive: drive['parameter_requests_failed'] == '3')
-    assert status['last_parameter_error'] == 'read p30.1: unknown parameter p30.1'
+    assert status['last_parameter_error'] == \
+        f'read p30.1: {sentences.unknown_parameter("p30.1")}'
     assert int(status['parameter_requests_ok']) >= 9
 
 
@@ -43,7 +49,7 @@ def test_write_only_reads_as_not_set_without_a_frame(bridge: StartBridge,
     with one.record() as recorder:
         assert client.get('/conveyor', 'user_command', 'p70') == [None, None]
         assert client.set('/conveyor', user_command=1) == [
-            (True, 'sent; this protocol does not acknowledge writes')]
+            (True, sentences.sent_unacknowledged())]
         wait_until(lambda: acyclic(recorder))
         assert [identifier >> 20 & 1 for identifier, _ in acyclic(recorder)] == [1]
 
@@ -76,9 +82,9 @@ def test_no_answer_is_logged_as_the_contract_says(bridge: StartBridge, client: C
     client.listen()
     assert client.get('/conveyor', 'ramp_time') == [None]
     assert client.wait_logged('ramp_time') == (
-        'conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts')
+        f'conveyor: read ramp_time (P30): {sentences.no_answer(0.1, 3)}')
     assert client.set('/conveyor', ramp_time=2.0, jog_speed=1.0) == [
-        (False, 'no answer in 0.1 s, 3 attempts')] * 2
+        (False, sentences.no_answer(0.1, 3))] * 2
     client.wait_logged('conveyor: set jog_speed (P62): no answer in 0.1 s, 3 attempts')
 
 
@@ -113,13 +119,15 @@ def test_set_raw(bridge: StartBridge, client: Client) -> None:
     assert client.get('/conveyor', 'p62') == [0x10000 - 100]
     # the rules of the listed twin
     assert client.set('/conveyor', p62=5000, p209=1, p50=1, p30=0, p62__1=3) == [
-        (False, 'raw 5000 of jog_speed: 500 is out of range: -300 to 300 rpm'),
-        (False, 'read-only'),
-        (False, 'sent cyclically: publish ~/command/speed_setpoint'),
-        (False, 'raw 0 of ramp_time: 0 is out of range: 0.01 to 60 s'),
-        (False, 'unknown parameter p62.1')]
+        (False, sentences.raw_refused(
+            5000, 'jog_speed', sentences.out_of_range('500', JOG_RANGE))),
+        (False, sentences.read_only()),
+        (False, sentences.sent_cyclically('speed_setpoint')),
+        (False, sentences.raw_refused(
+            0, 'ramp_time', sentences.out_of_range('0', RAMP_RANGE))),
+        (False, sentences.unknown_parameter('p62.1'))]
     assert client.set('/conveyor', p62=1.0) == [
-        (False, 'wrong type: double, expected integer')]
+        (False, sentences.wrong_type('double', 'integer'))]
     assert client.set('/conveyor', p62=0x10000)[0][1].startswith('65536 is not representable')
     assert client.set('/conveyor', p62=-0x8001)[0][1].startswith('-32769 is not representable')
 
@@ -135,22 +143,22 @@ def test_set_refusals(bridge: StartBridge, client: Client) -> None:
             jog_speed=True, maximum_speed=3000.1, rated_current=float('nan'),
             speed_setpoint=1.0, torque_limit=1.0, p122=1, p129=1, p65535=1, jog_speed__x=None)
         assert results[:11] == [
-            (False, 'unknown parameter ramp_tim, did you mean ramp_time?'),
-            (False, 'read-only'),
-            (False, 'wrong type: string, expected double'),
-            (False, 'wrong type: integer, expected bool'),
-            (False, 'wrong type: bool, expected double'),
-            (False, '3000.1 is out of range: 0 to 3000 rpm'),
-            (False, 'nan is not a finite number'),
-            (False, 'sent cyclically: publish ~/command/speed_setpoint'),
-            (False, 'sent cyclically: publish ~/command/torque_limit'),
-            (False, 'mapping parameter: not written while the bridge is active'),
-            (False, 'mapping parameter: not written while the bridge is active')]
-        assert results[11] == (False, 'unknown parameter p65535')
+            (False, sentences.unknown_parameter('ramp_tim', 'ramp_time')),
+            (False, sentences.read_only()),
+            (False, sentences.wrong_type('string', 'double')),
+            (False, sentences.wrong_type('integer', 'bool')),
+            (False, sentences.wrong_type('bool', 'double')),
+            (False, sentences.out_of_range('3000.1', SPEED_RANGE)),
+            (False, sentences.not_finite('nan')),
+            (False, sentences.sent_cyclically('speed_setpoint')),
+            (False, sentences.sent_cyclically('torque_limit')),
+            (False, sentences.mapping_parameter()),
+            (False, sentences.mapping_parameter())]
+        assert results[11] == (False, sentences.unknown_parameter('p65535'))
         assert client.set('/conveyor', ramp_time=None) == [
-            (False, 'wrong type: not set, expected double')]
+            (False, sentences.wrong_type('not set', 'double'))]
         assert client.set('/conveyor', ramp_time=['a']) == [
-            (False, 'wrong type: array, expected double')]
+            (False, sentences.wrong_type('array', 'double'))]
         assert not acyclic(recorder)
     client.wait_logged('conveyor: set maximum_speed: 3000.1 is out of range: 0 to 3000 rpm')
     status = client.diagnostics(DRIVE)
@@ -170,7 +178,7 @@ def test_read_back_something_else(bridge: StartBridge, client: Client) -> None:
     drive.fault('stuck=jog_speed')
     client.listen()
     assert client.set('/conveyor', jog_speed=20.0) == [
-        (False, 'read back 1.5 instead of 20')]
+        (False, sentences.read_back_differs('1.5', '20'))]
     client.wait_logged('conveyor: set jog_speed (P62): read back 1.5 instead of 20')
     assert client.set('/conveyor', fan_always_on=True) == [(True, '')]
     wait_until(lambda: events)
@@ -183,7 +191,7 @@ def test_unverified_writes_say_so(bridge: StartBridge, client: Client) -> None:
     events = client.parameter_events('/conveyor')
     one.played['conveyor'].fault('stuck=jog_speed')
     assert client.set('/conveyor', jog_speed=20.0) == [
-        (True, 'sent; this protocol does not acknowledge writes')]
+        (True, sentences.sent_unacknowledged())]
     wait_until(lambda: events)
 
 
@@ -237,7 +245,7 @@ def test_an_offline_drive_is_tried_once(bridge: StartBridge, client: Client) -> 
         assert len({identifier for identifier, _ in acyclic(recorder)}) == 1
     client.wait_logged('conveyor: read p498 (P498): no answer; drive offline')
     assert client.set('/conveyor', ramp_time=1.0, jog_speed=1.0) == [
-        (False, 'no answer; drive offline')] * 2
+        (False, sentences.no_answer_offline())] * 2
     one.played['conveyor'].fault('ok')
     assert client.get('/conveyor', 'ramp_time') != [None]
 

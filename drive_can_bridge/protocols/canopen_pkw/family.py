@@ -174,7 +174,7 @@ class CanopenPkw(Family):
             last = Span(address, parameter.type.bits // 16).addresses[-1]
             if last.word > pkw.WORD_MAX or (last.subindex or 0) > pkw.SUBINDEX_MAX:
                 yield Complaint(f'{place}.type', says('last_register', type=parameter.type.value,
-                                                      address=address))
+                                                      address=str(address)))
 
     def _check_request(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Look for setpoints that would overwrite each other, or the control word."""
