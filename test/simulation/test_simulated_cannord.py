@@ -9,6 +9,7 @@ from cannord_builders import (
 )
 from hypothesis import given, strategies as st
 import pytest
+from simulation_builders import RULES
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.errors import ValueRefused
@@ -66,7 +67,7 @@ class TestStates:
     def test_reserved_bit(self) -> None:
         made = inverter()
         tells(made, '7E240000')
-        assert made.violations == {'reserved bit 13 of the control word': 1}
+        assert made.violations == {RULES['reserved bit']: 1}
 
 
 class TestMotor:
@@ -191,8 +192,8 @@ class TestFrames:
         assert says(made, f'0C8#{data}') == []
         assert says(made, '2C8#66100000000000') == []
         assert list(made.violations) == [
-            'process data of a length that the manual does not define (ignored)',
-            'parameter task without eight data bytes (ignored)']
+            RULES['length'],
+            RULES['task length']]
 
     def test_29_bit_identifiers(self) -> None:
         made = inverter(extended_identifiers=True)
@@ -205,7 +206,7 @@ class TestFrames:
         made = inverter()
         assert says(made, '0C9#700B0000') == []
         assert says(made, '2C9#6610000000000000') == []
-        assert made.violations == {'frame that only this drive may send': 2}
+        assert made.violations == {RULES['alone']: 2}
 
 
 class TestBroadcast:

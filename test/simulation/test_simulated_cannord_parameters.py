@@ -3,6 +3,7 @@
 
 from cannord_builders import asks, inverter, says, TABLE
 import pytest
+from simulation_builders import RULES
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
@@ -124,7 +125,7 @@ class TestRefusals:
     def test_tasks_that_do_not_exist(self, task: int) -> None:
         made = inverter()
         assert asks(made, f'66{task:X}0000000000000') == '667000000000C900'
-        assert made.violations == {'task identifier that does not exist (refused)': 1}
+        assert made.violations == {RULES['task identifier']: 1}
 
     def test_scripted_refusal(self) -> None:
         made = inverter()
@@ -139,13 +140,13 @@ class TestRefusals:
         made = inverter()
         assert says(made, '2C8#6618000000000000') == []
         assert made.violations == {
-            'parameter task that the manual does not define (ignored)': 1}
+            RULES['task']: 1}
 
     def test_byte_without_information(self) -> None:
         made = inverter()
         assert asks(made, '6660010100000000')[:8] == '66400100'
         assert made.violations == {
-            'byte of the sub-index that holds no information is not 0': 1}
+            RULES['sub-index']: 1}
 
 
 class TestLayouts:

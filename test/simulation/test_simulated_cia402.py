@@ -6,6 +6,7 @@ from typing import Any
 import cia402_builders
 from cia402_builders import BEGINNING, Servo
 import pytest
+from simulation_builders import RULES
 
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
@@ -132,18 +133,14 @@ def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:
     answer, = servo.ask('080#')
     assert answer.startswith('185#3102')
     assert servo.read(0x6040) == 6
-    # every second SYNC
-    servo.write(0x1800, 2, 2, 1)
-    assert [len(servo.ask('080#')) for _ in range(4)] == [0, 1, 0, 1]
 
 
-def test_an_rpdo_that_is_too_short_is_an_emergency_until_the_next_good_one() -> None:
+def test_an_rpdo_that_is_too_short_is_ignored() -> None:
     servo = Servo()
     servo.set_up(9)
-    assert servo.ask('205#0600') == ['085#1082110000000000']
-    assert servo.ask('205#0600') == []
-    assert servo.ask('205#060000000000') == ['085#0000110000000000']
-    assert servo.drive.violations == {'PDO shorter than its mapping (ignored)': 2}
+    assert servo.ask('205#0600') == servo.ask('080#')[1:] == []
+    assert servo.read(0x6040) == 0
+    assert list(servo.drive.violations.values()) == [1]
 
 
 def test_tpdos_by_event_and_timer() -> None:
@@ -174,7 +171,7 @@ def test_a_second_node_with_its_number_is_seen() -> None:
     servo = Servo()
     servo.ask('705#05')
     servo.ask('185#5002')
-    assert servo.drive.violations == {'frame that only this drive may send': 2}
+    assert servo.drive.violations == {RULES['alone']: 2}
 
 
 # -- states ---------------------------------------------------------------------------------------

@@ -40,7 +40,7 @@ class PdoHabits:
     :param no_remote: TPDOs want bit 30 of their COB-ID.
     """
 
-    types: Collection[int] = frozenset((*range(241), 254, 255))
+    types: Collection[int] = frozenset((0, 1, 254, 255))
     fixed_mapping: bool = False
     no_remote: bool = False
 
@@ -62,7 +62,6 @@ class Pdo:
     count: int = 0
     entries: list[int] = field(default_factory=lambda: [0] * ENTRIES_MAX)
     pending: bytes | None = None
-    syncs: int = 0
     sent: bytes | None = None
     sent_at: float = -math.inf
 
@@ -168,7 +167,7 @@ class Pdos:
                     and value != pdo.cob_id):
                 raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
             pdo.cob_id = value
-            pdo.pending, pdo.sent, pdo.syncs = None, None, 0
+            pdo.pending = pdo.sent = None
         elif subindex == 2:
             if value not in self.habits.types:
                 raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
@@ -228,16 +227,10 @@ class Pdos:
                         for entry in pdo.mapped)
 
     def synchronised(self, pdo: Pdo) -> bool:
-        """Count a SYNC, and tell whether this TPDO leaves with it."""
+        """Tell whether this TPDO leaves with a SYNC: with each, or with content that is new."""
         if pdo.identifier is None or pdo.type > 240:
             return False
-        if pdo.type == 0:
-            return self.content(pdo) != pdo.sent
-        pdo.syncs += 1
-        if pdo.syncs < pdo.type:
-            return False
-        pdo.syncs = 0
-        return True
+        return bool(pdo.type) or self.content(pdo) != pdo.sent
 
     def due(self, pdo: Pdo) -> float:
         """Return when a TPDO leaves by itself."""
