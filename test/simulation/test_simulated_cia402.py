@@ -109,22 +109,6 @@ def test_a_mapping_is_changed_in_the_order_of_the_standard_only() -> None:
     assert servo.ask('080#') == [f'185#{BEGINNING.to_bytes(4, "little").hex().upper() * 2}']
 
 
-@pytest.mark.parametrize(('habits', 'index', 'subindex', 'value', 'size', 'code'), [
-    (Habits(fixed_mapping=True), 0x1A01, 0, 0, 1, 0x06010000),
-    (Habits(types={254, 255}), 0x1801, 2, 1, 1, 0x06090030),
-    (Habits(types={1, 255}), 0x1401, 2, 254, 1, 0x06090030),
-    (Habits(no_remote=True), 0x1801, 1, 0x285, 4, 0x06090030)])
-def test_makers_differ(habits: Habits, index: int, subindex: int, value: int, size: int,
-                       code: int) -> None:
-    servo = Servo(habits=habits)
-    if index == 0x1801:
-        servo.write(index, 1, 0xC0000285, 4)
-    assert servo.refused(index, subindex, value, size) == code
-    servo = Servo()
-    servo.write(index & ~0x200 if index >= 0x1A00 else index, 1, 0x80000285, 4)
-    servo.write(index, subindex, value, size)
-
-
 def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:
     servo = Servo()
     servo.set_up(9)
@@ -236,21 +220,6 @@ def test_sto_low_lets_no_torque_be() -> None:
 # -- modes ----------------------------------------------------------------------------------------
 
 
-def test_csp_follows_and_stays_where_it_is() -> None:
-    servo = Servo()
-    servo.set_up(8)
-    servo.target = BEGINNING
-    servo.enable()
-    status, position = servo.run(0.2)
-    assert (status & 0x1000, position) == (0x1000, BEGINNING)
-    for _ in range(100):
-        servo.target += 50
-        servo.cycle()
-    assert servo.read(0x606C) == pytest.approx(5000, abs=1)
-    assert servo.run(0.05)[1] == BEGINNING + 5000
-    assert servo.speed == 0.0
-
-
 def test_a_step_in_csp_is_a_fault() -> None:
     servo = Servo()
     servo.set_up(8)
@@ -302,59 +271,6 @@ def test_pp_takes_targets_by_bit_4() -> None:
     assert servo.run(2.0)[1] == 90_000
 
 
-def test_pv_and_vl_have_ramps_and_vl_wants_its_bits() -> None:
-    servo = Servo()
-    servo.set_up(3)
-    servo.target = 100_000
-    servo.enable()
-    servo.run(0.1)
-    assert servo.speed == pytest.approx(5.0, abs=1.0)       # 50 rev/s²
-    servo.run(0.5)
-    assert servo.speed == 10.0
-    servo = Servo()
-    servo.set_up(2)
-    servo.target = 600
-    servo.enable()
-    servo.run(1.0)
-    assert servo.speed == 0.0
-    servo.word = 0x7F
-    servo.run(1.0)
-    assert servo.speed == pytest.approx(10.0)
-    assert servo.read(0x6044) == 600
-    servo = Servo(habits=Habits(ramp_bits=False))
-    servo.set_up(2)
-    servo.target = 600
-    servo.enable()
-    servo.run(1.0)
-    assert servo.speed == pytest.approx(10.0)
-
-
-def test_ip_wants_bit_4_and_cst_pulls() -> None:
-    servo = Servo()
-    servo.set_up(7)
-    servo.target = BEGINNING + 100
-    servo.enable()
-    assert servo.run(0.2) == (0x0237, BEGINNING)
-    servo.word |= 0x10
-    servo.target = BEGINNING + 200
-    assert servo.run(0.2) == (0x1237, BEGINNING + 200)
-    servo = Servo()
-    servo.set_up(10)
-    servo.target = 200
-    servo.enable()
-    servo.run(0.5)
-    assert 0.0 < servo.speed < 50.0
-    assert servo.drive.value('actual_torque') == pytest.approx(20.0, abs=0.1)
-
-
-def test_a_new_mode_is_shown_only_in_operation_on_some_drives() -> None:
-    servo = Servo(habits=Habits(mode_shown_early=False))
-    servo.set_up(9)
-    assert servo.read(0x6061) == 0
-    servo.enable()
-    assert servo.read(0x6061) == 9
-
-
 @pytest.mark.parametrize(('method', 'status', 'position'), [
     (35, 0x1637, 0), (37, 0x1637, 0), (17, 0x1637, 0), (33, 0x1637, 0), (0, 0x2237, BEGINNING)])
 def test_homing(method: int, status: int, position: int) -> None:
@@ -366,31 +282,6 @@ def test_homing(method: int, status: int, position: int) -> None:
     servo.word |= 0x10
     assert servo.run(3.0) == (status, position)
     assert servo.speed == 0.0
-
-
-def test_homing_to_an_offset_and_without_a_switch() -> None:
-    servo = Servo()
-    servo.set_up(6)
-    servo.write(0x607C, 0, -500, 4)
-    servo.write(0x6098, 0, 17, 1)
-    servo.enable()
-    servo.word |= 0x10
-    assert servo.run(3.0)[1] == -500
-    assert servo.revolutions == 0.0
-    servo = Servo(habits=Habits(home_switch=None))
-    servo.set_up(6)
-    servo.write(0x6098, 0, 17, 1)
-    servo.enable()
-    servo.word |= 0x10
-    assert servo.run(3.0)[0] & 0x3000 == 0x2000
-    assert servo.read(0x6064) == BEGINNING - 20_000 & 0xFFFFFFFF
-    # and taken back in the middle
-    servo.word &= ~0x10
-    servo.cycle()
-    servo.word |= 0x10
-    servo.run(0.1)
-    servo.word &= ~0x10
-    assert servo.run(0.5) == (servo.cycle()[0], servo.cycle()[1])
 
 
 # -- ways out, told by the motor ------------------------------------------------------------------
@@ -505,33 +396,3 @@ def test_the_node_stopped_is_a_lost_connection() -> None:
     servo = running()
     servo.ask('000#0205')
     assert servo.drive.plant.operation.faulted
-
-
-def test_a_vertical_axis_falls_where_power_goes_and_not_where_it_stays() -> None:
-    servo = Servo(load=0.4)
-    servo.set_up(9)
-    servo.enable()
-    servo.run(1.0)
-    assert servo.read(0x6064) - BEGINNING == pytest.approx(0, abs=150)     # the first cycles
-    held = servo.revolutions
-    servo.run(1.0)
-    assert servo.revolutions == held
-    # quick stop that stays holds it, one that ends lets it go
-    servo.write(0x605A, 0, 6, 2)
-    servo.word = 0x02
-    servo.run(1.0)
-    assert servo.revolutions == held
-    servo.word = 0x0F
-    servo.cycle()
-    servo.write(0x605A, 0, 2, 2)
-    servo.word = 0x02
-    servo.run(1.0)
-    assert servo.revolutions < held - 1.0
-    # unless a brake closes
-    servo = Servo(load=0.4, brake=1)
-    servo.set_up(9)
-    servo.enable()
-    held = servo.revolutions
-    servo.word = 0
-    servo.run(1.0)
-    assert servo.revolutions == held

@@ -7,7 +7,6 @@ compared here are the literal bytes of the vectors and of the manual's tables.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
-    ACTUAL_SPEED, ask, bridge, configuration, EXAMPLE, frame, parameter, RAM, RULES,
+    ACTUAL_SPEED, ask, configuration, EXAMPLE, frame, parameter, RAM, RULES,
 )
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -23,7 +22,6 @@ from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.simulation import make_drives
 
 VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
     encoding='utf-8'))['vectors']
@@ -169,19 +167,6 @@ def test_other_frames_that_it_does_not_understand(text: str) -> None:
 # -- reads ----------------------------------------------------------------------------------------
 
 
-def test_reads_of_one_to_four_with_junk_in_unused_words() -> None:
-    table = [parameter(f'x_{number}', number, storage=RAM) for number in range(300, 304)]
-    made = drive(table, request=(), response=())
-    for number in range(300, 304):
-        made.set_value(f'x_{number}', 0x0100 * (number - 299) + 0xE0)
-    assert ask(made, '3F1#032C010100000000', 0.0) == ['7F1#E001A5A5A5A5A5A5']
-    assert ask(made, '3F1#032C010200000000', 0.0) == ['7F1#E001E002A5A5A5A5']
-    assert ask(made, '3F1#032C010300000000', 0.0) == ['7F1#E001E002E003A5A5']
-    assert ask(made, '3F1#032C010400000000', 0.0) == ['7F1#E001E002E003E004']
-    assert made.requests == made.answers == 4
-    assert not made.violations
-
-
 def test_a_window_with_an_unknown_parameter_is_not_answered() -> None:
     made = drive()
     # 209 to 211 exist, 212 does not, nor does 208
@@ -317,19 +302,3 @@ def test_foreign_frames_stay_clear_of_neighbours() -> None:
     # nobody is absent
     made = drive(neighbours=[Route(0, 0, True), Route(0, 0, False)])
     assert foreign(made, READ_RAMP) == []
-
-
-def test_drives_of_a_bus_know_each_other() -> None:
-    first = standard(name='first', station=1)
-    second = standard(name='second', station=9)
-    third = configuration(name='third', station=1)
-    elsewhere = replace(standard(name='elsewhere', station=5), bus='other')
-    drives = make_drives(bridge(first, second, third, elsewhere))
-    assert isinstance(drives['first'], SimulatedDataModelDrive)
-    assert Route(0x7F9, 0x7FF, False) in drives['first'].neighbours
-    assert Route(0x3F9, 0x7FF, False) in drives['first'].neighbours
-    assert any(route.extended for route in drives['first'].neighbours)
-    assert len(drives['first'].neighbours) == 3     # neither its own nor those of another bus
-    # the 29-bit drive of the same station hears nothing of it
-    assert ask(drives['third'], READ_RAMP, 0.0) == []       # type: ignore[arg-type]
-    assert not drives['third'].violations

@@ -58,16 +58,6 @@ class TestVectors:
     def test_sdo(self, row: dict[str, Any]) -> None:
         assert prepared().ask(row['request'], 1.0) == [row['response']]
 
-    def test_word_order_of_a_single_parameter(self) -> None:
-        parameters = dict(LTMR.parameters)
-        parameters['average_current'] = replace(parameters['average_current'],
-                                                word_order='low_first')
-        made = Ltmr(replace(LTMR, parameters=parameters))
-        made.drive.set_value('average_current', 9.0)
-        made.drive.set_value('l1_current', 9.0)
-        assert made.ask('505#F401002600000000', 1.0) == ['485#F401002684030000']
-        assert made.ask('505#F60100A600000000', 1.0) == ['485#F60100A600008403']
-
     @pytest.mark.parametrize(('layout', 'request_text', 'response'), [
         ('dword_swapped', '0025C70100000000', '0025C70100008320'),
         ('dword_swapped', '00AAC70100003412', '00CEC70101060200'),
@@ -77,10 +67,6 @@ class TestVectors:
     def test_layouts(self, layout: str, request_text: str, response: str) -> None:
         made = prepared(layout=layout)
         assert made.ask(f'505#{request_text}', 1.0) == [f'485#{response}']
-
-    def test_high_half_of_an_abort_code_first(self) -> None:
-        made = prepared(abort_code_order='high_first')
-        assert made.ask('505#C70100AA34120000', 1.0) == ['485#C70100CE01060200']
 
 
 class TestNetwork:
@@ -334,14 +320,6 @@ class TestConfigurationMode:
 
 
 class TestFaults:
-
-    def test_silent_obeys_and_its_heart_beats(self) -> None:
-        made = Ltmr()
-        made.fault('silent', 0.0)
-        assert made.ask('505#C002002A01000000', 0.1) == []
-        assert made.drive.value('control_register_1') == 1
-        assert made.ask('605#4000100000000000', 0.2) == []
-        assert [text for _, text in made.until(1.0)] == ['705#05']
 
     def test_foreign(self) -> None:
         made = Ltmr()
