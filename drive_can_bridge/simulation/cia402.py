@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.pdos import Factory, Pdo, Pdos
+from drive_can_bridge.simulation.canopen.pdos import Pdo, Pdos
 from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
 from drive_can_bridge.simulation.cia402_plant import Habits, own_parameters, ServoPlant
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
@@ -97,7 +97,7 @@ class SimulatedServoDrive(SimulatedDrive):
         if not isinstance(self.plant, ServoPlant):
             raise ConfigurationError([f'{self.name}: a drive of CiA 402 needs a ServoPlant'])
         self.table = ObjectDictionary(self.registers)
-        self.pdos = Pdos(self.configuration.station, self.table, self._factory())
+        self.pdos = Pdos(self.configuration.station, self.table, *self._factory())
         self.habits = Habits()
         self._consumer = HeartbeatConsumer()
         self._node_state = NmtState.BOOT_UP
@@ -118,18 +118,18 @@ class SimulatedServoDrive(SimulatedDrive):
     def allow_torque(self, allowed: bool) -> None:
         self.plant.machine.set_safe(allowed)
 
-    def _factory(self) -> Factory:
+    def _factory(self) -> tuple[dict[int, list[int]], dict[int, list[int]], int]:
         """Return what is mapped at first."""
         configuration, options = self.configuration, self.configuration.options
         request, response = [states.CONTROL_PARAMETER], [states.STATUS_PARAMETER]
         if options.mapping == 'configure':
-            return Factory({1: [_entry(request[0])]}, {1: [_entry(response[0])]}, 255)
+            return {1: [_entry(request[0])]}, {1: [_entry(response[0])]}, 255
         request += configuration.cyclic_request
         response += configuration.cyclic_response
         receive, transmit = ({pdo.number: list(pdo.entries) for pdo in pdos} for pdos in (
             pdo_codec.receive_pdos(configuration.station, options.request_pdos, request),
             pdo_codec.transmit_pdos(configuration.station, options.response_pdos, response)))
-        return Factory(receive, transmit, 1 if options.transmission == 'sync' else 255)
+        return receive, transmit, 1 if options.transmission == 'sync' else 255
 
     def find_routes(self) -> list[Route]:
         """Return the predefined set of the node, SYNC, and the heartbeats of all others."""

@@ -29,8 +29,6 @@ NUMBERS = (30, 31, 50, 209, 0x1234, 0x1235, 0xFFFD, 0xFFFE, 0xFFFF)
 UNTOUCHED = 0x5151
 
 READ_RAMP = '3F1#031E000100000000'
-LOST = 'EEPROM write less than 20 ms after the one before (lost)'
-TOO_EARLY = 'read while an EEPROM write is under way (not answered)'
 UNDEFINED = 'frame that the manual does not define (ignored)'
 
 

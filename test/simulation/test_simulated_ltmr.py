@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Conversations with the simulated LTMR, in literal bytes and literal times. Its node-ID is 5."""
 
-from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,8 @@ VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'canopen_pkw.json'
     encoding='utf-8'))
 
 START = '000#0105'
-IDLE = '505#0000000000000000'
 READ_455 = '505#C701002500000000'
 READ_455_TOGGLED = '505#C70100A500000000'
-#: the shipped profile without the register of the configuration mode, if it has that
-PLAIN = replace(LTMR, parameters={name: parameter for name, parameter in LTMR.parameters.items()
-                                  if parameter.number != 601})
 NOT_OPERATIONAL = 'request while the node is not operational (ignored)'
 
 

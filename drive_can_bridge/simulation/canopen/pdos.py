@@ -10,7 +10,6 @@ from collections.abc import Collection
 from copy import deepcopy
 from dataclasses import dataclass, field
 import math
-from typing import NamedTuple
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
@@ -80,29 +79,19 @@ class Pdo:
         return sum(entry & 0xFF for entry in self.mapped) // 8
 
 
-class Factory(NamedTuple):
-    """
-    What PDOs carry from the factory: entries by number.
-
-    :param type: of transmission.
-    """
-
-    receive: dict[int, list[int]]
-    transmit: dict[int, list[int]]
-    type: int
-
-
 class Pdos:
     """
     All PDOs of one drive.
 
-    :param factory: what is mapped when it leaves the factory.
+    :param receive: entries that are mapped when it leaves the factory, by number.
+    :param kind: type of transmission then.
     """
 
-    def __init__(self, node: int, objects: ObjectDictionary, factory: Factory) -> None:
+    def __init__(self, node: int, objects: ObjectDictionary, receive: dict[int, list[int]],
+                 transmit: dict[int, list[int]], kind: int) -> None:
         self._objects = objects
         self.habits = PdoHabits()
-        self._node, self._factory = node, factory
+        self._node, self._mapped, self._kind = node, (receive, transmit), kind
         self._stored: tuple[list[Pdo], list[Pdo]] | None = None
         self.begin()
 
@@ -119,11 +108,10 @@ class Pdos:
             return
         self.receive = [Pdo(False, 0x200 + 0x100 * n + self._node) for n in range(COUNT)]
         self.transmit = [Pdo(True, 0x40000180 + 0x100 * n + self._node) for n in range(COUNT)]
-        for pdos, made in ((self.receive, self._factory.receive),
-                           (self.transmit, self._factory.transmit)):
+        for pdos, made in zip((self.receive, self.transmit), self._mapped, strict=True):
             for number, entries in made.items():
                 pdo = pdos[number - 1]
-                pdo.count, pdo.type = len(entries), self._factory.type
+                pdo.count, pdo.type = len(entries), self._kind
                 pdo.entries[:len(entries)] = entries
 
     # -- objects ----------------------------------------------------------------------------------
