@@ -32,7 +32,7 @@ from drive_can_bridge.simulation.control import (
 )
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant
-from drive_can_bridge.simulation.quantities import clamp, mains_swing, plausible
+from drive_can_bridge.simulation.quantities import clamp, plausible
 from drive_can_bridge.simulation.registers import (
     Mechanics, Plant, PlantFactory, Refusal, Refused, Registers,
 )
@@ -93,11 +93,6 @@ SERIAL_RANK = 73
 #: settings that take only multiples of something, by register
 STEPS = {TRIP_CLASS: 5}
 
-MAINS_VOLTAGE = 400.0
-MAINS_FREQUENCY = 50.0
-POWER_FACTOR = 0.85
-NEVER = 9999
-
 Figure = Callable[[], float]
 DEVICE_NAME = b'simulated LTMR'
 JUNK = (0x5A5A, 0x5A5A)
@@ -135,15 +130,6 @@ class Starter:
     def alarm(self) -> bool:
         """The motor is close to a trip."""
         return self.thermal >= ALARM_LEVEL
-
-    @property
-    def time_to_trip(self) -> float:
-        """Time in s until this current would trip; infinity: never."""
-        final = self._final_level
-        if final <= TRIP_LEVEL:
-            return math.inf
-        left = (final - self.thermal) / (final - TRIP_LEVEL)
-        return self.time_constant * math.log(max(left, 1.0))
 
     @property
     def time_to_reset(self) -> float:
@@ -369,7 +355,6 @@ class StarterPlant(Plant):
     def _all_figures(self) -> dict[int | None, Figure]:
         """Return what gives the contents of registers."""
         starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
-        power = math.sqrt(3.0) * MAINS_VOLTAGE / 100.0
         return {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
             451: code,
@@ -377,25 +362,14 @@ class StarterPlant(Plant):
             460: lambda: THERMAL_OVERLOAD if starter.alarm else 0,
             461: lambda: _bit_of(THERMAL_OVERLOAD) if starter.alarm else 0,
             465: lambda: starter.thermal,
-            471: lambda: 1 if starter.current else 0,
-            472: lambda: 32.0 + 0.1 * starter.thermal,
-            474: lambda: 100.0 * MAINS_FREQUENCY,
-            475: lambda: 10.0 * (100.0 + 0.8 * starter.thermal),
-            481: lambda: 100.0 * POWER_FACTOR if starter.current else 0,
-            # active and reactive power, in 0.1 kW
-            482: lambda: power * POWER_FACTOR * starter.current,
-            483: lambda: power * math.sqrt(1.0 - POWER_FACTOR ** 2) * starter.current,
-            511: lambda: min(starter.time_to_trip, NEVER),
             NODE_ADDRESS: lambda: self._node,
             # no trips and alarms of these groups, no inputs, nothing to ground
             **dict.fromkeys((453, 456, 457, 462, 463, 470, 508), lambda: 0),
             # outputs: one for each direction
             **dict.fromkeys((458, 459), lambda: (
                 1 << bool(self.operation.word & RUN_REVERSE) if self.operation.enabled else 0)),
-            # the average and the three phases, in % of the full load current, in V, in 0.01 A
+            # the average and the three phases, in % of the full load current, in 0.01 A
             **dict.fromkeys(range(466, 470), lambda: 100.0 * starter.ratio),
-            **dict.fromkeys(range(476, 480), lambda: (
-                MAINS_VOLTAGE * (1.0 + mains_swing(self.operation.now)))),
             **dict.fromkeys((500, 502, 504, 506), lambda: 100.0 * starter.current),
         }
 

@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.canopen import abort_codes, network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.pdos import Factory, Pdo, Pdos
+from drive_can_bridge.simulation.canopen.pdos import Pdo, Pdos
 from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
 from drive_can_bridge.simulation.cia402_plant import Habits, own_parameters, ServoPlant
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
@@ -32,68 +32,55 @@ DEVICE_TYPE = 0x00020192
 STORE, SAVE = 0x1010, b'save'
 CONSUMERS = 2
 NOT_STORED = 0x08000020
-WRONG_LENGTH = Emergency(0x8210, 0x11)
 #: bits of the error register by the first digit of a code: CiA 301
 _REGISTER_BITS = {1: 0x01, 2: 0x02, 3: 0x04, 4: 0x08, 8: 0x10}
 
 
 class HeartbeatConsumer:
-    """
-    Watches other nodes, each at a place of the list: node << 16 | ms.
+    """Watches other nodes, each at a place of the list: node << 16 | ms."""
 
-    :param places: how many there are.
-    """
-
-    def __init__(self, places: int) -> None:
-        self._watched = [0] * places
-        self._stored = list(self._watched)
+    def __init__(self) -> None:
+        self.stored = (0,) * CONSUMERS
         self.begin()
-
-    def store(self) -> None:
-        """Keep the list without power."""
-        self._stored = list(self._watched)
 
     def begin(self) -> None:
         """Have what was stored, and have heard nobody."""
-        self._watched = list(self._stored)
-        self._heard = [math.inf] * len(self._watched)
+        self.watched = list(self.stored)
+        self._heard = [math.inf] * CONSUMERS
 
     def read(self, subindex: int) -> bytes:
+        if subindex > CONSUMERS:
+            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
         if subindex == 0:
-            return bytes((len(self._watched),))
-        return self._watched[self._place(subindex)].to_bytes(4, 'little')
+            return bytes((CONSUMERS,))
+        return self.watched[subindex - 1].to_bytes(4, 'little')
 
     def write(self, subindex: int, data: bytes) -> None:
+        self.read(subindex)     # it exists
         if subindex == 0:
             raise Refused(abort_codes.WRITE_OF_READ_ONLY)
-        place = self._place(subindex)
-        self._watched[place] = int.from_bytes(checked_length(data, 4), 'little')
-        self._heard[place] = math.inf
+        self.watched[subindex - 1] = int.from_bytes(checked_length(data, 4), 'little')
+        self._heard[subindex - 1] = math.inf
 
     def hear(self, node: int, now: float) -> None:
         """Take a heartbeat."""
-        for place, watched in enumerate(self._watched):
+        for place, watched in enumerate(self.watched):
             if watched >> 16 & network.NODE_MAX == node and watched & 0xFFFF:
                 self._heard[place] = now
 
     def next_timer(self) -> float:
         """Return when the next heartbeat is missed."""
-        return min(map(self._due, range(len(self._watched))))
+        return min(map(self._due, range(CONSUMERS)))
 
     def missed(self, now: float) -> list[int]:
         """Return the nodes that are missed now, each once."""
-        missed = [place for place in range(len(self._watched)) if self._due(place) <= now]
+        missed = [place for place in range(CONSUMERS) if self._due(place) <= now]
         for place in missed:
             self._heard[place] = math.inf
-        return [self._watched[place] >> 16 & network.NODE_MAX for place in missed]
+        return [self.watched[place] >> 16 & network.NODE_MAX for place in missed]
 
     def _due(self, place: int) -> float:
-        return self._heard[place] + (self._watched[place] & 0xFFFF) / 1000.0
-
-    def _place(self, subindex: int) -> int:
-        if subindex > len(self._watched):
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
-        return subindex - 1
+        return self._heard[place] + (self.watched[place] & 0xFFFF) / 1000.0
 
 
 class SimulatedServoDrive(SimulatedDrive):
@@ -110,11 +97,10 @@ class SimulatedServoDrive(SimulatedDrive):
         if not isinstance(self.plant, ServoPlant):
             raise ConfigurationError([f'{self.name}: a drive of CiA 402 needs a ServoPlant'])
         self.table = ObjectDictionary(self.registers)
-        self.pdos = Pdos(self.configuration.station, self.table, self._factory())
+        self.pdos = Pdos(self.configuration.station, self.table, *self._factory())
         self.habits = Habits()
-        self._consumer = HeartbeatConsumer(CONSUMERS)
+        self._consumer = HeartbeatConsumer()
         self._node_state = NmtState.BOOT_UP
-        self._wrong_length = False
         self.power_lost(forget=False)
         self.node = self.companion = CanopenNode(
             self, self, constants=self._constants, trip_code=self.plant.trip_code, heartbeat=0,
@@ -132,18 +118,18 @@ class SimulatedServoDrive(SimulatedDrive):
     def allow_torque(self, allowed: bool) -> None:
         self.plant.machine.set_safe(allowed)
 
-    def _factory(self) -> Factory:
+    def _factory(self) -> tuple[dict[int, list[int]], dict[int, list[int]], int]:
         """Return what is mapped at first."""
         configuration, options = self.configuration, self.configuration.options
         request, response = [states.CONTROL_PARAMETER], [states.STATUS_PARAMETER]
         if options.mapping == 'configure':
-            return Factory({1: [_entry(request[0])]}, {1: [_entry(response[0])]}, 255)
+            return {1: [_entry(request[0])]}, {1: [_entry(response[0])]}, 255
         request += configuration.cyclic_request
         response += configuration.cyclic_response
         receive, transmit = ({pdo.number: list(pdo.entries) for pdo in pdos} for pdos in (
             pdo_codec.receive_pdos(configuration.station, options.request_pdos, request),
             pdo_codec.transmit_pdos(configuration.station, options.response_pdos, response)))
-        return Factory(receive, transmit, 1 if options.transmission == 'sync' else 255)
+        return receive, transmit, 1 if options.transmission == 'sync' else 255
 
     def find_routes(self) -> list[Route]:
         """Return the predefined set of the node, SYNC, and the heartbeats of all others."""
@@ -190,11 +176,7 @@ class SimulatedServoDrive(SimulatedDrive):
     def _take(self, pdo: Pdo, data: bytes, now: float) -> None:
         if self.node.state is not NmtState.OPERATIONAL:
             raise Ignored('PDO while the node is not operational')
-        if (len(data) < pdo.length) is not self._wrong_length:
-            self._wrong_length = not self._wrong_length
-            self.send(network.encode_emergency(self.node.number, WRONG_LENGTH._replace(
-                code=WRONG_LENGTH.code if self._wrong_length else network.NO_ERROR)))
-        if self._wrong_length:
+        if len(data) < pdo.length:
             raise Ignored('PDO shorter than its mapping')
         self.requests += 1
         if pdo.type <= 240:
@@ -251,7 +233,6 @@ class SimulatedServoDrive(SimulatedDrive):
         if operational and before is not NmtState.OPERATIONAL:
             for pdo in (*self.pdos.receive, *self.pdos.transmit):
                 pdo.pending = pdo.sent = None
-                pdo.syncs = 0
         elif self._node_state is NmtState.STOPPED and before is NmtState.OPERATIONAL:
             self.plant.machine.connection_lost()
         for node in self._consumer.missed(now):
@@ -286,7 +267,7 @@ class SimulatedServoDrive(SimulatedDrive):
                 raise Refused(NOT_STORED)
             self.registers.store_all()
             self.pdos.store()
-            self._consumer.store()
+            self._consumer.stored = tuple(self._consumer.watched)
         elif index == STORE:
             raise Refused(abort_codes.NO_SUCH_SUBINDEX if subindex else
                           abort_codes.WRITE_OF_READ_ONLY)

@@ -41,10 +41,8 @@ SEARCH = 2.0
 OVERCURRENT, LOST_MASTER, FOLLOWING_ERROR = 0x2310, 0x8130, 0x8611
 PP, VL, PV, TQ, HM, IP, CSP, CSV, CST = 1, 2, 3, 4, 6, 7, 8, 9, 10
 _ON_THE_SPOT = (35, 37)
-#: methods that begin in the negative direction: limit switch, home switch, index pulse
-_NEGATIVE = (1, 3, 5, 8, 10, 17, 19, 21, 33)
 _METHODS = (*range(1, 15), *range(17, 31), 33, 34, *_ON_THE_SPOT)
-_HALT, _RELATIVE, _BIT_4 = states.HALT, 0x40, 0x10
+_HALT, _BIT_4 = states.HALT, 0x10
 _MOVING = (PP, PV, TQ, VL, HM)
 
 _STATUS = {State.SWITCH_ON_DISABLED: 0x40, State.READY_TO_SWITCH_ON: 0x21,
@@ -263,7 +261,6 @@ class ServoPlant:
         self._demand = self.shaft.position
         self._goal, self._goal_in = self._demand, 0.0
         self._target = self._demand
-        self._next: float | None = None
         self._acknowledged = self._reached = self._attained = self._homing_failed = False
         self._homing: float | None = None       # where it ends
         self._shown_mode = 0
@@ -367,10 +364,9 @@ class ServoPlant:
             self._begin_mode()
         edge = word & ~before & _BIT_4
         if self._mode == PP:
-            if edge and not self._acknowledged:
-                self._take_target(word)
-            if not word & _BIT_4 and self._next is None:
-                self._acknowledged = False
+            if edge:
+                self._target, self._reached = self._position(0x607A), False
+            self._acknowledged = bool(word & _BIT_4)
         elif self._mode == HM:
             if edge:
                 self._home()
@@ -394,17 +390,6 @@ class ServoPlant:
         self._goal = goal
         self._goal_in = max(self.raw(0x60C2, 1) * 10.0 ** self.raw(0x60C2, 2), 1e-6)
 
-    def _take_target(self, word: int) -> None:
-        """Take a target of pp: at once, or behind the one before."""
-        self._acknowledged = True
-        target = self._position(0x607A)
-        if word & _RELATIVE:
-            target += self._target - self._zero
-        if word & states.AT_ONCE or self._reached or self._target == self.shaft.position:
-            self._target, self._reached = target, False
-        else:
-            self._next = target
-
     def _home(self) -> None:
         method, here = self.raw(0x6098), self.shaft.position
         self._attained, self._homing_failed = False, method not in _METHODS
@@ -417,7 +402,7 @@ class ServoPlant:
         elif self.habits.home_switch is not None:
             self._homing = self.habits.home_switch
         else:
-            self._homing = here + (-SEARCH if method in _NEGATIVE else SEARCH)
+            self._homing = here - SEARCH
 
     # -- the axis ---------------------------------------------------------------------------------
 
@@ -503,15 +488,11 @@ class ServoPlant:
             self.operation.trip(code=FOLLOWING_ERROR)
 
     def _turn(self, duration: float, mode: int) -> None:
-        rates = Rates(FASTEST, FASTEST)
-        target = self.value(0x60FF) if mode != VL else self.value(0x6042)
-        if mode == PV:
-            rates = Rates(self._rate(0x6083), self._rate(0x6084))
-        elif mode == VL:
-            rates = Rates(*(max(self.raw(index, 1), 1) / 60.0 / max(self.raw(index, 2), 0.01)
-                            for index in (0x6048, 0x6049)))
-            if self.habits.ramp_bits and self.operation.word & 0x70 != 0x70:
-                target = 0.0
+        rates = Rates(FASTEST, FASTEST) if mode == CSV else Rates(
+            self._rate(0x6083), self._rate(0x6084))
+        target = self.value(0x6042 if mode == VL else 0x60FF)
+        if mode == VL and self.habits.ramp_bits and self.operation.word & 0x70 != 0x70:
+            target = 0.0
         self.shaft.run(duration, min(max(target, -RATED_SPEED), RATED_SPEED), rates)
         self._reached = self.shaft.speed == target
 
@@ -527,9 +508,6 @@ class ServoPlant:
     def _travel(self, duration: float) -> None:
         self.shaft.go(duration, self._target, max(self.value(0x6081), 1e-6), self._rate(0x6083))
         self._reached = self.shaft.position == self._target and not self.shaft.speed
-        if self._reached and self._next is not None:
-            self._target, self._next, self._reached = self._next, None, False
-            self._acknowledged = bool(self.operation.word & _BIT_4)
 
     def _seek(self, duration: float) -> None:
         goal = self._homing

@@ -29,8 +29,6 @@ from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_f
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.registers import Mechanics, PlantFactory, Registers
 
-#: the manual's least time between two EEPROM writes
-EEPROM_TIME = 0.020
 #: s that a drive is deaf after power came back
 BOOT_TIME = 0.5
 #: s without power, where a fault does not say
@@ -73,7 +71,6 @@ class SimulatedDrive(ABC):
     """
     One simulated drive.
 
-    :param eeprom_time: s that an EEPROM write takes.
     :param mechanics: what the motor carries; None: nothing.
     :param plant: makes what moves; None: what the family chooses.
     :ivar routes: the identifiers that belong to the drive, in both directions.
@@ -88,11 +85,10 @@ class SimulatedDrive(ABC):
 
     table: Table
 
-    def __init__(self, configuration: DriveConfiguration, *, eeprom_time: float = EEPROM_TIME,
+    def __init__(self, configuration: DriveConfiguration, *,
                  mechanics: Mechanics | None = None, plant: PlantFactory | None = None) -> None:
         self.configuration = configuration
         self.name = configuration.name
-        self.eeprom_time = eeprom_time
         self.routes = self.find_routes()
         self.neighbours: list[Route] = []
         self.registers = Registers(

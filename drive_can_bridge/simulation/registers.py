@@ -27,7 +27,6 @@ class Refusal(Enum):
     READ_ONLY = 'read-only'
     OUT_OF_RANGE = 'out of range'
     FORBIDDEN = 'a scripted fault'
-    TOO_EARLY = 'another parameter has to be written first'
     UNTOLD = 'nobody is told, the value stays'
 
 
@@ -178,10 +177,9 @@ class Registers:
             if not parameter.writable:
                 return Refusal.READ_ONLY
             for kind, one, other in self.faults:
-                if one == name and kind is FaultKind.REFUSE:
+                if one == name and (kind is FaultKind.REFUSE or (
+                        kind is FaultKind.NEEDS and other not in self._written)):
                     return Refusal.FORBIDDEN
-                if one == name and kind is FaultKind.NEEDS and other not in self._written:
-                    return Refusal.TOO_EARLY
             if raw != self.clamped(name, raw):
                 return Refusal.OUT_OF_RANGE
             refusal = self._plant.refusal(parameter, raw)

@@ -25,7 +25,7 @@ from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
-from drive_can_bridge.simulation.drive import EEPROM_TIME, SimulatedDrive
+from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.faults import Fault
 from drive_can_bridge.simulation.player import BusPlayer, OpenBus, Say, ShowFrame
 from drive_can_bridge.simulation.registers import Mechanics, PlantFactory
@@ -39,12 +39,9 @@ SIMULATED_DRIVES: Mapping[str, type[SimulatedDrive]] = {
     'datamodel_extended': SimulatedDataModelDrive,
     'datamodel_standard': SimulatedDataModelDrive,
 }
-#: s that the arrival of a frame may be noticed late. Two writes 20 ms apart on the wire must not
-#: seem closer because the thread that plays the bus slept over the first.
-ARRIVAL_JITTER = 0.002
 
 
-def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPROM_TIME,
+def make_drives(configuration: BridgeConfiguration, *,
                 mechanics: Mapping[str, Mechanics] | None = None,
                 plants: Mapping[str, PlantFactory] | None = None) -> dict[str, SimulatedDrive]:
     """
@@ -56,8 +53,7 @@ def make_drives(configuration: BridgeConfiguration, *, eeprom_time: float = EEPR
     """
     drives = {
         name: SIMULATED_DRIVES[drive.protocol](
-            drive, eeprom_time=eeprom_time, mechanics=(mechanics or {}).get(name),
-            plant=(plants or {}).get(name))
+            drive, mechanics=(mechanics or {}).get(name), plant=(plants or {}).get(name))
         for name, drive in configuration.drives.items()}
     for drive in drives.values():
         drive.neighbours = [
@@ -134,8 +130,7 @@ class Simulation:
                  plants: Mapping[str, PlantFactory] | None = None) -> None:
         self.configuration = configuration
         clock = clock or SteadyClock()
-        drives = make_drives(configuration, eeprom_time=EEPROM_TIME - ARRIVAL_JITTER,
-                             mechanics=mechanics, plants=plants)
+        drives = make_drives(configuration, mechanics=mechanics, plants=plants)
         self._players = {
             bus.name: BusPlayer(
                 bus, [drive for drive in drives.values() if drive.configuration.bus == bus.name],

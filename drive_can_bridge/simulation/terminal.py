@@ -28,15 +28,14 @@ DONE = b'\r'
 REFUSED = b'\a'
 #: commands of which nobody here needs to know more: version, serial number, and filters, polling
 #: and serial speed by their first letters
-ANSWERS = {'V': b'V1013\r', 'N': b'NSIM1\r', 'F': b'F00\r', **dict.fromkeys('MmWXU', DONE)}
+ANSWERS = {'V': b'V1013\r', 'N': b'NSIM1\r', 'F': b'F00\r', 'Z0': DONE,
+           **dict.fromkeys('MmWXU', DONE)}
 BIT_RATES = {'S0': 10_000, 'S1': 20_000, 'S2': 50_000, 'S3': 100_000, 'S4': 125_000,
              'S5': 250_000, 'S6': 500_000, 'S7': 750_000, 'S8': 1_000_000, 'S9': 83_300}
 _TIMING = re.compile('s[0-9A-Fa-f]{4}')
 #: identifier of 11 or 29 bits, length, data
 _FRAME = re.compile(r'(?:[tr]([0-7]\h\h)|[TR]([01]\h{7}))([0-8])((?:\h\h)*)'.replace(
     r'\h', '[0-9A-Fa-f]'))
-# Z1 stamps wrap once a minute
-_STAMP_WRAP = 60_000
 # the longest command is a 29-bit frame with eight bytes: 26 characters
 _COMMAND_MAX = 64
 #: frames that wait while a client does not read, beside what the kernel holds
@@ -66,7 +65,7 @@ class SlcanAdapter:
     Tiiiiiiiildd…  send a 29-bit frame
     riiil, R…l     send a remote frame; accepted and gone, no drive here answers any
     V, N, F        version, serial number, status flags
-    Z0, Z1         received frames without, with a time stamp in ms
+    Z0             received frames without a time stamp
     ============== ===================================================================
 
     A frame that was taken for sending is *not* answered. Adapters differ there, clients do not
@@ -84,7 +83,6 @@ class SlcanAdapter:
         self.is_open = False
         self.opened = 0
         self._listen_only = False
-        self._stamps = False
         self._begun = b''
         self._replies = bytearray()
 
@@ -105,11 +103,11 @@ class SlcanAdapter:
         replies, self._replies = bytes(self._replies), bytearray()
         return replies
 
-    def encode(self, frame: Frame, now: float) -> bytes:
+    @staticmethod
+    def encode(frame: Frame) -> bytes:
         """Return what the adapter writes when it receives a frame from the bus."""
         head = (f'T{frame.identifier:08X}' if frame.extended else f't{frame.identifier:03X}')
-        stamp = f'{int(now * 1000.0) % _STAMP_WRAP:04X}' if self._stamps else ''
-        return f'{head}{len(frame.data)}{frame.data.hex().upper()}{stamp}\r'.encode()
+        return f'{head}{len(frame.data)}{frame.data.hex().upper()}\r'.encode()
 
     def _obey(self, command: str) -> Frame | None:
         kind, reply = command[0], DONE
@@ -129,12 +127,10 @@ class SlcanAdapter:
                 reply = REFUSED
             elif self._bitrate is not None:
                 self._set = BIT_RATES.get(command, self._bitrate)   # s…: by somebody who knows
-        elif command in ('Z0', 'Z1'):
-            self._stamps = command == 'Z1'
         elif command == 'F' and not self.is_open:
             reply = REFUSED
         else:
-            reply = ANSWERS.get(command if kind in 'VNF' else kind, REFUSED)
+            reply = ANSWERS.get(command if kind in 'VNFZ' else kind, REFUSED)
         self._replies += reply
         return None
 
@@ -216,8 +212,7 @@ class SlcanTerminal(EndPoint):
         with self._lock:
             if not self._adapter.connected:
                 return
-            now = self._now()
-            self._outgoing.append((now, self._adapter.encode(frame, now)))
+            self._outgoing.append((self._now(), self._adapter.encode(frame)))
             self._flush()
 
     def link(self, path: Path) -> None:

@@ -18,6 +18,25 @@ from drive_can_bridge.simulation.registers import Mechanics
 RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
 RAM, EEPROM = Storage.RAM, Storage.EEPROM
 INT16 = ParameterType.INT16
+#: rules of the protocols that somebody may break, as they are told
+RULES = {
+    'alone': 'frame that only this drive may send',
+    'reserved bit': 'reserved bit 13 of the control word',
+    'length': 'process data of a length that the manual does not define (ignored)',
+    'task length': 'parameter task without eight data bytes (ignored)',
+    'task': 'parameter task that the manual does not define (ignored)',
+    'task identifier': 'task identifier that does not exist (refused)',
+    'sub-index': 'byte of the sub-index that holds no information is not 0',
+    'undefined': 'frame that the manual does not define (ignored)',
+    'read data': 'read request with data other than 00h',
+    'read bytes': 'read request with unused bytes other than 00h',
+    'write bytes': 'write with unused bytes other than 00h',
+    'map': 'map parameter in the request map (ignored)',
+    'wear': 'EEPROM parameter ramp_time written cyclically',
+    'function byte': 'request with the function byte of the one before (ignored)',
+    'request length': 'request without eight data bytes (ignored)',
+    'not operational': 'request while the node is not operational (ignored)',
+}
 
 
 def parameter(name: str, number: int, **options: Any) -> Parameter:

@@ -4,14 +4,14 @@
 import math
 
 from cannord_builders import (
-    ACTUAL, ACTUAL_PERCENT, asks, configuration, FREQUENCY, inverter, PERCENT, run, says,
+    ACTUAL, asks, configuration, FREQUENCY, inverter, run, says,
     SETPOINTS, TABLE, tells, VALUES,
 )
 from hypothesis import given, strategies as st
 import pytest
+from simulation_builders import RULES
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.cannord import SimulatedCannordInverter
@@ -24,12 +24,6 @@ FAULT = '380B'
 
 
 class TestStates:
-
-    def test_answer_tells_how_it_was_before(self) -> None:
-        made = inverter()
-        assert tells(made, READY) == '700B0000'
-        assert tells(made, READY) == '310B0000'
-        assert not made.violations
 
     def test_way_to_operation_enabled(self) -> None:
         made = inverter()
@@ -66,7 +60,7 @@ class TestStates:
     def test_reserved_bit(self) -> None:
         made = inverter()
         tells(made, '7E240000')
-        assert made.violations == {'reserved bit 13 of the control word': 1}
+        assert made.violations == {RULES['reserved bit']: 1}
 
 
 class TestMotor:
@@ -80,14 +74,6 @@ class TestMotor:
         assert tells(made, '7F040020', 11.0) == '370B0020'
         assert made.value('actual_frequency') == 25.0
         assert made.value('actual_relative_frequency') == 50.0
-
-    def test_percent_is_the_same_word(self) -> None:
-        made = inverter(request=(PERCENT,), response=(ACTUAL_PERCENT, ACTUAL))
-        run(made)
-        tells(made, '7F0400C000000000', 10.0)
-        # rotating left, -100 % twice
-        assert tells(made, '7F0400C000000000', 12.0) == '371300C000C00000'
-        assert made.value('actual_frequency') == -50.0
 
     def test_shutdown_ramps_down_before_it_disables(self) -> None:
         made = inverter()
@@ -164,26 +150,6 @@ class TestFrames:
         assert tells(made, '7F04004000200010', 5.0) == '370B004000200010'
         assert tells(made, RUN, 5.0) == '370B0040'
 
-    def test_swap(self) -> None:
-        made = inverter(request=(FREQUENCY, *SETPOINTS[:2]), response=(ACTUAL, *VALUES[:2]),
-                        swap_setpoints_2_3=True)
-        run(made)
-        tells(made, '7F04004010002000', 0.0)
-        assert made.value('setpoint_2') == pytest.approx(100.0 * 0x20 / 0x4000)
-        assert made.value('setpoint_3') == pytest.approx(100.0 * 0x10 / 0x4000)
-        assert tells(made, '7F04004010002000', 5.0) == '370B004010002000'
-
-    def test_five_bytes(self) -> None:
-        made = inverter(request=(FREQUENCY, *SETPOINTS), response=(ACTUAL, *VALUES),
-                        extra_setpoints=True)
-        run(made)
-        tells(made, '0010002000', 0.0)
-        assert tells(made, '00100020A5', 5.0) == '0010002000'
-        assert made.value('setpoint_4') == 25.0
-        # it has no control word
-        assert tells(made, RUN, 5.0) == '370B0000'
-        assert not made.violations
-
     @pytest.mark.parametrize('data', ['', '7E', '7E04', '7E0400', '7E0400000000',
                                       '7E040000000000'])
     def test_other_lengths(self, data: str) -> None:
@@ -191,21 +157,14 @@ class TestFrames:
         assert says(made, f'0C8#{data}') == []
         assert says(made, '2C8#66100000000000') == []
         assert list(made.violations) == [
-            'process data of a length that the manual does not define (ignored)',
-            'parameter task without eight data bytes (ignored)']
-
-    def test_29_bit_identifiers(self) -> None:
-        made = inverter(extended_identifiers=True)
-        assert says(made, '03200000#7E040000') == ['03240000#700B0000']
-        assert says(made, '0B200000#0310000000000000') == ['0B240000#037000000000CA00']
-        assert says(made, '0C8#7E040000') == []
-        assert says(inverter(), '03200000#7E040000') == []
+            RULES['length'],
+            RULES['task length']]
 
     def test_second_inverter_with_its_address(self) -> None:
         made = inverter()
         assert says(made, '0C9#700B0000') == []
         assert says(made, '2C9#6610000000000000') == []
-        assert made.violations == {'frame that only this drive may send': 2}
+        assert made.violations == {RULES['alone']: 2}
 
 
 class TestBroadcast:
@@ -282,17 +241,6 @@ class TestFaults:
             ['03240000#5A5A5A5A'],              # 29 bits of the same identifier
             ['2C9#FF17000000005A5A'],           # answer that nobody asked for
         ]
-
-    def test_stuck(self) -> None:
-        made = inverter()
-        made.fault('stuck=p102.1', 0.0)
-        made.fault('stuck=offset', 0.0)
-        before = made.value('acceleration_time_set_2')
-        asks(made, '66C0010000001234')
-        assert made.value('p102.1') == before
-        assert asks(made, '9B2100000000' + '0500')[-4:] != '0500'
-        with pytest.raises(ValueRefused, match="no parameter 'p102.2'"):
-            made.fault('stuck=p102.2', 0.0)
 
 
 class TestTelegramTimeout:

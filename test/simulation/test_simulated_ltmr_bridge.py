@@ -1,127 +1,44 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""
-The session of a bridge and a simulated LTMR, both without a clock: conversations in literal times.
-
-A frame takes a millisecond. Nothing here waits, and nothing depends on the machine.
-"""
+"""The session of a bridge and a simulated LTMR; a frame takes a millisecond."""
 
 from typing import Any
 
-from builders import drive, read, text_of, write
+from builders import drive, read, write
+from cable import Cable
 from hypothesis import given, Phase, settings, strategies as st
 from ltmr_builders import LTMR, names, NODE
 import pytest
+from simulation_builders import RULES
 
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import (
-    Event, FrameRejected, ProcessDataReceived, RequestCompleted, StationFound, StationLost,
+    FrameRejected, ProcessDataReceived, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import Request
-from drive_can_bridge.protocols.families import make_sessions
-from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 
 FRAME_TIME = 0.001
 RATIO, TRIP_CLASS = names('flc1_ratio', 'motor_trip_class')
 RESPONSE = names('system_status_1', 'system_status_2', 'thermal_capacity', 'average_current')
 
 
-class Line:
-    """
-    A bridge and a controller at the two ends of a cable.
-
-    :ivar sent: what the bridge has sent, with its time.
-    """
+class Line(Cable):
+    """A bridge and a controller at the two ends of a cable."""
 
     def __init__(self, **options: Any) -> None:
-        configuration = drive(
+        super().__init__(drive(
             'canopen_pkw', name='pump', station=NODE, table=LTMR.parameters.values(),
             control=LTMR.control, request=(), response=RESPONSE,
-            **{'period': 0.1, 'parameter_timeout': 0.5, **options})
-        self.session, = make_sessions([configuration])
-        self.ltmr = SimulatedPkwDrive(configuration)
-        self.now = 0.0
-        self.sent: list[tuple[float, str]] = []
-        self.events: list[tuple[float, Event]] = []
-        self._under_way: list[tuple[float, bool, Frame]] = []
-        self.session.bus_up(0.0)
-        self.session.activate(0.0)
-        self.ltmr.handle_timer(0.0)
-        self._collect()
+            **{'period': 0.1, 'parameter_timeout': 0.5, **options}), frame_time=FRAME_TIME)
+        self.session, = self.sessions
+        self.ltmr, = self.drives
 
-    def run(self, until: float) -> None:
+    def until(self, until: float) -> None:
         """Let time pass."""
-        for _ in range(100_000):
-            timer = self.ltmr.next_timer()
-            due = min(self.session.next_timer(), timer,
-                      *(at for at, _, _ in self._under_way))
-            if due > until:
-                self.now = until
-                return
-            self.now = max(self.now, due)
-            arrived = [entry for entry in self._under_way if entry[0] <= self.now]
-            self._under_way = [entry for entry in self._under_way if entry[0] > self.now]
-            for _, to_device, frame in arrived:
-                if to_device:
-                    self.ltmr.receive_frame(frame, self.now)
-                else:
-                    self.session.receive_frame(frame, self.now)
-            if timer <= self.now:
-                self.ltmr.handle_timer(self.now)
-            self.session.handle_timer(self.now)
-            self._collect()
-        raise AssertionError(f'nothing goes on at {self.now}')
-
-    def _collect(self) -> None:
-        for frame in self.session.take_frames():
-            self.sent.append((round(self.now, 6), str(frame)))
-            self._under_way.append((self.now + FRAME_TIME, True, frame))
-        self.session.frames_left(self.now)
-        for frame in self.ltmr.take_frames():
-            self._under_way.append((self.now + FRAME_TIME, False, frame))
-        self.events += [(round(self.now, 6), event) for event in self.session.take_events()]
-
-    def submit(self, request: Request) -> None:
-        self.session.services.submit(request, self.now)
-        self._collect()
-
-    def outcome(self, request: Request, patience: float = 20.0) -> list[object]:
-        """Submit a request; let time pass until it has its outcome."""
-        self.submit(request)
-        return self.wait(request, patience)
-
-    def wait(self, request: Request, patience: float = 20.0) -> list[object]:
-        """Let time pass until a request has its outcome."""
-        limit = self.now + patience
-        while not self.outcomes(request):
-            assert self.now < limit, 'no outcome'
-            self.run(self.now + 0.05)
-        return self.outcomes(request)[0]
-
-    def outcomes(self, request: Request) -> list[list[object]]:
-        return [[text_of(outcome) for outcome in event.outcomes]
-                for event in self.found(RequestCompleted) if event.request is request]
-
-    def control(self, action: ControlAction, patience: float = 20.0) -> tuple[bool, str]:
-        """Ask for a control action; let time pass until it has its outcome."""
-        request = ControlRequest(action)
-        assert not self.session.services.control_refusal(action)
-        self.session.services.submit(request, self.now)
-        self._collect()
-        limit = self.now + patience
-        while True:
-            for done in self.found(ControlCompleted):
-                if done.request is request:
-                    return done.success, done.message
-            assert self.now < limit, 'no outcome'
-            self.run(self.now + 0.05)
+        self.run(until - self.now)
 
     def fault(self, text: str) -> None:
         self.ltmr.fault(text, self.now)
         self._collect()
-
-    def found(self, kind: type) -> list[Any]:
-        return [event for _, event in self.events if isinstance(event, kind)]
 
     def writes(self, register: str) -> list[str]:
         """Return the words that the bridge has written to a register (bytes 0 and 1 in hex)."""
@@ -131,7 +48,7 @@ class Line:
 
 def test_start() -> None:
     line = Line()
-    line.run(0.5)
+    line.until(0.5)
     assert line.session.online
     frames = [text for _, text in line.sent]
     # start twice: at the beginning, and after the boot-up frame; only then a PDO
@@ -148,20 +65,20 @@ def test_start() -> None:
 
 def test_run_trip_reset() -> None:
     line = Line(control_timeout=5.0)
-    line.run(1.0)
+    line.until(1.0)
     assert line.control(ControlAction.ENABLE) == (True, 'enabled')
-    line.run(5.0)
+    line.until(5.0)
     status, _, thermal, current = line.found(ProcessDataReceived)[-1].raws
     assert status & 0x83 == 0x83
     assert thermal > 0
     assert current == 630
     line.fault('trip')
-    line.run(6.0)
+    line.until(6.0)
     assert line.session.facts()['emergency'].startswith('FF00h')
     assert line.session.warning
     assert not line.control(ControlAction.ENABLE)[0]
     assert line.control(ControlAction.RESET_FAULT)[0]
-    line.run(7.0)
+    line.until(7.0)
     assert line.session.facts()['emergency'] == 'none'
     assert line.control(ControlAction.ENABLE)[0]
     assert line.control(ControlAction.DISABLE)[0]
@@ -172,15 +89,15 @@ def test_run_trip_reset() -> None:
 
 def test_a_lost_answer_to_a_write() -> None:
     line = Line()
-    line.run(1.0)
+    line.until(1.0)
     request = write((RATIO, 50))
     line.fault('silent')
     line.submit(request)
-    line.run(1.002)
+    line.until(1.002)
     # only this one answer is lost; whatever is sent again would be answered
     line.fault('ok')
     assert line.wait(request) == ['no answer in 0.5 s, 1 attempt']
-    line.run(5.0)
+    line.until(5.0)
     assert line.session.online
     assert line.writes('8C02') == ['3200']
     assert line.ltmr.value('flc1_ratio') == 50.0
@@ -190,10 +107,10 @@ def test_a_lost_answer_to_a_write() -> None:
 
 def test_a_write_is_not_sent_into_the_unknown() -> None:
     line = Line()
-    line.run(1.0)
+    line.until(1.0)
     line.fault('silent')
     # a read of the round has not been answered: the last function byte is unknown
-    line.run(1.6)
+    line.until(1.6)
     answer, = line.outcome(write((RATIO, 50)))
     assert str(answer).startswith('no answer')
     assert line.writes('8C02') == []
@@ -203,7 +120,7 @@ def test_a_write_is_not_sent_into_the_unknown() -> None:
 @pytest.mark.parametrize('late', [0.05, 0.3, 0.6, 0.9])
 def test_late_answers_are_never_taken_for_others(late: float) -> None:
     line = Line(missed_limit=10, parameter_retries=5)
-    line.run(1.0)
+    line.until(1.0)
     line.fault(f'late={late}')
     for value in (50, 51, 52):
         answer, = line.outcome(write((RATIO, value)), 60.0)
@@ -217,9 +134,9 @@ def test_late_answers_are_never_taken_for_others(late: float) -> None:
 @pytest.mark.parametrize('boot', [0.0, 0.02, 0.5, 3.0])
 def test_restart_in_the_middle_of_a_write(boot: float) -> None:
     line = Line()
-    line.run(1.0)
+    line.until(1.0)
     assert line.control(ControlAction.ENABLE)[0]
-    line.run(2.05)
+    line.until(2.05)
     request = write((RATIO, 50))
     line.submit(request)
     # the write is on its way
@@ -227,7 +144,7 @@ def test_restart_in_the_middle_of_a_write(boot: float) -> None:
     before = len(line.sent)
     answer, = line.wait(request)
     assert str(answer).startswith(('no answer', 'drive offline'))
-    line.run(line.now + 10.0)
+    line.until(line.now + 10.0)
     assert line.session.online
     assert line.found(StationLost)
     assert len(line.writes('8C02')) == 1
@@ -249,7 +166,7 @@ def test_unknown_last_function_byte(function: str) -> None:
     line.ltmr.receive_frame(Frame(0x000, b'\x01\x05', False), 0.0)
     line.ltmr.receive_frame(Frame(0x505, bytes.fromhex(f'C80100{function}00000000'), False), 0.0)
     line.ltmr.take_frames()
-    line.run(2.0)
+    line.until(2.0)
     assert line.session.online
     assert line.outcome(write((RATIO, 50))) == ['written']
     assert line.ltmr.value('flc1_ratio') == 50.0
@@ -257,10 +174,10 @@ def test_unknown_last_function_byte(function: str) -> None:
 
 def test_stopped_node_is_started_again() -> None:
     line = Line()
-    line.run(1.0)
+    line.until(1.0)
     sent = len(line.sent)
     line.ltmr.receive_frame(Frame(0x000, b'\x02\x05', False), 1.0)
-    line.run(5.0)
+    line.until(5.0)
     assert '000#0105' in [text for _, text in line.sent[sent:]]
     assert line.session.online
     assert line.session.facts()['nmt_state'] == 'operational'
@@ -268,31 +185,31 @@ def test_stopped_node_is_started_again() -> None:
 
 def test_lost_heartbeats() -> None:
     line = Line(heartbeat_timeout=0.6, missed_limit=1000)
-    line.run(1.0)
+    line.until(1.0)
     line.fault('off')
-    line.run(3.0)
+    line.until(3.0)
     assert not line.session.online
     lost, = (at for at, event in line.events if isinstance(event, StationLost))
     # the last one came at 1.0 at the latest, 0.2 s apart
     assert 1.4 <= lost <= 1.61
     line.fault('ok')
-    line.run(6.0)
+    line.until(6.0)
     assert line.session.online
 
 
 def test_safe_stop() -> None:
     line = Line()
-    line.run(1.0)
+    line.until(1.0)
     assert line.control(ControlAction.ENABLE)[0]
     line.session.deactivate(line.now)
     line._collect()
-    line.run(line.now + 2.0)
+    line.until(line.now + 2.0)
     assert line.session.stopped
     assert not line.ltmr.plant.operation.enabled
     assert line.writes('C002')[-1] == '0000'
     # nothing by NMT, and silence
     last = line.sent[-1][0]
-    line.run(line.now + 5.0)
+    line.until(line.now + 5.0)
     assert line.sent[-1][0] == last
 
 
@@ -316,22 +233,21 @@ _STEPS = st.lists(st.tuples(
 def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
         steps: list[tuple[float, tuple[str, Any]]]) -> None:
     line = Line(parameter_retries=1)
-    line.run(0.5)
+    line.until(0.5)
     asked: list[Any] = []
     for wait, (what, value) in steps:
-        line.run(line.now + wait)
+        line.until(line.now + wait)
         if what == 'fault':
             line.fault(value)
         elif what == 'control':
-            line.session.services.submit(ControlRequest(value), line.now)
-            line._collect()
+            line.submit(ControlRequest(value))
         else:
             request: Any = read(RATIO)
             if what != 'read':
                 request = write((RATIO if what == 'write' else TRIP_CLASS, value))
             asked.append(request)
             line.submit(request)
-    line.run(line.now + 40.0)
+    line.until(line.now + 40.0)
     for request in asked:
         (answer,), = line.outcomes(request)     # exactly one outcome
         if isinstance(answer, int):
@@ -343,7 +259,7 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
                 assert request.items[0][1] % 5 or not 5 <= request.items[0][1] <= 30
     # once all is well again, so is the bridge; and what it reads is what is there
     line.fault('ok')
-    line.run(line.now + 10.0)
+    line.until(line.now + 10.0)
     assert line.session.online
     # settings are taken while the motor is off
     assert line.control(ControlAction.DISABLE)[0]
@@ -353,4 +269,4 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
     found = line.found(StationFound)
     assert len(found) - 1 <= len(line.found(StationLost))
     # no PDO before the node was ready for it, but for those that crossed a boot-up frame
-    assert set(line.ltmr.violations) <= {'request while the node is not operational (ignored)'}
+    assert set(line.ltmr.violations) <= {RULES['not operational']}

@@ -182,13 +182,10 @@ class CanopenNode(Companion):
 
         :raises Refused: its index has none, and no such sub-index.
         """
-        code, register, _ = self._error
         objects = {
             # what every node has: device type, errors, identifiers, heartbeat, identity
             (0x1000, 0): bytes(4),
-            (0x1001, 0): bytes((register,)),
-            (0x1003, 0): bytes((bool(code),)),
-            (0x1003, 1): code.to_bytes(4, 'little'),
+            (0x1001, 0): bytes((self._error.register,)),
             (0x1014, 0): (network.EMERGENCY_BASE + self.number).to_bytes(4, 'little'),
             HEARTBEAT_TIME: self._heartbeat.to_bytes(2, 'little'),
             (0x1018, 0): bytes((1,)),

@@ -10,7 +10,6 @@ from collections.abc import Collection
 from copy import deepcopy
 from dataclasses import dataclass, field
 import math
-from typing import NamedTuple
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
@@ -40,7 +39,7 @@ class PdoHabits:
     :param no_remote: TPDOs want bit 30 of their COB-ID.
     """
 
-    types: Collection[int] = frozenset((*range(241), 254, 255))
+    types: Collection[int] = frozenset((0, 1, 254, 255))
     fixed_mapping: bool = False
     no_remote: bool = False
 
@@ -62,7 +61,6 @@ class Pdo:
     count: int = 0
     entries: list[int] = field(default_factory=lambda: [0] * ENTRIES_MAX)
     pending: bytes | None = None
-    syncs: int = 0
     sent: bytes | None = None
     sent_at: float = -math.inf
 
@@ -81,29 +79,19 @@ class Pdo:
         return sum(entry & 0xFF for entry in self.mapped) // 8
 
 
-class Factory(NamedTuple):
-    """
-    What PDOs carry from the factory: entries by number.
-
-    :param type: of transmission.
-    """
-
-    receive: dict[int, list[int]]
-    transmit: dict[int, list[int]]
-    type: int
-
-
 class Pdos:
     """
     All PDOs of one drive.
 
-    :param factory: what is mapped when it leaves the factory.
+    :param receive: entries that are mapped when it leaves the factory, by number.
+    :param kind: type of transmission then.
     """
 
-    def __init__(self, node: int, objects: ObjectDictionary, factory: Factory) -> None:
+    def __init__(self, node: int, objects: ObjectDictionary, receive: dict[int, list[int]],
+                 transmit: dict[int, list[int]], kind: int) -> None:
         self._objects = objects
         self.habits = PdoHabits()
-        self._node, self._factory = node, factory
+        self._node, self._mapped, self._kind = node, (receive, transmit), kind
         self._stored: tuple[list[Pdo], list[Pdo]] | None = None
         self.begin()
 
@@ -120,11 +108,10 @@ class Pdos:
             return
         self.receive = [Pdo(False, 0x200 + 0x100 * n + self._node) for n in range(COUNT)]
         self.transmit = [Pdo(True, 0x40000180 + 0x100 * n + self._node) for n in range(COUNT)]
-        for pdos, made in ((self.receive, self._factory.receive),
-                           (self.transmit, self._factory.transmit)):
+        for pdos, made in zip((self.receive, self.transmit), self._mapped, strict=True):
             for number, entries in made.items():
                 pdo = pdos[number - 1]
-                pdo.count, pdo.type = len(entries), self._factory.type
+                pdo.count, pdo.type = len(entries), self._kind
                 pdo.entries[:len(entries)] = entries
 
     # -- objects ----------------------------------------------------------------------------------
@@ -168,7 +155,7 @@ class Pdos:
                     and value != pdo.cob_id):
                 raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
             pdo.cob_id = value
-            pdo.pending, pdo.sent, pdo.syncs = None, None, 0
+            pdo.pending = pdo.sent = None
         elif subindex == 2:
             if value not in self.habits.types:
                 raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
@@ -228,16 +215,10 @@ class Pdos:
                         for entry in pdo.mapped)
 
     def synchronised(self, pdo: Pdo) -> bool:
-        """Count a SYNC, and tell whether this TPDO leaves with it."""
+        """Tell whether this TPDO leaves with a SYNC: with each, or with content that is new."""
         if pdo.identifier is None or pdo.type > 240:
             return False
-        if pdo.type == 0:
-            return self.content(pdo) != pdo.sent
-        pdo.syncs += 1
-        if pdo.syncs < pdo.type:
-            return False
-        pdo.syncs = 0
-        return True
+        return bool(pdo.type) or self.content(pdo) != pdo.sent
 
     def due(self, pdo: Pdo) -> float:
         """Return when a TPDO leaves by itself."""

@@ -26,7 +26,6 @@ CODES = {
     Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
     Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
     Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
-    Refusal.TOO_EARLY: abort_codes.DEVICE_STATE,
 }
 
 
