@@ -359,6 +359,12 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[Any]:
         room.leave()
 
 
+@pytest.fixture(autouse=True, scope='module')
+def _collected() -> None:
+    """Let garbage collection leave out what modules before have left, too."""
+    gc.freeze()
+
+
 def pytest_collection_finish() -> None:
     """Let garbage collection, which tests in ros/ ask for, leave out thousands of tests."""
     gc.collect()

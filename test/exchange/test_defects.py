@@ -114,7 +114,7 @@ class World:
         configurations, self.devices = KINDS[kind]()
         self.group = 'group' in kind
         self.bench = Bench(*configurations)
-        self.coming: list[tuple[float, int, str]] = []
+        self.coming: list[tuple[float, int, Frame]] = []
         self.number = count()
         self.frames: list[str] = []
         self.deaf = False
@@ -139,7 +139,7 @@ class World:
                     continue
                 for answer in device.takes(sent):
                     heapq.heappush(self.coming, (
-                        self.bench.now + DELAY, next(self.number), str(answer)))
+                        self.bench.now + DELAY, next(self.number), answer))
 
     def _is_for(self, sent: Frame, index: int) -> bool:
         device, station = self.devices[index], index + 1
@@ -158,8 +158,8 @@ class World:
             at = min(member.due for member in self.exchange._members)
             at = min(max(at, self.bench.now), self.bench.now + 0.02)
             if self.coming and self.coming[0][0] <= min(at, end):
-                self.bench.now, _, text = heapq.heappop(self.coming)
-                self.exchange.frame_received(frame(text), 0.0)
+                self.bench.now, _, answer = heapq.heappop(self.coming)
+                self.exchange.frame_received(answer, 0.0)
             elif at <= end:
                 self.bench.now = at
                 with self.exchange.lock:

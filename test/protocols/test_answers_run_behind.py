@@ -112,9 +112,9 @@ class Bus:
         self.now = 10.0
         self.deaf: set[int] = set()
         self.lose = 0           # so many answers get lost
-        self.coming: list[tuple[float, int, int, str]] = []
+        self.coming: list[tuple[float, int, int, Frame]] = []
         self.number = count()
-        self.sent: list[tuple[float, str]] = []
+        self.sent: list[tuple[float, Frame]] = []
         for session in self.sessions:
             session.bus_up(self.now)
             session.activate(self.now)
@@ -127,7 +127,7 @@ class Bus:
         for session, events in zip(self.sessions, self.events):
             while frames := session.take_frames():
                 for each in frames:
-                    self.sent.append((self.now, str(each)))
+                    self.sent.append((self.now, each))
                     for index, device in enumerate(self.devices):
                         if index not in self.deaf:
                             self.answer(index, device.takes(each))
@@ -140,15 +140,15 @@ class Bus:
                 self.lose -= 1
             else:
                 heapq.heappush(self.coming, (
-                    self.now + self.delay, next(self.number), index, str(each)))
+                    self.now + self.delay, next(self.number), index, each))
 
     def live(self, seconds: float) -> None:
         end = self.now + seconds
         while True:
             due = max(self.now, min(session.next_timer() for session in self.sessions))
             if self.coming and self.coming[0][0] <= min(due, end):
-                self.now, _, index, text = heapq.heappop(self.coming)
-                self.sessions[index].receive_frame(frame(text), self.now)
+                self.now, _, index, answer = heapq.heappop(self.coming)
+                self.sessions[index].receive_frame(answer, self.now)
             elif due <= end:
                 self.now = due
                 for session in self.sessions:
@@ -266,7 +266,7 @@ def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
     bus.stop()
     cycles = '400' if 'group' in kind else '002' if 'cannord' in kind else '003FFFF0'
     cycles = '201' if kind == 'cia402' else cycles
-    assert len([text for _, text in bus.sent if text.startswith(f'{cycles}#')]) == 6
+    assert len([each for _, each in bus.sent if str(each).startswith(f'{cycles}#')]) == 6
 
 
 @pytest.mark.parametrize('members', [2, 4])
@@ -287,7 +287,7 @@ def test_members_that_did_not_answer_get_frames_of_their_own(members: int) -> No
     bus.live(2.0)
     assert not any(device.runs for device in bus.devices)
     alone = {f'{2 * index + 2:03X}' for index in deaf}
-    assert {text[:3] for _, text in bus.sent} == {'400', *alone}
+    assert {str(each)[:3] for _, each in bus.sent} == {'400', *alone}
 
 
 @pytest.mark.parametrize('refused', ['002', '004', '006', '008'])
