@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.cli.command import agreed
 from drive_can_bridge.core.text import column_lines, printable
 
 
@@ -65,9 +66,10 @@ def _fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
     return table
 
 
-def print_json(document: Mapping[str, Any]) -> None:
-    """Print one JSON document as a line of standard output."""
-    print(json.dumps(document, ensure_ascii=False))
+def print_json(*documents: Mapping[str, Any]) -> None:
+    """Print JSON documents, each as a line of standard output."""
+    for document in documents:
+        print(json.dumps(document, ensure_ascii=False))
 
 
 #: s after which a bar appears
@@ -124,13 +126,17 @@ class Bar:
         self._progress.update(task, completed=self._done)
 
 
-def differs(path: Path, data: bytes | None = None) -> bool:
+def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
     """
-    Tell whether there is a file that would be lost.
+    Ask about files that would be lost.
 
-    :param data: what is to be written; None: not known yet.
+    :param otherwise: what was not done.
+    :raises WrongUsage: nobody is there to be asked.
     """
-    return path.is_file() and (data is None or path.read_bytes() != data)
+    there = [str(file) for file in files if file.is_file()]
+    return not there or agreed(
+        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
+        otherwise=otherwise, yes_means='overwrites')
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
-from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
+from drive_can_bridge.cli.output import print_json, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
@@ -145,8 +145,7 @@ def _list(args: Namespace) -> int:
     """Print which profiles there are."""
     documents = [_summary(name, check(path)) for name, path in available(args.directory).items()]
     if args.json:
-        for document in documents:
-            print_json(document)
+        print_json(*documents)
         return 0
     print_table(
         ('name', 'parameters', 'verified', 'protocols', 'description', 'problems'),
@@ -171,12 +170,12 @@ def _show(args: Namespace) -> int:
     """Print what is in a profile."""
     checked = check(find(args.name, args.directory))
     if checked.problems:
-        _print_problems(checked.problems)
+        complain('\n'.join(map(str, checked.problems)))
         return FAILED
     profile, entries = checked.loaded.profile, checked.entries
     if args.json:
-        for name, parameter in profile.parameters.items():
-            print_json(description(name, parameter, entries[name]))
+        print_json(*(description(name, parameter, entries[name])
+                     for name, parameter in profile.parameters.items()))
         return 0
     say(f'{profile.description or profile.name} ({", ".join(profile.protocols)})')
     say(str(checked.path))
@@ -216,7 +215,8 @@ def _check(args: Namespace) -> int:
                         'problems': [_problem(each) for each in checked.problems],
                         'warnings': [_problem(each) for each in checked.warnings]})
             continue
-        _print_problems(checked.problems)
+        for problem in checked.problems:
+            complain(str(problem))
         for warning in checked.warnings:
             complain(f'warning: {warning}')
         if not checked.problems:
@@ -242,11 +242,6 @@ def _size(checked: Checked) -> str:
 
 def _problem(problem: Problem) -> dict[str, Any]:
     return {'line': problem.line, 'key': problem.key, 'message': problem.message}
-
-
-def _print_problems(problems: tuple[Problem, ...]) -> None:
-    for problem in problems:
-        complain(str(problem))
 
 
 # -- import ---------------------------------------------------------------------------------------
@@ -277,7 +272,8 @@ def _import(args: Namespace) -> int:
         print(built.text, end='')
         return 0
     data = built.text.encode('utf-8')
-    if differs(args.output, data) and not agreed(
+    lost = args.output.is_file() and args.output.read_bytes() != data
+    if lost and not agreed(
             f'{args.output} exists and holds something else. Overwrite it?', yes=args.yes,
             otherwise='Nothing was written', yes_means='overwrites it'):
         return FAILED

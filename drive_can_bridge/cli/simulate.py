@@ -324,19 +324,15 @@ def _signals_as_descriptor() -> Iterator[int]:
     """Turn SIGINT and SIGTERM into something that can be waited for."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
-
-    def wake(signum: int, _: Any) -> None:
-        try:
-            os.write(writing, b'\0')
-        except BlockingIOError:
-            pass
-
-    previous: list[tuple[int, Callable[[int, Any], Any] | int | None]] = [
-        (signum, signal.signal(signum, wake)) for signum in (signal.SIGINT, signal.SIGTERM)]
+    woken = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    # a handler, so that neither has its usual effect
+    previous = {number: signal.signal(number, lambda *_: None)
+                for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield reading
     finally:
-        for signum, handler in previous:
-            signal.signal(signum, handler)
+        signal.set_wakeup_fd(woken)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
         os.close(reading)
         os.close(writing)
