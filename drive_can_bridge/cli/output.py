@@ -13,7 +13,6 @@ import os
 from pathlib import Path
 import sys
 import tempfile
-from types import TracebackType
 from typing import Any
 
 from rich.console import Console
@@ -86,44 +85,38 @@ def waiting(what: str) -> Iterator[None]:
         yield
 
 
-class Bar:
+@contextmanager
+def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callable[..., None]]:
     """
-    Counts steps.
+    Show in a terminal how far something is, if it takes long; yield what counts a step.
 
-    :param what: what they are for, ``reading conveyor``.
+    :param what: the steps are for, ``reading conveyor``.
     :param total: how many there are.
     :param now: the steady time.
     """
+    progress = Progress(TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+                        TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+    task = progress.add_task(what, total=total)
+    began = now()
 
-    def __init__(self, what: str, total: int, now: Callable[[], float]) -> None:
-        self._now = now
-        self._what = what
-        self._total = total
-        self._done = 0
-        self._began = self._now()
-        self._progress: Progress | None = None
+    def step(_: object = None) -> None:
+        progress.advance(task)
+        if now() - began >= PATIENCE and sys.stderr.isatty():
+            progress.start()
+    try:
+        yield step
+    finally:
+        if progress.live.is_started:
+            progress.stop()
 
-    def __enter__(self) -> 'Bar':
-        return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
-        if self._progress is not None:
-            self._progress.stop()
+def differs(path: Path, data: bytes | None = None) -> bool:
+    """
+    Tell whether there is a file that would be lost.
 
-    def step(self, _: object = None) -> None:
-        """Count a step."""
-        self._done += 1
-        if self._progress is None:
-            if self._now() - self._began < PATIENCE or not sys.stderr.isatty():
-                return
-            self._progress = Progress(
-                TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-                TimeRemainingColumn(), console=Console(stderr=True), transient=True)
-            self._progress.add_task(self._what, total=self._total)
-            self._progress.start()
-        task, = self._progress.task_ids
-        self._progress.update(task, completed=self._done)
+    :param data: what is to be written; None: not known yet.
+    """
+    return path.is_file() and (data is None or path.read_bytes() != data)
 
 
 def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
@@ -133,7 +126,7 @@ def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
     :param otherwise: what was not done.
     :raises WrongUsage: nobody is there to be asked.
     """
-    there = [str(file) for file in files if file.is_file()]
+    there = [str(file) for file in files if differs(file)]
     return not there or agreed(
         f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
         otherwise=otherwise, yes_means='overwrites')

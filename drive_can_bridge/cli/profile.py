@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
-from drive_can_bridge.cli.output import print_json, print_table, write_atomically
+from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
@@ -272,8 +272,7 @@ def _import(args: Namespace) -> int:
         print(built.text, end='')
         return 0
     data = built.text.encode('utf-8')
-    lost = args.output.is_file() and args.output.read_bytes() != data
-    if lost and not agreed(
+    if differs(args.output, data) and not agreed(
             f'{args.output} exists and holds something else. Overwrite it?', yes=args.yes,
             otherwise='Nothing was written', yes_means='overwrites it'):
         return FAILED

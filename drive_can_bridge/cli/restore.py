@@ -16,7 +16,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import Bar, print_json, print_table
+from drive_can_bridge.cli.output import counting, print_json, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
@@ -117,11 +117,11 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return _is_enabled(drive)
     with postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
             as interrupted:
-        with Bar(f'writing {drive.name}', len(plan.changes), args.clock.now) as bar:
+        with counting(f'writing {drive.name}', len(plan.changes), args.clock.now) as step:
             result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
                               clock=args.clock.now,
                               wait=lambda s: args.clock.wait(args.clock.now() + s),
-                              told=bar.step, hint=complain).run()
+                              told=step, hint=complain).run()
         # a second signal does not keep from anybody what was written
         return _report(args, drive, plan, result, interrupted)
 

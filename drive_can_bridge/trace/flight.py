@@ -27,8 +27,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.record import DATA, Record, RecordKind
-from drive_can_bridge.trace.candump import format_record
-from drive_can_bridge.trace.files import labels
+from drive_can_bridge.trace.files import format_record, labels
 
 #: most that a ring may take
 MEMORY_MAX = 64 * 2**20
