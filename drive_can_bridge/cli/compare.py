@@ -12,11 +12,11 @@ import re
 from drive_can_bridge.backup.document import (
     Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, read_backup, settings_of,
 )
-from drive_can_bridge.cli.command import complain, say, WrongUsage
+from drive_can_bridge.cli.command import complain, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import print_json, print_table
+from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    complain, FAILED, namespace, say, what_is_missing, WrongUsage,
+    complain, FAILED, namespace, print_json, say, what_is_missing, WrongUsage,
 )
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.process.locks import bridges, Present, short
@@ -136,7 +136,6 @@ def _show(args: Namespace, answers: Sequence[Any]) -> int:
     for answer in sorted(answers, key=lambda each: each.ok):
         name = answer.name.lstrip('/')
         if args.json:
-            from drive_can_bridge.cli.output import print_json
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
                         'message': answer.text})
         else:

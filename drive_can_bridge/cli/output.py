@@ -1,19 +1,17 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Tables and progress bars for people, and JSON for programs.
+Tables and progress bars for people, and files.
 
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
 a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a terminal only.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-import json
 import os
 from pathlib import Path
 import sys
 import tempfile
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -31,17 +29,24 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
 
     :param numbers: headings of columns that are aligned to the right.
     """
-    headings, written = _used(headings, rows)
     if sys.stdout.isatty():
-        Console().print(_fitting(headings, written, numbers))
+        Console().print(fitting_table(headings, rows, numbers))
     else:
-        print('\n'.join(column_lines(headings, written, numbers=numbers)))
+        print('\n'.join(column_lines(*_used(headings, rows), numbers=numbers)))
 
 
 def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
                   numbers: Sequence[str] = ()) -> Table:
     """Make a table that fits a terminal, for those that show it again and again."""
-    return _fitting(*_used(headings, rows), numbers)
+    headings, written = _used(headings, rows)
+    table = Table(box=None, pad_edge=False, header_style='bold')
+    for place, heading in enumerate(headings):
+        # a name that is broken in two cannot be copied
+        table.add_column(heading, justify='right' if heading in numbers else 'left',
+                         overflow='fold', no_wrap=place == 0 or heading in numbers)
+    for row in written:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
 
 
 def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
@@ -51,24 +56,6 @@ def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
     used = [place for place in range(len(headings)) if any(row[place] for row in written)]
     return [headings[place] for place in used], [[row[place] for place in used]
                                                  for row in written]
-
-
-def _fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
-             numbers: Sequence[str]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style='bold')
-    for place, heading in enumerate(headings):
-        # a name that is broken in two cannot be copied
-        table.add_column(heading, justify='right' if heading in numbers else 'left',
-                         overflow='fold', no_wrap=place == 0 or heading in numbers)
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    return table
-
-
-def print_json(*documents: Mapping[str, Any]) -> None:
-    """Print JSON documents, each as a line of standard output."""
-    for document in documents:
-        print(json.dumps(document, ensure_ascii=False))
 
 
 #: s after which a bar appears

@@ -5,12 +5,15 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter, SUP
 import codecs
 from collections.abc import Mapping, Sequence
 import csv
+from dataclasses import asdict
 from pathlib import Path
 import re
 from typing import Any
 
-from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
-from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
+from drive_can_bridge.cli.command import (
+    agreed, complain, FAILED, output_path, print_json, say, WrongUsage,
+)
+from drive_can_bridge.cli.output import differs, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
@@ -282,8 +285,7 @@ def _import(args: Namespace) -> int:
             'file': str(args.file), 'output': str(args.output), 'entries': built.entries,
             'parameters': len(built.names), 'remarks': built.remarks,
             'protocols': list(built.protocols), 'notes': list(built.notes),
-            'left_out': [{'line': each.line, 'section': each.section, 'what': each.what,
-                          'reason': each.reason} for each in built.left_out]})
+            'left_out': [asdict(each) for each in built.left_out]})
     else:
         say(f'{args.output}: {_counted(built)}')
     return 0

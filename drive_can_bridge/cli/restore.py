@@ -11,12 +11,12 @@ from drive_can_bridge.backup.restore import (
     RestorePlan, Restorer, RestoreResult, says_nothing, strangers, why_left_alone,
 )
 from drive_can_bridge.cli.command import (
-    agreed, complain, FAILED, must_be_answerable, say, WrongUsage,
+    agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage,
 )
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import counting, print_json, print_table
+from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value

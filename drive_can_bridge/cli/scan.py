@@ -17,9 +17,9 @@ import shlex
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, WrongUsage,
+    above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, print_json, WrongUsage,
 )
-from drive_can_bridge.cli.output import may_overwrite, print_json, write_atomically
+from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING

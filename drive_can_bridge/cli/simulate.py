@@ -177,8 +177,10 @@ def run(args: argparse.Namespace) -> int:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
             raise WrongUsage('--pty and --interface/--channel exclude each other')
-        configuration = _on_buses(_load(args.params_file), args.interface, args.channel,
-                                  args.bitrate)
+        # imported late: it reads schemas, and --help needs none
+        from drive_can_bridge.configuration.load import configuration_from_file
+        configuration = _on_buses(configuration_from_file(args.params_file), args.interface,
+                                  args.channel, args.bitrate)
         faults = [of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
         mechanics = dict(of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
@@ -266,12 +268,6 @@ def _wait(simulation: Simulation, wake: int, console: Console) -> int:
             for line in reader.read_lines():
                 console.obey(line)
     return FAILED
-
-
-def _load(path: Path) -> BridgeConfiguration:
-    # imported late: it reads schemas, and --help needs none
-    from drive_can_bridge.configuration.load import configuration_from_file
-    return configuration_from_file(path)
 
 
 def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel: str | None,

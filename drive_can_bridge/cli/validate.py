@@ -6,8 +6,7 @@ import re
 import sys
 from typing import Any
 
-from drive_can_bridge.cli.command import FAILED
-from drive_can_bridge.cli.output import print_json
+from drive_can_bridge.cli.command import FAILED, print_json
 from drive_can_bridge.configuration.checks import Adapters, bus_shares
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration

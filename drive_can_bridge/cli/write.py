@@ -5,9 +5,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 import re
 
-from drive_can_bridge.cli.command import FAILED, WrongUsage
+from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
-from drive_can_bridge.cli.output import counting, print_json, print_table
+from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
 from drive_can_bridge.configuration.yaml_nodes import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
