@@ -120,9 +120,9 @@ def _add_options(parser: ArgumentParser, action: str = '') -> None:
 
     :param action: '' for all, in front of the action: understood there, but not described again.
     """
-    for flags, (what, _, actions) in _OPTIONS.items():
+    for flags, (what, default, actions) in _OPTIONS.items():
         if not action:
-            parser.add_argument(*flags, **{**what, 'default': SUPPRESS, 'help': SUPPRESS})
+            parser.add_argument(*flags, **{**what, 'default': default, 'help': SUPPRESS})
         elif action in actions:
             parser.add_argument(*flags, **what, default=SUPPRESS)
 
@@ -134,9 +134,6 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: it could not be done, in words.
     :raises OSError: a file cannot be read or written.
     """
-    for flags, (_, default, _) in _OPTIONS.items():
-        name = flags[-1].removeprefix('--')
-        setattr(args, name, getattr(args, name, default))
     actions = {'list': _list, 'show': _show, 'check': _check, 'import': _import}
     return actions[args.action](args)
 
