@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 import os
 from pathlib import Path
+from typing import Any
 
 from drive_can_bridge.backup.document import head_of, settings_of, written
-from drive_can_bridge.cli.command import agreed, complain, FAILED, output, say, WrongUsage
+from drive_can_bridge.cli.command import complain, FAILED, output, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, chosen, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import differs, print_json, write_atomically
-from drive_can_bridge.client.drive import Drive, ReadOutcome
+from drive_can_bridge.cli.output import may_overwrite, write_atomically
+from drive_can_bridge.client.drive import Drive
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.words import counted
 
 SUFFIX = '.yaml'
 
@@ -51,16 +53,22 @@ def run(args: Namespace) -> int:
     with source_of(args) as source:
         names = chosen(source.names, args.words)
         files = _files(args.output, names)
-        if not _may_write(list(files.values()), yes=args.yes):
+        if not may_overwrite(files.values(), yes=args.yes,
+                             otherwise='Nothing was read or written'):
             return FAILED
         with opened(source, names) as drives:
-            texts = {name: _text(args, drives[name]) for name in names}
-    for name, made in texts.items():
-        if made is not None:
+            made = {name: _made(args, drives[name], files[name]) for name in names}
+    for name, backup in made.items():
+        if backup is not None:
+            text, document = backup
             files[name].parent.mkdir(exist_ok=True)
-            write_atomically(files[name], made.text.encode('utf-8'))
-            made.tell(args, files[name])
-    return FAILED if None in texts.values() else 0
+            write_atomically(files[name], text.encode('utf-8'))
+            if args.json:
+                print_json(document)
+            else:
+                settings = counted(document['settings'], 'setting', 'settings')
+                say(f'{name}: {settings} in {files[name]}')
+    return FAILED if None in made.values() else 0
 
 
 def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
@@ -86,55 +94,28 @@ def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
     return files
 
 
-def _may_write(files: Sequence[Path], *, yes: bool) -> bool:
-    there = [str(file) for file in files if differs(file)]
-    return not there or agreed(
-        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
-        otherwise='Nothing was read or written', yes_means='overwrites')
+def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any]] | None:
+    """
+    Read a drive; None: there is to be no file, and it was said why.
 
-
-class _Made:
-    """A backup, ready to be written."""
-
-    def __init__(self, drive: Drive, settings: Sequence[tuple[Parameter, int]],
-                 left_out: Sequence[tuple[str, str]], today: float) -> None:
-        self._name = drive.name
-        self._count = len(settings)
-        self._identity = drive.identity()
-        self._left_out = left_out
-        time = datetime.fromtimestamp(today, timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
-        self.text = written(
-            drive.facts, head_of(drive.facts, time=time, identity=self._identity), settings,
-            remarks=[f'left out: {name}: {reason}' for name, reason in left_out])
-
-    def tell(self, args: Namespace, file: Path) -> None:
-        """Say what was written where."""
-        if args.json:
-            print_json({'drive': self._name, 'file': str(file), 'settings': self._count,
-                        'identity': self._identity,
-                        'left_out': [{'parameter': name, 'reason': reason}
-                                     for name, reason in self._left_out]})
-        else:
-            settings = f'{self._count} setting{"" if self._count == 1 else "s"}'
-            say(f'{self._name}: {settings} in {file}')
-
-
-def _text(args: Namespace, drive: Drive) -> _Made | None:
-    """Read a drive; None: there is to be no file, and it was said why."""
+    :return: the text of its file, and what programs are told.
+    """
     names = settings_of(drive)
     outcomes = read_all(drive, names, args.clock)
     settings: list[tuple[Parameter, int]] = []
     missing: list[tuple[str, str]] = []
     useless: list[tuple[str, str]] = []
     for name, outcome in outcomes.items():
-        if outcome.parameter is None or outcome.raw is None:
+        parameter, raw = outcome.parameter, outcome.raw
+        if parameter is None or raw is None:
             missing.append((name, outcome.reason))
             continue
-        reason = _why_not_restorable(drive, outcome)
-        if reason:
-            useless.append((name, reason))
-        else:
-            settings.append((outcome.parameter, outcome.raw))
+        low, high = parameter.raw_limits
+        if low <= raw <= high:
+            settings.append((parameter, raw))
+        else:   # it could not be written back
+            useless.append((name, f'the drive has {outcome.value}, the profile allows '
+                                  f'{parameter.range_text}'))
     for name, reason in useless:
         complain(f'warning: {drive.name}: {name} is left out: {reason}')
     for line in unread(drive, outcomes.values()):
@@ -147,15 +128,12 @@ def _text(args: Namespace, drive: Drive) -> _Made | None:
     if not settings:
         complain(f'{drive.name}: has no settings that could be written to a file')
         return None
-    return _Made(drive, settings, [*missing, *useless], 1e-9 * args.clock.stamp())
-
-
-def _why_not_restorable(drive: Drive, outcome: ReadOutcome) -> str:
-    """Say why a value that was read could not be written back; '' if it could."""
-    parameter, raw = outcome.parameter, outcome.raw
-    if parameter is None or raw is None:
-        return ''
-    low, high = parameter.raw_limits
-    if low <= raw <= high:
-        return ''
-    return f'the drive has {outcome.value}, the profile allows {parameter.range_text}'
+    left_out = [*missing, *useless]
+    time = datetime.fromtimestamp(1e-9 * args.clock.stamp(), timezone.utc)
+    head = head_of(drive.facts, time=time.strftime('%Y-%m-%dT%H:%M:%SZ'),
+                   identity=drive.identity())
+    return written(drive.facts, head, settings, remarks=[
+        f'left out: {name}: {reason}' for name, reason in left_out]), {
+            'drive': drive.name, 'file': str(file), 'settings': len(settings),
+            'identity': head.identity,
+            'left_out': [{'parameter': name, 'reason': reason} for name, reason in left_out]}

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What all subcommands have in common: exit codes, wrong usage, and lines for people.
+What all subcommands have in common: exit codes, wrong usage, lines for people and programs.
 
 A subcommand is a module of its name with ``define(parser)`` and ``run(args) -> exit code``.
 Whatever it raises, :mod:`.main` says in one line.
@@ -8,15 +8,16 @@ Whatever it raises, :mod:`.main` says in one line.
 
 import argparse
 from argparse import ArgumentParser, ArgumentTypeError
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+import json
 import math
 import os
 from pathlib import Path
 import re
 import sys
 import termios
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
@@ -58,6 +59,12 @@ class Parser(argparse.ArgumentParser):
 def say(text: str) -> None:
     """Write a line to standard output."""
     print(printable(text, None))
+
+
+def print_json(*documents: Mapping[str, Any]) -> None:
+    """Print JSON documents, each as a line of standard output."""
+    for document in documents:
+        print(json.dumps(document, ensure_ascii=False))
 
 
 def complain(text: str) -> None:

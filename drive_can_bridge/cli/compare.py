@@ -4,6 +4,7 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 import math
 from pathlib import Path
 import re
@@ -11,11 +12,11 @@ import re
 from drive_can_bridge.backup.document import (
     Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, read_backup, settings_of,
 )
-from drive_can_bridge.cli.command import complain, say, WrongUsage
+from drive_can_bridge.cli.command import complain, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import print_json, print_table
+from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore
@@ -32,6 +33,8 @@ _DRIVE = re.compile(r'[a-z][a-z0-9_]*')
 _NONE = '-'
 #: settings that may all be misspelt
 _FEW = 3
+#: name, unit ('' where nobody knows it), and the values of both sides; None: it has no such setting
+Difference = tuple[str, str, Value | None, Value | None]
 #: names of what is left out that are told
 _NAMED_MAX = 5
 
@@ -47,25 +50,6 @@ class Setting:
 
     value: Value
     raw: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """
-    A setting that is not the same on both sides.
-
-    :param first: None: that side has no such setting.
-    """
-
-    name: str
-    parameter: Parameter | None
-    first: Setting | None
-    second: Setting | None
-
-    @property
-    def unit(self) -> str:
-        """Unit of the values, '' where there is none or nobody knows it."""
-        return self.parameter.unit if self.parameter else ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,11 +108,6 @@ def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
     return Side(settings, parameters, tuple(left_out))
 
 
-def side_of_file_and_drive(backup: Backup, drive: Drive) -> Side:
-    """Take the settings of a file, as the profile of a drive knows them."""
-    return side_of_file(backup, find=drive.find, counts=lambda name: is_setting(drive, name))
-
-
 def names_to_read(drive: Drive, *others: Backup) -> tuple[str, ...]:
     """Return what to read of a drive: settings, its mode, and what else a file has of them."""
     names = [*settings_of(drive), *modes_of(drive)]
@@ -138,14 +117,15 @@ def names_to_read(drive: Drive, *others: Backup) -> tuple[str, ...]:
 
 
 def differences(first: Side, second: Side) -> list[Difference]:
-    """Compare two sides."""
+    """Return the settings that are not the same on both sides."""
     names = dict.fromkeys([*first.settings, *second.settings])
     found = []
     for name in names:
         one, other = first.settings.get(name), second.settings.get(name)
         parameter = first.parameters.get(name) or second.parameters.get(name)
         if one is None or other is None or not _same(one, other, parameter):
-            found.append(Difference(name, parameter, one, other))
+            found.append((name, parameter.unit if parameter else '',
+                          one.value if one else None, other.value if other else None))
     return found
 
 
@@ -222,7 +202,8 @@ def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives,
         if word in files:
             # there are two sides, so the other one is a drive
             drive = drives[next(other for other in words if other not in files)]
-            found.append(side_of_file_and_drive(files[word], drive))
+            found.append(side_of_file(files[word], find=drive.find,
+                                      counts=partial(is_setting, drive)))
             _tell_profile(files[word], drive)
         else:
             found.append(_drive(drives[word], list(files.values()), clock))
@@ -271,18 +252,16 @@ def _tell_profile(backup: Backup, drive: Drive) -> None:
 
 def _show(args: Namespace, found: Sequence[Difference]) -> None:
     if args.json:
-        for each in found:
-            print_json({'parameter': each.name, 'unit': each.unit,
-                        'a': each.first and each.first.value,
-                        'b': each.second and each.second.value})
+        print_json(*({'parameter': name, 'unit': unit, 'a': one, 'b': other}
+                     for name, unit, one, other in found))
     elif found:
         first, second = args.words
         print_table(('parameter', first, second, 'unit'), [
-            (each.name, _text(each.first), _text(each.second), each.unit) for each in found],
+            (name, _text(one), _text(other), unit) for name, unit, one, other in found],
             numbers=(first, second))
     else:
         print('the same')
 
 
-def _text(setting: Setting | None) -> str:
-    return _NONE if setting is None else value_text(setting.value)
+def _text(value: Value | None) -> str:
+    return _NONE if value is None else value_text(value)

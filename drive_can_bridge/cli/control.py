@@ -9,7 +9,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any
 
-from drive_can_bridge.cli.command import complain, FAILED, say, what_is_missing, WrongUsage
+from drive_can_bridge.cli.command import (
+    complain, FAILED, namespace, print_json, say, what_is_missing, WrongUsage,
+)
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.process.locks import bridges, Present, short
 
@@ -39,17 +41,12 @@ def define(parser: ArgumentParser) -> None:
         'a drive, by its name or its full name in the ROS graph (/cell/lift)'
         + ('; patterns too' if patterns else '')))
     words.completer = _complete     # type: ignore[attr-defined]  # for argcomplete
-    parser.add_argument('--namespace', metavar='NS', type=_namespace,
+    parser.add_argument('--namespace', metavar='NS', type=namespace,
                         help='only the bridge in this namespace')
     parser.add_argument('--json', action='store_true', help='a JSON document a line')
     parser.add_argument('--yes', action='store_true', help='accepted; nothing is asked')
     parser.add_argument('-p', '--params-file', metavar='FILE', help='refused: these go through '
                                                                     'the running bridge only')
-
-
-def _namespace(text: str) -> str:
-    from drive_can_bridge.cli.command import namespace
-    return namespace(text)
 
 
 def _complete(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
@@ -139,7 +136,6 @@ def _show(args: Namespace, answers: Sequence[Any]) -> int:
     for answer in sorted(answers, key=lambda each: each.ok):
         name = answer.name.lstrip('/')
         if args.json:
-            from drive_can_bridge.cli.output import print_json
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
                         'message': answer.text})
         else:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from drive_can_bridge.cli.command import complain, namespace, what_is_missing, WrongUsage
-from drive_can_bridge.cli.output import Bar, waiting
+from drive_can_bridge.cli.output import counting, waiting
 from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
 from drive_can_bridge.clock import Clock
@@ -145,8 +145,8 @@ def unread(drive: Drive, outcomes: Iterable[ReadOutcome]) -> list[str]:
 
 def read_all(drive: Drive, names: Sequence[str], clock: Clock) -> dict[str, ReadOutcome]:
     """Read parameters of a drive, none if there are no names; show how far it is."""
-    with Bar(f'reading {drive.name}', len(names), clock.now) as bar:
-        return drive.read(*names, told=bar.step) if names else {}
+    with counting(f'reading {drive.name}', len(names), clock.now) as step:
+        return drive.read(*names, told=step) if names else {}
 
 
 def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:

@@ -1,26 +1,24 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Tables and progress bars for people, and JSON for programs.
+Tables and progress bars for people, and files.
 
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
 a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a terminal only.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-import json
 import os
 from pathlib import Path
 import sys
 import tempfile
-from types import TracebackType
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from drive_can_bridge.cli.command import agreed
 from drive_can_bridge.core.text import column_lines, printable
 
 
@@ -31,17 +29,24 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
 
     :param numbers: headings of columns that are aligned to the right.
     """
-    headings, written = _used(headings, rows)
     if sys.stdout.isatty():
-        Console().print(_fitting(headings, written, numbers))
+        Console().print(fitting_table(headings, rows, numbers))
     else:
-        print('\n'.join(column_lines(headings, written, numbers=numbers)))
+        print('\n'.join(column_lines(*_used(headings, rows), numbers=numbers)))
 
 
 def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
                   numbers: Sequence[str] = ()) -> Table:
     """Make a table that fits a terminal, for those that show it again and again."""
-    return _fitting(*_used(headings, rows), numbers)
+    headings, written = _used(headings, rows)
+    table = Table(box=None, pad_edge=False, header_style='bold')
+    for place, heading in enumerate(headings):
+        # a name that is broken in two cannot be copied
+        table.add_column(heading, justify='right' if heading in numbers else 'left',
+                         overflow='fold', no_wrap=place == 0 or heading in numbers)
+    for row in written:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
 
 
 def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
@@ -51,23 +56,6 @@ def _used(headings: Sequence[str], rows: Iterable[Sequence[str]],
     used = [place for place in range(len(headings)) if any(row[place] for row in written)]
     return [headings[place] for place in used], [[row[place] for place in used]
                                                  for row in written]
-
-
-def _fitting(headings: Sequence[str], rows: Sequence[Sequence[str]],
-             numbers: Sequence[str]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style='bold')
-    for place, heading in enumerate(headings):
-        # a name that is broken in two cannot be copied
-        table.add_column(heading, justify='right' if heading in numbers else 'left',
-                         overflow='fold', no_wrap=place == 0 or heading in numbers)
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    return table
-
-
-def print_json(document: Mapping[str, Any]) -> None:
-    """Print one JSON document as a line of standard output."""
-    print(json.dumps(document, ensure_ascii=False))
 
 
 #: s after which a bar appears
@@ -84,44 +72,29 @@ def waiting(what: str) -> Iterator[None]:
         yield
 
 
-class Bar:
+@contextmanager
+def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callable[..., None]]:
     """
-    Counts steps.
+    Show in a terminal how far something is, if it takes long; yield what counts a step.
 
-    :param what: what they are for, ``reading conveyor``.
+    :param what: the steps are for, ``reading conveyor``.
     :param total: how many there are.
     :param now: the steady time.
     """
+    progress = Progress(TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+                        TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+    task = progress.add_task(what, total=total)
+    began = now()
 
-    def __init__(self, what: str, total: int, now: Callable[[], float]) -> None:
-        self._now = now
-        self._what = what
-        self._total = total
-        self._done = 0
-        self._began = self._now()
-        self._progress: Progress | None = None
-
-    def __enter__(self) -> 'Bar':
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
-        if self._progress is not None:
-            self._progress.stop()
-
-    def step(self, _: object = None) -> None:
-        """Count a step."""
-        self._done += 1
-        if self._progress is None:
-            if self._now() - self._began < PATIENCE or not sys.stderr.isatty():
-                return
-            self._progress = Progress(
-                TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-                TimeRemainingColumn(), console=Console(stderr=True), transient=True)
-            self._progress.add_task(self._what, total=self._total)
-            self._progress.start()
-        task, = self._progress.task_ids
-        self._progress.update(task, completed=self._done)
+    def step(_: object = None) -> None:
+        progress.advance(task)
+        if now() - began >= PATIENCE and sys.stderr.isatty():
+            progress.start()
+    try:
+        yield step
+    finally:
+        if progress.live.is_started:
+            progress.stop()
 
 
 def differs(path: Path, data: bytes | None = None) -> bool:
@@ -131,6 +104,19 @@ def differs(path: Path, data: bytes | None = None) -> bool:
     :param data: what is to be written; None: not known yet.
     """
     return path.is_file() and (data is None or path.read_bytes() != data)
+
+
+def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
+    """
+    Ask about files that would be lost.
+
+    :param otherwise: what was not done.
+    :raises WrongUsage: nobody is there to be asked.
+    """
+    there = [str(file) for file in files if differs(file)]
+    return not there or agreed(
+        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
+        otherwise=otherwise, yes_means='overwrites')
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 import json
 from typing import Any
 
-from drive_can_bridge.cli.command import add_params_file, agree_to_hazard, complain, FAILED
+from drive_can_bridge.cli.command import (
+    add_params_file, agree_to_hazard, complain, FAILED, print_json,
+)
 from drive_can_bridge.cli.drives import chosen, split_words
-from drive_can_bridge.cli.output import print_json, print_table
+from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,

@@ -5,12 +5,15 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter, SUP
 import codecs
 from collections.abc import Mapping, Sequence
 import csv
+from dataclasses import asdict
 from pathlib import Path
 import re
 from typing import Any
 
-from drive_can_bridge.cli.command import agreed, complain, FAILED, output_path, say, WrongUsage
-from drive_can_bridge.cli.output import differs, print_json, print_table, write_atomically
+from drive_can_bridge.cli.command import (
+    agreed, complain, FAILED, output_path, print_json, say, WrongUsage,
+)
+from drive_can_bridge.cli.output import differs, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
@@ -117,9 +120,9 @@ def _add_options(parser: ArgumentParser, action: str = '') -> None:
 
     :param action: '' for all, in front of the action: understood there, but not described again.
     """
-    for flags, (what, _, actions) in _OPTIONS.items():
+    for flags, (what, default, actions) in _OPTIONS.items():
         if not action:
-            parser.add_argument(*flags, **{**what, 'default': SUPPRESS, 'help': SUPPRESS})
+            parser.add_argument(*flags, **{**what, 'default': default, 'help': SUPPRESS})
         elif action in actions:
             parser.add_argument(*flags, **what, default=SUPPRESS)
 
@@ -131,9 +134,6 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: it could not be done, in words.
     :raises OSError: a file cannot be read or written.
     """
-    for flags, (_, default, _) in _OPTIONS.items():
-        name = flags[-1].removeprefix('--')
-        setattr(args, name, getattr(args, name, default))
     actions = {'list': _list, 'show': _show, 'check': _check, 'import': _import}
     return actions[args.action](args)
 
@@ -145,8 +145,7 @@ def _list(args: Namespace) -> int:
     """Print which profiles there are."""
     documents = [_summary(name, check(path)) for name, path in available(args.directory).items()]
     if args.json:
-        for document in documents:
-            print_json(document)
+        print_json(*documents)
         return 0
     print_table(
         ('name', 'parameters', 'verified', 'protocols', 'description', 'problems'),
@@ -171,12 +170,12 @@ def _show(args: Namespace) -> int:
     """Print what is in a profile."""
     checked = check(find(args.name, args.directory))
     if checked.problems:
-        _print_problems(checked.problems)
+        complain('\n'.join(map(str, checked.problems)))
         return FAILED
     profile, entries = checked.loaded.profile, checked.entries
     if args.json:
-        for name, parameter in profile.parameters.items():
-            print_json(description(name, parameter, entries[name]))
+        print_json(*(description(name, parameter, entries[name])
+                     for name, parameter in profile.parameters.items()))
         return 0
     say(f'{profile.description or profile.name} ({", ".join(profile.protocols)})')
     say(str(checked.path))
@@ -216,7 +215,8 @@ def _check(args: Namespace) -> int:
                         'problems': [_problem(each) for each in checked.problems],
                         'warnings': [_problem(each) for each in checked.warnings]})
             continue
-        _print_problems(checked.problems)
+        for problem in checked.problems:
+            complain(str(problem))
         for warning in checked.warnings:
             complain(f'warning: {warning}')
         if not checked.problems:
@@ -242,11 +242,6 @@ def _size(checked: Checked) -> str:
 
 def _problem(problem: Problem) -> dict[str, Any]:
     return {'line': problem.line, 'key': problem.key, 'message': problem.message}
-
-
-def _print_problems(problems: tuple[Problem, ...]) -> None:
-    for problem in problems:
-        complain(str(problem))
 
 
 # -- import ---------------------------------------------------------------------------------------
@@ -287,8 +282,7 @@ def _import(args: Namespace) -> int:
             'file': str(args.file), 'output': str(args.output), 'entries': built.entries,
             'parameters': len(built.names), 'remarks': built.remarks,
             'protocols': list(built.protocols), 'notes': list(built.notes),
-            'left_out': [{'line': each.line, 'section': each.section, 'what': each.what,
-                          'reason': each.reason} for each in built.left_out]})
+            'left_out': [asdict(each) for each in built.left_out]})
     else:
         say(f'{args.output}: {_counted(built)}')
     return 0

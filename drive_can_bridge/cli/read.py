@@ -8,11 +8,11 @@ from typing import Any
 
 from rich.live import Live
 
-from drive_can_bridge.cli.command import above_zero, FAILED
+from drive_can_bridge.cli.command import above_zero, FAILED, print_json
 from drive_can_bridge.cli.drives import (
     add_words, complete_words, opened, read_all, source_of, split_words,
 )
-from drive_can_bridge.cli.output import fitting_table, print_json, print_table
+from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.words import value_text
@@ -57,8 +57,7 @@ def _read(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
         names = wanted or drive.readable_names
         outcomes += [(drive, outcome) for outcome in read_all(drive, names, args.clock).values()]
     if args.json:
-        for drive, outcome in outcomes:
-            print_json(document(drive, outcome))
+        print_json(*(document(drive, outcome) for drive, outcome in outcomes))
     else:
         print_table(_HEADINGS, _rows(drives, outcomes), numbers=_NUMBERS)
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
@@ -81,8 +80,8 @@ def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
                             refresh=True)
             elif args.json:
                 now = 1e-9 * clock.stamp()
-                for drive, outcome in outcomes:
-                    print_json({'time': round(now, 3), **document(drive, outcome)})
+                print_json(*({'time': round(now, 3), **document(drive, outcome)}
+                             for drive, outcome in outcomes))
             else:
                 if not first:
                     print()

@@ -10,9 +10,8 @@ import sys
 from typing import Any, TextIO
 
 from drive_can_bridge.cli.command import (
-    above_zero, add_params_file, add_seconds, complain, output_path, WrongUsage,
+    above_zero, add_params_file, add_seconds, complain, output_path, print_json, WrongUsage,
 )
-from drive_can_bridge.cli.output import print_json
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration

@@ -7,22 +7,22 @@ from pathlib import Path
 
 from drive_can_bridge.backup.document import Backup, is_setting, read_backup
 from drive_can_bridge.backup.restore import (
-    Change, LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in,
+    LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in,
     RestorePlan, Restorer, RestoreResult, says_nothing, strangers, why_left_alone,
 )
 from drive_can_bridge.cli.command import (
-    agreed, complain, FAILED, must_be_answerable, say, WrongUsage,
+    agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage,
 )
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
 )
-from drive_can_bridge.cli.output import Bar, print_json, print_table
+from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.words import counted, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
 
 #: s that a drive's identity is waited for
@@ -109,18 +109,19 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return 0
     if drive.enabled() is Enabled.UNKNOWN:
         complain(f'{drive.name}: whether it is enabled is not known; it should stand still')
-    if not agreed(f'Write {_count(plan.changes)} to {drive.name}?', yes=args.yes,
+    count = counted(len(plan.changes), 'setting', 'settings')
+    if not agreed(f'Write {count} to {drive.name}?', yes=args.yes,
                   otherwise=_NOTHING, yes_means='writes without asking'):
         return FAILED
     if drive.enabled() is Enabled.YES:      # since it was asked
         return _is_enabled(drive)
     with postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
             as interrupted:
-        with Bar(f'writing {drive.name}', len(plan.changes), args.clock.now) as bar:
+        with counting(f'writing {drive.name}', len(plan.changes), args.clock.now) as step:
             result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
                               clock=args.clock.now,
                               wait=lambda s: args.clock.wait(args.clock.now() + s),
-                              told=bar.step, hint=complain).run()
+                              told=step, hint=complain).run()
         # a second signal does not keep from anybody what was written
         return _report(args, drive, plan, result, interrupted)
 
@@ -183,11 +184,11 @@ def _is_enabled(drive: Drive) -> int:
 def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> None:
     differing = [*plan.changes, *plan.kept]
     if args.json:
-        for change in differing:
-            print_json({'drive': drive.name, 'parameter': change.name,
-                        'unit': change.parameter.unit, 'found': change.found,
-                        'wanted': change.wanted, 'left_alone':
-                        change.left_alone.value if change.left_alone else None})
+        print_json(*({'drive': drive.name, 'parameter': change.name,
+                      'unit': change.parameter.unit, 'found': change.found,
+                      'wanted': change.wanted,
+                      'left_alone': change.left_alone.value if change.left_alone else None}
+                     for change in differing))
     elif differing:
         print_table(_HEADINGS, [
             (change.name, value_text(change.found),
@@ -248,7 +249,8 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if not args.json:
         modes = [change.name for change in (*plan.changes, *plan.kept) if change.not_all
                  and change.wanted is not None and change.left_alone in (None, LeftAlone.MODE)]
-        say(f'{drive.name}: {_count(plan.changes)} written, {len(plan.words)} read '
+        count = counted(len(plan.changes), 'setting', 'settings')
+        say(f'{drive.name}: {count} written, {len(plan.words)} read '
             f'back: as in the file{f", but for the mode in {_list(modes)}" if modes else ""}')
     return 0
 
@@ -273,10 +275,6 @@ def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wante
 def _with_unit(plan: RestorePlan, name: str, value: Value) -> str:
     units = {change.name: change.parameter.unit for change in plan.changes}
     return f'{value_text(value)} {units.get(name, "")}'.rstrip()
-
-
-def _count(changes: Sequence[Change]) -> str:
-    return f'{len(changes)} setting{"" if len(changes) == 1 else "s"}'
 
 
 def _list(names: Sequence[str]) -> str:

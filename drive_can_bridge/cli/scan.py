@@ -17,9 +17,9 @@ import shlex
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    above_zero, agree_to_hazard, agreed, bitrate, complain, FAILED, output_path, WrongUsage,
+    above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, print_json, WrongUsage,
 )
-from drive_can_bridge.cli.output import differs, print_json, write_atomically
+from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
@@ -278,20 +278,15 @@ def run(args: Namespace) -> int:
             raise WrongUsage('--bitrates only counts frames, there is nothing to write: leave -o '
                              'away')
         return _compare_bitrates(args, bus)
-    if args.output is not None and not _may_write(args.output, yes=args.yes):
+    if args.output is not None and not may_overwrite(
+            (args.output, *tables_beside(args.output)), yes=args.yes,
+            otherwise='Nothing was sent or written'):
         return FAILED
     for name in args.protocols:     # before anything is sent
         agree_to_hazard(f'{name}: {FAMILIES[name].make_scanner().hazard}',
                         f'Ask {name} all the same?', yes=args.yes or args.passive,
                         who=f'--protocols {name}')
     return _scan(args, bus)
-
-
-def _may_write(output: Path, *, yes: bool) -> bool:
-    there = [str(path) for path in (output, *tables_beside(output)) if differs(path)]
-    return not there or agreed(
-        f'{", ".join(there)} exist{"s" if len(there) == 1 else ""}. Overwrite?', yes=yes,
-        otherwise='Nothing was sent or written', yes_means='overwrites')
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
@@ -363,9 +358,9 @@ def _command(args: Namespace) -> str:
 def _show(args: Namespace, survey: Survey) -> None:
     sightings = survey.sightings
     if args.json:
-        for each in sightings:
-            print_json({'protocol': each.protocol, 'station': each.station,
-                        'certainty': each.certainty.value, 'text': each.text})
+        print_json(*({'protocol': each.protocol, 'station': each.station,
+                      'certainty': each.certainty.value, 'text': each.text}
+                     for each in sightings))
         return
     drives = {each.station for each in sightings if each.protocol in ('canopen_pkw', 'cia402')}
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)

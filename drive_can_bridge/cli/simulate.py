@@ -177,8 +177,10 @@ def run(args: argparse.Namespace) -> int:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
             raise WrongUsage('--pty and --interface/--channel exclude each other')
-        configuration = _on_buses(_load(args.params_file), args.interface, args.channel,
-                                  args.bitrate)
+        # imported late: it reads schemas, and --help needs none
+        from drive_can_bridge.configuration.load import configuration_from_file
+        configuration = _on_buses(configuration_from_file(args.params_file), args.interface,
+                                  args.channel, args.bitrate)
         faults = [of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
         mechanics = dict(of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
@@ -268,12 +270,6 @@ def _wait(simulation: Simulation, wake: int, console: Console) -> int:
     return FAILED
 
 
-def _load(path: Path) -> BridgeConfiguration:
-    # imported late: it reads schemas, and --help needs none
-    from drive_can_bridge.configuration.load import configuration_from_file
-    return configuration_from_file(path)
-
-
 def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel: str | None,
               bitrate: int | None) -> BridgeConfiguration:
     """Replace the end points of all buses."""
@@ -324,19 +320,15 @@ def _signals_as_descriptor() -> Iterator[int]:
     """Turn SIGINT and SIGTERM into something that can be waited for."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
-
-    def wake(signum: int, _: Any) -> None:
-        try:
-            os.write(writing, b'\0')
-        except BlockingIOError:
-            pass
-
-    previous: list[tuple[int, Callable[[int, Any], Any] | int | None]] = [
-        (signum, signal.signal(signum, wake)) for signum in (signal.SIGINT, signal.SIGTERM)]
+    woken = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    # a handler, so that neither has its usual effect
+    previous = {number: signal.signal(number, lambda *_: None)
+                for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield reading
     finally:
-        for signum, handler in previous:
-            signal.signal(signum, handler)
+        signal.set_wakeup_fd(woken)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
         os.close(reading)
         os.close(writing)

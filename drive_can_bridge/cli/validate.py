@@ -2,12 +2,11 @@
 """The subcommand ``drive_can validate``: check a parameter file without touching a bus."""
 
 from argparse import ArgumentParser, Namespace
-import json
 import re
 import sys
 from typing import Any
 
-from drive_can_bridge.cli.command import FAILED
+from drive_can_bridge.cli.command import FAILED, print_json
 from drive_can_bridge.configuration.checks import Adapters, bus_shares
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
@@ -43,12 +42,11 @@ def run(args: Namespace) -> int:
     except ConfigurationError as error:
         if not args.json:
             raise
-        for problem in error.problems:
-            _print_json(_place('error', problem))
+        print_json(*(_place('error', problem) for problem in error.problems))
         return FAILED
     for warning in configuration.warnings:
         if args.json:
-            _print_json(_place('warning', warning))
+            print_json(_place('warning', warning))
         else:
             print(f'warning: {warning}', file=sys.stderr)
     shares: dict[str, float] = {}
@@ -57,7 +55,7 @@ def run(args: Namespace) -> int:
             bus, [drive for drive in configuration.drives.values() if drive.bus == bus.name]))
     for drive in configuration.drives.values():
         if args.json:
-            _print_json(_document(drive, configuration.buses[drive.bus], shares[drive.name]))
+            print_json(_document(drive, configuration.buses[drive.bus], shares[drive.name]))
             continue
         print(summary(drive, configuration.buses[drive.bus], shares[drive.name]))
     return 0
@@ -91,10 +89,6 @@ def _place(level: str, problem: str) -> dict[str, Any]:
     file, line, key, message = found.groups() if found else (None, None, None, problem)
     return {'level': level, 'file': file, 'line': None if line is None else int(line),
             'key': key, 'message': message}
-
-
-def _print_json(document: dict[str, Any]) -> None:
-    print(json.dumps(document, ensure_ascii=False))
 
 
 def _names(parameters: tuple[Parameter, ...]) -> str:

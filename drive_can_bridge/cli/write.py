@@ -5,9 +5,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 import re
 
-from drive_can_bridge.cli.command import FAILED, WrongUsage
+from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
-from drive_can_bridge.cli.output import Bar, print_json, print_table
+from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
 from drive_can_bridge.configuration.yaml_nodes import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
@@ -85,11 +85,11 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
     outcomes: list[tuple[Drive, WriteOutcome]] = []
     try:
         for drive in drives.values():
-            with Bar(f'writing {drive.name}', len(wanted), args.clock.now) as bar:
+            with counting(f'writing {drive.name}', len(wanted), args.clock.now) as step:
                 for name in wanted:
                     drive.write({name: checked[drive, name][0]},
                                 told=lambda outcome: outcomes.append((drive, outcome)))
-                    bar.step()
+                    step()
     finally:    # also what was written before Ctrl-C, or before the bus was lost
         _show(args, drives, wanted, outcomes)
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED

@@ -5,6 +5,7 @@ A process of the demo, from both sides: started and ended by one, run in the oth
 It ends with the demo, whatever that one dies of: the kernel sends it SIGTERM then.
 """
 
+from contextlib import nullcontext
 import ctypes
 import importlib
 import os
@@ -46,11 +47,7 @@ class Child:
         self.told = False
         command = [sys.executable, '-c', _BEGIN, program, *arguments]
         keyboard = None if shared else subprocess.DEVNULL
-        if log is None:
-            self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
-                                            start_new_session=not shared)
-            return
-        with log.open('wb') as errors:
+        with nullcontext() if log is None else log.open('wb') as errors:
             self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
                                             stderr=errors, start_new_session=not shared)
 

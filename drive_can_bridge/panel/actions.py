@@ -48,47 +48,6 @@ class Done(Outcome):
     file: bytes = b''
 
 
-class Backups:
-    """Runs the commands, a few at once."""
-
-    def __init__(self) -> None:
-        self._running = 0
-
-    async def make(self, drive: DriveSnapshot) -> Done:
-        """Back up the settings of a drive."""
-        return await self._run(drive, lambda name, file: ['backup', name, '-o', file])
-
-    async def compare(self, drive: DriveSnapshot, backup: bytes) -> Done:
-        """Compare a drive with a backup; what differs is no failure."""
-        return await self._run(drive, lambda name, file: ['compare', file, name], backup,
-                               fine=(0, _DIFFERENT))
-
-    async def restore(self, drive: DriveSnapshot, backup: bytes) -> Done:
-        """Write a backup to a drive; what differs has been shown before."""
-        return await self._run(drive, lambda name, file: ['restore', file, name, '--yes'], backup)
-
-    async def _run(self, drive: DriveSnapshot, arguments: Callable[[str, str], list[str]],
-                   backup: bytes | None = None, *, fine: Sequence[int] = (0,)) -> Done:
-        if self._running >= _AT_ONCE:
-            return Done(False, _BUSY)
-        self._running += 1
-        try:
-            with tempfile.TemporaryDirectory(prefix='drive_can_panel_') as directory:
-                file = Path(directory) / f'{drive.name.rpartition("/")[2]}.yaml'
-                if backup is not None:
-                    file.write_bytes(backup)
-                namespace, _, name = drive.name.rpartition('/')
-                command = [*arguments(name, str(file)), '--namespace', namespace or '/']
-                code, text = await _command(command, directory)
-                text = text.replace(f'{directory}/', '').strip()
-                if code in fine:
-                    made = file.read_bytes() if backup is None else b''
-                    return Done(True, text or 'nothing differs', made)
-                return Done(False, _for_a_browser(text) or f'drive_can {command[0]} failed')
-        finally:
-            self._running -= 1
-
-
 def _for_a_browser(text: str) -> str:
     """Say where options can be given that a command speaks of."""
     options = dict.fromkeys(_OPTION.findall(text))
@@ -133,10 +92,10 @@ class Actions:
     :param allow_writes: parameters may be written and backups restored, by an operator.
     """
 
-    def __init__(self, feed: Feed, backups: Backups, *, allow_writes: bool) -> None:
+    def __init__(self, feed: Feed, *, allow_writes: bool) -> None:
         self._feed = feed
-        self._backups = backups
         self._allow_writes = allow_writes
+        self._running = 0
 
     def routes(self) -> list[Route]:
         """Return what the web server offers."""
@@ -194,7 +153,7 @@ class Actions:
 
     async def _backup(self, request: Request) -> Response:
         drive = self._drive(request.query_params.get('drive'))
-        made = await self._backups.make(drive)
+        made = await self._run(drive, lambda name, file: ['backup', name, '-o', file])
         if not made.success:
             return Response(f'{made.text}\n', 503, media_type='text/plain')
         name = drive.name[1:].replace('/', '_')
@@ -205,13 +164,44 @@ class Actions:
     async def _compare(self, request: Request) -> Response:
         _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
-        return _said(await self._backups.compare(drive, await request.body()))
+        return _said(await self._run(drive, lambda name, file: ['compare', file, name],
+                                     await request.body(), fine=(0, _DIFFERENT)))
 
     async def _restore(self, request: Request) -> Response:
         self._writer(request, 'restoring a backup')
         _of_type(request, 'application/yaml')
         drive = self._drive(request.query_params.get('drive'))
-        return _said(await self._backups.restore(drive, await request.body()))
+        # what differs has been shown before
+        return _said(await self._run(
+            drive, lambda name, file: ['restore', file, name, '--yes'], await request.body()))
+
+    async def _run(self, drive: DriveSnapshot, arguments: Callable[[str, str], list[str]],
+                   backup: bytes | None = None, *, fine: Sequence[int] = (0,)) -> Done:
+        """
+        Run a command on a backup, a few at once.
+
+        :param arguments: makes them of the name of the drive and the file of the backup.
+        :param backup: that was sent; None: the command makes it.
+        :param fine: exit codes that are no failure.
+        """
+        if self._running >= _AT_ONCE:
+            return Done(False, _BUSY)
+        self._running += 1
+        try:
+            with tempfile.TemporaryDirectory(prefix='drive_can_panel_') as directory:
+                file = Path(directory) / f'{drive.name.rpartition("/")[2]}.yaml'
+                if backup is not None:
+                    file.write_bytes(backup)
+                namespace, _, name = drive.name.rpartition('/')
+                command = [*arguments(name, str(file)), '--namespace', namespace or '/']
+                code, text = await _command(command, directory)
+                text = text.replace(f'{directory}/', '').strip()
+                if code in fine:
+                    made = file.read_bytes() if backup is None else b''
+                    return Done(True, text or 'nothing differs', made)
+                return Done(False, _for_a_browser(text) or f'drive_can {command[0]} failed')
+        finally:
+            self._running -= 1
 
     def _writer(self, request: Request, what: str) -> None:
         _operator(request, what)

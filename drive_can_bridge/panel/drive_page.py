@@ -21,8 +21,8 @@ from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    box, button, Changing, in_script, Look, marked, place_in_words, series_name, StopButtons,
-    tone_class, Values, words,
+    box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
+    StopButtons, Values, words,
 )
 
 _SPANS = {'30 s': 30, '1 min': 60, '10 min': 600}
@@ -348,7 +348,7 @@ class _Content:
         panels.on_value_change(lambda: self._parameters.look(self._panels.value == 'Parameters'))
 
     def show(self, drive: DriveSnapshot, snapshot: Snapshot) -> None:
-        self._look.set(tone_class(tone_of(drive)))
+        self._look.set(class_of(tone_of(drive)))
         self._stops.show(drive)
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)

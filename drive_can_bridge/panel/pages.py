@@ -33,12 +33,12 @@ from drive_can_bridge.monitor.summary import (
     counts, FEW, in_order, principal, Tone, tone_of, Trouble, troubles,
 )
 from drive_can_bridge.panel.access import Access, Gate, plain_page, ROLE, Role
-from drive_can_bridge.panel.actions import Actions, ALL, Backups
+from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    Banner, box, button, Changing, in_script, level_class, Look, marked, place_in_words,
-    StopButtons, tone_class, Values, words,
+    Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words, StopButtons,
+    Values, words,
 )
 
 _LINES = 100
@@ -67,7 +67,7 @@ class Overview:
         self._drives = Changing(box('drives'), self._make_drives)
         with box('legend dim') as self._legend:
             for tone in reversed(Tone):
-                words(tone.value, f'key {tone_class(tone)}')
+                words(tone.value, f'key {class_of(tone)}')
 
     def show(self, snapshot: Snapshot) -> None:
         """Show everything."""
@@ -103,7 +103,7 @@ class Overview:
             self._filter.set_value('' if self._filter.value == state else state)
         labels = []
         for tone, state in found:
-            with box(f'count {tone_class(tone)}', 'button').props('type=button').on(
+            with box(f'count {class_of(tone)}', 'button').props('type=button').on(
                     'click', partial(choose, state)):
                 labels.append(words('', 'chip state'))
         return labels
@@ -123,7 +123,7 @@ def _make_troubles(found: tuple[Trouble, ...]) -> None:
     if found:
         with box('section'):
             for trouble in found:
-                with box(f'trouble {tone_class(trouble.tone)}'):
+                with box(f'trouble {class_of(trouble.tone)}'):
                     words(f'{trouble.who}{trouble.text}')
 
 
@@ -141,7 +141,7 @@ class _Bus:
 
     def show(self, bus: BusSnapshot) -> None:
         load = 0.0 if math.isnan(bus.load) else min(max(bus.load, 0.0), 100.0)
-        self._look.set(level_class(bus.level))
+        self._look.set(class_of(bus.level))
         self._name.set_text(f'bus {bus.label}: {bus.state}')
         self._rates.set_text('' if math.isnan(bus.load) else
                              f'load {bus.load:.0f} % · {bus.sent + bus.received:.0f} frames/s')
@@ -167,7 +167,7 @@ class _Card:
                 self._stops = StopButtons(drive, role)
 
     def show(self, drive: DriveSnapshot, _: int, *, advice: bool, hidden: bool) -> None:
-        self._look.set(f'{tone_class(tone_of(drive))}{" hidden-now" if hidden else ""}')
+        self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)
         self._advice.set_text(
@@ -192,7 +192,7 @@ class _Row:
             self._stops = StopButtons(drive, role)
 
     def show(self, drive: DriveSnapshot, place: int, *, advice: bool, hidden: bool) -> None:
-        self._look.set(f'{tone_class(tone_of(drive))}{" hidden-now" if hidden else ""}')
+        self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
         if place != self._order:    # no row is made anew: somebody may be about to click
             self._order = place
             self._element.style(f'order: {place}')
@@ -235,9 +235,9 @@ class LogPage:
         for bridge in snapshot.bridges:
             told.append((f'bridge {bridge.name}', 'error' if bridge.silent else '',
                          'silent' if bridge.silent else 'runs'))
-        told += [(f'bus {bus.label}', level_class(bus.level), f'{bus.state}: {bus.message}')
+        told += [(f'bus {bus.label}', class_of(bus.level), f'{bus.state}: {bus.message}')
                  for bus in snapshot.buses]
-        told += [(f'drive {drive.label}', tone_class(tone_of(drive)), drive.advice)
+        told += [(f'drive {drive.label}', class_of(tone_of(drive)), drive.advice)
                  for drive in in_order(snapshot.drives)]
         rows = self._states.of(tuple(name for name, _, _ in told))
         for (look, label), (_, level, text) in zip(rows, told):
@@ -331,8 +331,7 @@ def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
         task.cancel()
 
     web = FastAPI(lifespan=lifespan, openapi_url=None, docs_url=None, redoc_url=None)
-    web.router.routes.extend(
-        Actions(feed, Backups(), allow_writes=setting.allow_writes).routes())
+    web.router.routes.extend(Actions(feed, allow_writes=setting.allow_writes).routes())
     web.mount('/panel', StaticFiles(directory=_STATIC))
     framework.add_exception_handler(404, _nothing)
     _add_pages(feed, setting)
@@ -346,7 +345,8 @@ def _add_pages(feed: Feed, setting: Setting) -> None:
     def shown(request: Request, here: str, make: Callable[[Role], View]) -> Response | None:
         role = request.scope[ROLE]
         if _full(role):
-            return _too_many(request)
+            return _said(request, 503, f'{PAGES_MAX} pages are open already with this token: '
+                                       'close some, or wait a minute')
         page, banner = _frame(here, role, setting)
         with page:
             view = make(role)
@@ -376,11 +376,6 @@ def _full(role: Role) -> bool:
 async def _nothing(request: Request, _: Exception) -> Response:
     """Say that there is no such page; the web framework would make one, for anybody."""
     return _said(request, 404, 'there is nothing at this address')
-
-
-def _too_many(request: Request) -> Response:
-    return _said(request, 503, f'{PAGES_MAX} pages are open already with this token: close some, '
-                               'or wait a minute')
 
 
 def _said(request: Request, status: int, reason: str) -> Response:

@@ -76,14 +76,9 @@ class Changing:
         return self._content
 
 
-def level_class(level: Level) -> str:
-    """Return the class of a level."""
-    return level.name.lower()
-
-
-def tone_class(tone: Tone) -> str:
-    """Return the class of a colour."""
-    return tone.name.lower()
+def class_of(what: Level | Tone) -> str:
+    """Return the class of a level, or of a colour."""
+    return what.name.lower()
 
 
 def button(text: str, classes: str, script: str) -> Element:

@@ -338,6 +338,10 @@ def read_table(text: str, given: Mapping[str, str], sign: str = '',
     return found
 
 
+#: what the cells of a row say, by column; '': nothing
+Cells = Mapping[str, str]
+
+
 class _RowReader:
     """Makes a draft of a row."""
 
@@ -345,7 +349,6 @@ class _RowReader:
         self._table = table
         self._sign = sign
         self._bytes_stay = bytes_stay
-        self._row = Row(0, ())
 
     def draft(self, row: Row) -> Draft:
         """
@@ -353,43 +356,39 @@ class _RowReader:
 
         :raises Unusable: something in it has no meaning.
         """
-        self._row = row
+        cells = {column: self._table.cell(row, column) for column in COLUMNS}
         if row.inside >= max(2, len(self._table.headings) - 1):
             raise Unusable('a cell over several lines holds as much as a row: is a quote missing?')
-        entry: dict[str, Any] = self._address()
+        entry: dict[str, Any] = self._address(cells)
         remarks: list[str] = []
-        title, title_unit = split_unit(self._cell('name'))
-        description = self._cell('description')
-        entry.update(self._scaling(title_unit))
-        limits = self._limits(str(entry.get('unit', '')))
-        entry['type'] = self._type(entry, limits, remarks)
+        title, title_unit = split_unit(cells['name'])
+        texts = (cells['name'], cells['description'])
+        entry.update(self._scaling(cells, title_unit))
+        limits = self._limits(cells, str(entry.get('unit', '')))
+        entry['type'] = self._type(cells['type'], entry, limits, remarks)
         if entry['type'] == 'bool':
             for key in entry.keys() & {'scale', 'offset', 'unit'}:
                 del entry[key]
                 remarks.append(f'{key} left out: a bool has none')
         else:
             entry.update(limits)
-        if self._cell('access'):
-            entry['access'] = access_of(self._cell('access'))
-        if self._cell('storage'):
-            entry['storage'] = word_of('storage', _STORAGE, self._cell('storage'))
-        if self._cell('bits'):
-            entry['bits'] = self._bits()
+        if cells['access']:
+            entry['access'] = access_of(cells['access'])
+        if cells['storage']:
+            entry['storage'] = word_of('storage', _STORAGE, cells['storage'])
+        if cells['bits']:
+            entry['bits'] = _bits(cells['bits'])
         if entry.get('access') == 'ro':
             entry.pop('storage', None)
-        words = one_line('; '.join(dict.fromkeys(filter(None, (self._cell('name'),
-                                                               description)))))
-        return Draft(row.line, '', title or description,
+        words = one_line('; '.join(dict.fromkeys(filter(None, texts))))
+        return Draft(row.line, '', title or cells['description'],
                      {**entry, 'description': words} if words else entry, remarks)
 
-    def _cell(self, column: str) -> str:
-        return self._table.cell(self._row, column)
-
-    def _address(self) -> dict[str, int]:
+    def _address(self, cells: Cells) -> dict[str, int]:
         found: dict[str, int] = {}
         hexadecimal = self._table.hexadecimal
-        number, element = _parts(_PREFIX.sub('', self._cell('number')))
-        index, subindex = _parts(self._cell('index'))
+        number, element = _parts(_PREFIX.sub('', cells['number']))
+        index, subindex = _parts(cells['index'])
         if number:
             found['number'] = integer(number, hexadecimal='number' in hexadecimal)
             if set(element) == {'0'}:    # what a spreadsheet makes of whole numbers
@@ -402,7 +401,7 @@ class _RowReader:
                                'a number, say --columns number=HEADING,index=')
         if not found:
             raise Unusable('has no number')
-        element = ''.join(_parts(self._cell('subindex'))) or element
+        element = ''.join(_parts(cells['subindex'])) or element
         if element:
             found['subindex'] = integer(element, hexadecimal='subindex' in hexadecimal)
         for key, largest in (('number', 65535), ('index', 65535), ('subindex', 255)):
@@ -410,40 +409,40 @@ class _RowReader:
                 raise Unusable(f'{key} {found[key]} is out of range, allowed is 0 to {largest}')
         return found
 
-    def _scaling(self, title_unit: str) -> dict[str, Any]:
+    def _scaling(self, cells: Cells, title_unit: str) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        scale, units = 1.0, [self._cell('unit')]
+        scale, units = 1.0, [cells['unit']]
         if re.match(r'(?:[0-9]|[xX×*] ?[0-9])', units[0]) and not known_unit(units[0]):
             scale, units[0] = factor(units[0], self._sign)     # "0,1 Hz" in the column of units
-        if self._cell('scale'):
-            step = factor(self._cell('scale'), self._sign)
+        if cells['scale']:
+            step = factor(cells['scale'], self._sign)
             scale *= step.number
             units.append(step.unit)
-        if self._cell('divisor'):
-            scale /= factor(self._cell('divisor'), self._sign).number
-        if self._cell('decimals'):
-            scale *= 10.0 ** -min(integer(self._cell('decimals')), 99)
+        if cells['divisor']:
+            scale /= factor(cells['divisor'], self._sign).number
+        if cells['decimals']:
+            scale *= 10.0 ** -min(integer(cells['decimals']), 99)
         if rounded(scale) != 1.0:
             found['scale'] = rounded(scale)
-        if self._cell('offset'):
-            offset = measure(self._cell('offset'), self._sign).number
+        if cells['offset']:
+            offset = measure(cells['offset'], self._sign).number
             found.update({'offset': offset} if offset else {})
         units.append(title_unit)
         if 'unit' not in self._table.columns:
             units += [split_unit(self._table.heading(column))[1] for column in (
                 'scale', 'minimum', 'maximum', 'range')]
-        if self._cell('range'):
-            units.append(interval(self._cell('range'), self._sign)[1].unit)
+        if cells['range']:
+            units.append(interval(cells['range'], self._sign)[1].unit)
         own = next(filter(None, map(unit, units)), '')
         return {**found, 'unit': own} if own else found
 
-    def _limits(self, own_unit: str) -> dict[str, float]:
+    def _limits(self, cells: Cells, own_unit: str) -> dict[str, float]:
         found: dict[str, Measure] = {}
-        if self._cell('range'):
-            found['minimum'], found['maximum'] = interval(self._cell('range'), self._sign)
+        if cells['range']:
+            found['minimum'], found['maximum'] = interval(cells['range'], self._sign)
         for column in ('minimum', 'maximum'):
-            if self._cell(column):
-                found[column] = measure(self._cell(column), self._sign)
+            if cells[column]:
+                found[column] = measure(cells[column], self._sign)
         for key, limit in found.items():
             if limit.unit and unit(limit.unit) != own_unit:
                 raise Unusable(f"{key} '{limit.number:g} {limit.unit}' is not in "
@@ -454,11 +453,11 @@ class _RowReader:
                            f'{limits["maximum"]:g}')
         return limits
 
-    def _type(self, entry: Mapping[str, Any], limits: dict[str, float],
+    def _type(self, told: str, entry: Mapping[str, Any], limits: dict[str, float],
               remarks: list[str]) -> str:
         scale, offset = entry.get('scale', 1.0), entry.get('offset', 0.0)
-        if self._cell('type'):
-            kind = word_of('type', _TYPES, self._cell('type'))
+        if told:
+            kind = word_of('type', _TYPES, told)
             if kind == 'uint8' and not self._bytes_stay:    # eight bits fit sixteen
                 limits.setdefault('maximum', rounded(255 * scale + offset))
                 return 'uint16'
@@ -473,14 +472,14 @@ class _RowReader:
                 return str(fits.value)
         raise Unusable('the limits fit no type of 16 or 32 bits')
 
-    def _bits(self) -> dict[str, int]:
-        text = self._cell('bits')
-        found: dict[str, int] = {}
-        for position, title in _BIT.findall(text):
-            found.setdefault(name_of(title, position), int(position))
-        if not found:
-            raise Unusable(f"bits '{text}' are not of the form 0=ready, 3=fault")
-        return found
+
+def _bits(text: str) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for position, title in _BIT.findall(text):
+        found.setdefault(name_of(title, position), int(position))
+    if not found:
+        raise Unusable(f"bits '{text}' are not of the form 0=ready, 3=fault")
+    return found
 
 
 def _parts(text: str) -> tuple[str, str]:

@@ -14,8 +14,10 @@ of failures: one that comes soon behind it is written when a trace of this bus m
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+import heapq
 import itertools
 import math
+from operator import attrgetter
 import os
 from pathlib import Path
 import re
@@ -27,8 +29,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.record import DATA, Record, RecordKind
-from drive_can_bridge.trace.candump import format_record
-from drive_can_bridge.trace.files import labels
+from drive_can_bridge.trace.files import format_record, labels
 
 #: most that a ring may take
 MEMORY_MAX = 64 * 2**20
@@ -106,28 +107,13 @@ class Ring:
         with self._lock:
             blocks = [memoryview(block) for _, block in self._full]
             blocks.append(memoryview(self._block)[:self._place])
-        return _entries(blocks, self._errors.copy(), since, channel, offset)
-
-
-def _entries(blocks: Iterable[memoryview], errors: deque[tuple[float, int, bytes]], since: float,
-             channel: str, offset: float) -> Iterator[Record]:
-    for block in blocks:
-        for at, identifier, flags, data in _ENTRY.iter_unpack(block):
-            if at < since:
-                continue
-            while errors and errors[0][0] <= at:
-                yield from _error(errors.popleft(), since, channel, offset)
-            yield Record(at + offset, channel, identifier, data[:flags & _LENGTH],
+        errors = [Record(at + offset, channel, classes, data, True, RecordKind.ERROR)
+                  for at, classes, data in self._errors.copy() if at >= since]
+        frames = (Record(at + offset, channel, identifier, data[:flags & _LENGTH],
                          bool(flags & _EXTENDED), DATA, bool(flags & _SENT))
-    for error in errors:
-        yield from _error(error, since, channel, offset)
-
-
-def _error(error: tuple[float, int, bytes], since: float, channel: str, offset: float,
-           ) -> Iterator[Record]:
-    at, classes, data = error
-    if at >= since:
-        yield Record(at + offset, channel, classes, data, True, RecordKind.ERROR)
+                  for block in blocks for at, identifier, flags, data in _ENTRY.iter_unpack(block)
+                  if at >= since)
+        return heapq.merge(errors, frames, key=attrgetter('time'))
 
 
 #: s after an event that belong into its trace

@@ -117,10 +117,9 @@ class Some(Asked):
 def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
         names: str, failing: dict[str, str], text: str) -> None:
     from drive_can_bridge.panel.actions import Actions
-    from drive_can_bridge.panel.actions import Backups
     feed = feed_of(Some(**{name: Outcome(False, each) for name, each in failing.items()}))
     feed.snapshot = Snapshot(drives=tuple(map(seen, names)))
-    actions = Actions(feed, Backups(), allow_writes=False)
+    actions = Actions(feed, allow_writes=False)
     said = json.loads(asyncio.run(actions._stop_all()).body)
     assert said == {'success': bool(names) and not failing, 'text': text,
                     'failed': text.splitlines()[:len(failing)]}

@@ -13,9 +13,9 @@ import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.record import Record, RecordKind
-from drive_can_bridge.trace.candump import format_record, parse_line
 from drive_can_bridge.trace.files import (
-    Channels, check_writable, labels, read_records, TraceWriter, UnknownFormat, WRITABLE,
+    Channels, check_writable, format_record, labels, parse_line, read_records, TraceWriter,
+    UnknownFormat, WRITABLE,
 )
 
 DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
