@@ -207,6 +207,11 @@ class ControlMachine:
         return self.pending and not self.pulsing and self._table.enabled is not None
 
     @property
+    def holds(self) -> Sentence:
+        """That the drive stands in a quick stop that does not end by itself; '' if not."""
+        return self._rules.holds
+
+    @property
     def disregard(self) -> Sentence:
         """How the drive goes on running although it shall not, and what to do; '' if not."""
         return self._disregard.text

@@ -261,7 +261,7 @@ class DriveReporter:
         if obeyed is not None and obeyed.disregard:
             return DiagnosticStatus.ERROR, together((obeyed.disregard, *told))
         if obeyed is not None and obeyed.stopping and obeyed.unconfirmed:
-            told.append(sentences.still_running(obeyed.state))
+            told.append(obeyed.holds or sentences.still_running(obeyed.state))
         if state is DriveState.DISABLED:
             advice = how_to_enable(session, drive.node)
             if now - session.setpoints.ignored_at < COMMANDS_RECENT:

@@ -70,6 +70,17 @@ def test_a_drive_that_still_runs_is_no_disabled_one(
     assert status['message'].startswith('told to stop, and still ready; disabled: call ')
 
 
+def test_a_drive_that_stands_in_a_quick_stop_is_not_said_to_run(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    monkeypatch.setattr(ControlMachine, 'unconfirmed', True)
+    monkeypatch.setattr(ControlMachine, 'holds', sentences.quick_stop_holds('quick stop active'))
+    status = client.diagnostics(DRIVE, lambda drive: drive['code'] == 'quick_stop_holds')
+    assert (status['level'], status['state']) == ('WARN', 'disabled')
+    assert status['message'].startswith('quick stop active, holds; disabled: call ')
+
+
 def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(
         lift=LIFT, conveyor={**LIFT, 'station': 3, 'profile': 'datamodel_example',

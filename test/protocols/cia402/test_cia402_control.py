@@ -181,6 +181,7 @@ class TestQuickStop:
         axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
         axis.live(0.15)
         assert axis.talk.control_outcomes() == []
+        assert axis.session.control.holds == ''
         if by_bit:
             axis.drive.objects[0x6041, 0] = b'\x07\x06'
         else:
@@ -190,6 +191,7 @@ class TestQuickStop:
             ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
         axis.live(5.0)
         assert axis.words() == ['0200']
+        assert axis.session.control.holds == says('quick_stop_holds', state='quick stop active')
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
 
