@@ -35,13 +35,13 @@ class Lines:
     """A log."""
 
     def __init__(self) -> None:
-        self.lines: list[str] = []
+        self.lines: list[tuple[str, str]] = []
 
     def speaker(self, name: str) -> Any:
-        return SimpleNamespace(warning=lambda text: self.lines.append(f'{name}: {text}'))
+        return SimpleNamespace(warning=lambda text: self.lines.append((name, text)))
 
     def warning(self, text: str) -> None:
-        self.lines.append(text)
+        self.lines.append(('', text))
 
 
 def test_one_that_was_never_seen_is_told_what_to_correct() -> None:
@@ -80,17 +80,17 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
     lost = drive('lost', ever_online=True)
     other = drive('other', state=DriveState.MAPPING_DIFFERS)    # it answers
     Attendance(log, [*seen, drive('a'), lost, other, drive('b')], clock()).look()  # type: ignore[arg-type]
-    assert [line.split(': ')[0] for line in log.lines] == ['a', 'b', '12 of 16 drives online; not '
-                                                           'seen']
-    assert log.lines[2].endswith('not seen: a, b')
-    assert 'not seen since start: ' in log.lines[0]
+    assert log.lines == [
+        ('a', says('never_seen')), ('b', says('never_seen')),
+        ('', says('drives_missing', online=12, drives=16, missing=['a', 'b']))]
 
 
 def test_on_a_bus_that_is_down_they_are_told_too() -> None:
     log = Lines()
     Attendance(log, [drive(bus_state='down')], clock()).look()  # type: ignore[arg-type, list-item]
-    assert log.lines == ['lift: not seen since start: bus main is down',
-                         '0 of 1 drive online; not seen: lift']
+    assert log.lines == [
+        ('lift', says('not_seen', why=says('bus_of_drive_down', bus='main'))),
+        ('', says('drives_missing', online=0, drives=1, missing=['lift']))]
 
 
 def test_where_all_were_seen_nothing_is_said() -> None:
