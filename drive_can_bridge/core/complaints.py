@@ -64,6 +64,10 @@ WORDS = {
     'is_profile':
         'a profile, allowed is NODE_NAME: {{{entry}: …}}; drive_can profile check looks at '
         'profiles',
+    'nothing_configured':
+        'node {node} got neither buses nor drives: give a parameter file with --ros-args '
+        '--params-file FILE',
+    'file_is_for': '{file} is for {nodes}',
     'no_mapping': 'no mapping, allowed is NODE_NAME: {{{entry}: …}}',
     'no_mapping_refused': 'no mapping (rcl refuses the file), {hint}',
     'no_parameters': 'no mapping, allowed are parameters',

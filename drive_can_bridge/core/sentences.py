@@ -1047,6 +1047,19 @@ def one_half(of: str, writable: bool) -> str:
     return f'one half of {of}: set that' if writable else f'read-only: one half of {of}'
 
 
+# -- the log, and traces --------------------------------------------------------------------------
+
+
+@sentence
+def nothing_recorded() -> str:
+    return 'nothing is recorded: set trace_seconds of a bus'
+
+
+@sentence
+def log_too_fast(lines: int) -> str:
+    return f'{lines} lines of the log left out: they came faster than they could be written'
+
+
 # -- diagnostics: how a bus is --------------------------------------------------------------------
 
 
@@ -1119,6 +1132,16 @@ def bus_of_drive_opening(bus: str) -> str:
 def never_seen(why: str) -> str:
     return (f'not seen since start: {why}; check its power, cable, station number and bit '
             f'rate')
+
+
+@sentence
+def not_seen(why: str) -> str:
+    return f'not seen since start: {why}'
+
+
+@sentence
+def drives_missing(online: int, drives: int, missing: Collection[str]) -> str:
+    return f'{online} of {_counted(drives, "drive")} online; not seen: {", ".join(missing)}'
 
 
 @sentence

@@ -26,6 +26,7 @@ from drive_can_bridge.core.configuration import (
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
+from drive_can_bridge.core.sentences import nothing_recorded
 from drive_can_bridge.core.words import counted
 from drive_can_bridge.exchange.exchange import BusExchange, stop_all
 from drive_can_bridge.exchange.one_master import InUse, Ownership
@@ -42,7 +43,6 @@ from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.failures import with_outlook
 
-NOT_RECORDING = 'nothing is recorded: set trace_seconds of a bus'
 #: of several reasons at once the most telling one names the trace
 _RANKS = {DriveState.OFFLINE: 1, DriveState.FAULT: 2, DriveState.MAPPING_DIFFERS: 2}
 _BUS_LOST_RANK = 3
@@ -170,7 +170,7 @@ class FlightWatch:
     async def _saved(self, response: Any) -> Any:
         buses = self._recorder.buses
         if not buses:
-            response.success, response.message = False, NOT_RECORDING
+            response.success, response.message = False, nothing_recorded()
             return response
         paths: list[str] = []
         refusals: list[str] = []

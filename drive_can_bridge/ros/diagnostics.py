@@ -23,7 +23,7 @@ from drive_can_bridge.core.sentences import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import counted, value_text
+from drive_can_bridge.core.words import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.commands import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import DriveNode
@@ -36,7 +36,6 @@ from drive_can_bridge.transport.failures import with_outlook
 
 #: s after the activation that a drive may take to be seen
 GRACE = 5.0
-_NEVER = 'not seen since start: '
 #: what a session says while it looks for a drive: of what to correct at a first start, which this
 #: one has behind it
 _FIRST_START = frozenset((
@@ -102,11 +101,12 @@ class Attendance:
             return
         for drive in missing:
             with drive.exchange.lock:
-                text = absence(drive)
-            self._log.speaker(drive.name).warning(f'{_NEVER}{text.removeprefix(_NEVER)}')
+                told = absence(drive)
+            self._log.speaker(drive.name).warning(
+                told if told.code == 'never_seen' else sentences.not_seen(told))
         online = sum(drive.session.online for drive in self._drives)
-        self._log.warning(f'{online} of {counted(len(self._drives), "drive", "drives")} online; '
-                          f'not seen: {", ".join(drive.name for drive in missing)}')
+        self._log.warning(sentences.drives_missing(
+            online, len(self._drives), [drive.name for drive in missing]))
 
 
 def _never_seen(drive: DriveNode) -> bool:

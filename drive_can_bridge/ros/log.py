@@ -32,6 +32,7 @@ import threading
 from typing import Any
 
 from drive_can_bridge.clock import Clock, Mailbox
+from drive_can_bridge.core.sentences import log_too_fast
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.standard_outputs import MOMENT, Taking
 
@@ -373,8 +374,7 @@ class Log:
             self._limit.sum_up()
             if self._dropped and (not self._lines or line is _END):
                 dropped, self._dropped = self._dropped, 0
-                self._write(Level.WARNING, f'{dropped} lines of the log left out: they came '
-                                           f'faster than they could be written')
+                self._write(Level.WARNING, log_too_fast(dropped))
             if line is _END:
                 return
 

@@ -161,16 +161,16 @@ def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
 
 def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
     from drive_can_bridge.configuration.parameter_file import section_names
+    from drive_can_bridge.core.complaints import says
 
-    text = (f'node {bridge.get_fully_qualified_name()} got neither buses nor drives: give a '
-            f'parameter file with --ros-args --params-file FILE')
+    told = [says('nothing_configured', node=bridge.get_fully_qualified_name())]
     for path in _parameter_files(arguments):
         try:
             names = section_names(Path(path))
         except OSError:
             continue
-        text += f'; {path} is for {", ".join(names) or "no node"}'
-    return text
+        told.append(says('file_is_for', file=path, nodes=', '.join(names) or 'no node'))
+    return '; '.join(told)
 
 
 def _parameter_files(arguments: Sequence[str]) -> list[str]:

@@ -22,10 +22,13 @@ from std_msgs.msg import Bool, Float64, Int64
 from std_srvs.srv import SetBool, Trigger
 from waiting import clock
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.protocols.families import FAMILIES as TABLE
 
 DRIVE = '/conveyor'
 STATUS = 'drive_can_bridge: drive conveyor'
+HOW_TO_ENABLE = 'call ~/enable (drive_can enable conveyor)'
+REFUSED_WHOLE = 'nothing was written'
 JOINT = {'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint',
          'gear_ratio': 2.0}
 #: rad/s of the joint for one rpm of the motor
@@ -225,13 +228,12 @@ def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'disabled'
                                 and drive['level'] == 'OK')
     assert set(status) == DRIVE_KEYS | facts.diagnostics | {'level', 'message'}
-    assert (status['level'], status['message']) == (
-        'OK', 'disabled: call ~/enable (drive_can enable conveyor)')
+    assert (status['level'], status['message']) == ('OK', sentences.disabled(HOW_TO_ENABLE))
     client.listen()
     command(client, speed_setpoint=0.0)
     client.wait_logged('disabled, call ~/enable', WARN)
     client.diagnostics(STATUS, lambda drive: drive['level'] == 'WARN'
-                       and drive['message'].startswith('disabled: call ~/enable'))
+                       and drive['code'] == 'disabled_and_commanded')
     assert enable(client) == (True, facts.states[0])
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'not armed')
     assert status['level'] == 'WARN' and status['command_age_s'] == 'nan'
@@ -240,7 +242,7 @@ def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     command(client, speed_setpoint=0.0, mode=0, brake=False)
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'online'
                                 and drive['level'] == 'OK')
-    assert status['message'] == 'online'
+    assert status['code'] == 'online'
     assert float(status['latency_mean_ms']) > 0.0 and float(status['command_age_s']) < 60.0
     later = after_exchanges(client, status)
     while later['missed_exchanges'] != status['missed_exchanges']:  # an answer that came too late
@@ -253,12 +255,11 @@ def test_diagnostics(start: Start, client: Client, facts: Facts) -> None:
     client.diagnostics(STATUS, lambda drive: drive['state'] != 'fault')
     drive.fault('off')
     status = client.diagnostics(STATUS, lambda drive: drive['state'] == 'offline')
-    assert status['level'] == 'ERROR' and status['message'].startswith('silent since ')
-    assert 'check' in status['message'] and 'power' in status['message']
+    assert (status['level'], status['code']) == ('ERROR', 'silent_since')
     drive.fault('ok')
     one.online()
     assert client.transition(4)
-    status = client.diagnostics(STATUS, lambda drive: 'inactive' in drive['message'])
+    status = client.diagnostics(STATUS, lambda drive: drive['code'] == 'activate_bridge')
     assert (status['state'], status['level']) == ('offline', 'STALE')
 
 
@@ -348,7 +349,7 @@ def test_control(start: Start, client: Client, facts: Facts) -> None:
 
     drive.fault('trip')
     client.diagnostics(STATUS, lambda drive: drive['state'] == 'fault')
-    assert enable(client) == (False, 'fault: reset it first')
+    assert enable(client) == (False, sentences.reset_first())
     success, message = trigger(client, 'reset_fault')
     assert success and message not in ('fault', enabled)
     settle(one)
@@ -359,7 +360,7 @@ def test_control(start: Start, client: Client, facts: Facts) -> None:
     wait_until(lambda: not one.node.drives['conveyor'].session.online)
     for answer in (enable(client), enable(client, False), trigger(client, 'quick_stop'),
                    trigger(client, 'reset_fault')):
-        assert answer == (False, 'drive offline')
+        assert answer == (False, sentences.drive_offline())
     drive.fault('ok')
     one.online()
     wait_until(lambda: topic.values[-1] is False)
@@ -390,7 +391,8 @@ def test_list_describe_and_types(shared: Bridge, client: Client, facts: Facts) -
     assert [entry.read_only for entry in described] == [
         False, True, False, False, True, False, False]
     speed, counts, flag, order, actual_ramp, nothing, raw = described
-    assert speed.description.startswith('Speed reference (') and 'unit rpm' in speed.description
+    assert speed.description.split(' (')[0] == 'Speed reference'
+    assert 'unit rpm' in speed.description
     [limits] = speed.floating_point_range
     assert (limits.from_value, limits.to_value, limits.step) == (-3000.0, 3000.0, 0.1)
     [limits] = counts.integer_range
@@ -401,7 +403,8 @@ def test_list_describe_and_types(shared: Bridge, client: Client, facts: Facts) -
     [limits] = actual_ramp.floating_point_range
     assert (limits.from_value, limits.to_value, limits.step) == (-10.0, 32757.5, 0.5)
     assert not nothing.description
-    assert raw.description.startswith(f"raw access ({facts.address_of('gain')}")
+    assert raw.description.split(' (')[0] == 'raw access'
+    assert raw.description.split(' (')[1].startswith(facts.address_of('gain'))
 
 
 def test_get(shared: Bridge, client: Client, facts: Facts) -> None:
@@ -466,7 +469,7 @@ def test_set(shared: Bridge, client: Client, facts: Facts) -> None:
     assert client.set(DRIVE, **{keyword(name): value for name, (value, _) in refused.items()}) == [
         (False, reason) for _, reason in refused.values()]
     if facts.status_mapped:
-        assert client.set(DRIVE, control_word=1) == [(False, 'use ~/enable')]
+        assert client.set(DRIVE, control_word=1) == [(False, sentences.use_enable())]
     absent, reason = facts.absent
     assert client.set(DRIVE, **{keyword(absent): 1}) == [(False, reason)]
     if facts.stuck:
@@ -489,9 +492,10 @@ def test_set_atomically(shared: Bridge, client: Client, facts: Facts) -> None:
     wait_until(lambda: events == [facts.atomic])
     before = {name: drive.value(name) for name in facts.scattered}
     success, reason = client.set_atomically(DRIVE, **facts.scattered)
-    assert not success and 'nothing was written' in reason and facts.scattered_reason in reason
+    assert not success and REFUSED_WHOLE in reason and facts.scattered_reason in reason
     success, reason = client.set_atomically(DRIVE, gain=5, actual_ramp=1.0)
-    assert (success, reason) == (False, 'actual_ramp: read-only; nothing was written')
+    assert (success, reason) == (
+        False, f'actual_ramp: {sentences.read_only()}; {REFUSED_WHOLE}')
     assert {name: drive.value(name) for name in facts.scattered} == before
     assert len(events) == 1
 
@@ -504,14 +508,15 @@ def test_a_drive_that_is_not_there(start: Start, client: Client, facts: Facts) -
     client.listen()
     # the first is tried, the others fail at once
     assert client.get(DRIVE, 'gain', 'flag', 'ramp_time') == [None, None, None]
-    assert client.set(DRIVE, gain=1, flag=True) == [(False, 'no answer; drive offline')] * 2
+    assert client.set(DRIVE, gain=1, flag=True) == [
+        (False, sentences.no_answer_offline())] * 2
     client.wait_logged(
         f"conveyor: read gain ({facts.address_of('gain')}): no answer; drive offline", WARN)
     assert not client.set_atomically(DRIVE, **facts.atomic)[0]
     assert client.transition(4)
     assert client.get(DRIVE, 'gain') == [None]
-    assert client.set(DRIVE, gain=1) == [(False, 'bridge inactive')]
-    assert enable(client) == (False, 'bridge inactive')
+    assert client.set(DRIVE, gain=1) == [(False, sentences.bridge_inactive())]
+    assert enable(client) == (False, sentences.bridge_inactive())
     one.played['conveyor'].fault('ok')
     assert client.transition(3)
     one.online()

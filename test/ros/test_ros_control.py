@@ -14,6 +14,9 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 
 DRIVE = 'drive_can_bridge: drive lift'
+FAULT = '7 overcurrent'
+#: why a drive that falls silent is offline
+SILENT = sentences.silent_for_cycles('no cyclic response', HASTY['missed_limit'])
 #: the control word has a slot, or is written on change
 WITH_SLOT = LIFT
 BY_HAND = {**LIFT, 'cyclic_request': ['speed_setpoint']}
@@ -53,11 +56,11 @@ def test_a_drive_that_runs_on_under_disable_is_an_error(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
-    monkeypatch.setattr(
-        ControlMachine, 'disregard', sentences.uncoded('still enabled: stop it by other means'))
-    status = client.diagnostics(DRIVE, lambda drive: 'still enabled' in drive['message'])
+    disregards = sentences.disregards('enabled', sentences.status_word(2), 'disable', 0)
+    monkeypatch.setattr(ControlMachine, 'disregard', disregards)
+    status = client.diagnostics(DRIVE, lambda drive: drive['code'] == 'disregards')
     assert status['level'] == 'ERROR'
-    assert status['message'].startswith('still enabled: stop it by other means')
+    assert status['message'].startswith(disregards)
 
 
 def test_a_drive_that_still_runs_is_no_disabled_one(
@@ -65,9 +68,9 @@ def test_a_drive_that_still_runs_is_no_disabled_one(
     one = bridge(parameters(lift=LIFT))
     one.online()
     monkeypatch.setattr(ControlMachine, 'unconfirmed', True)
-    status = client.diagnostics(DRIVE, lambda drive: 'still' in drive['message'])
+    status = client.diagnostics(DRIVE, lambda drive: drive['code'] == 'still_running')
     assert (status['level'], status['state']) == ('WARN', 'disabled')
-    assert status['message'].startswith('told to stop, and still ready; disabled: call ')
+    assert status['message'].startswith(f'{sentences.still_running("ready")}; disabled: ')
 
 
 def test_a_drive_that_stands_in_a_quick_stop_is_not_said_to_run(
@@ -75,10 +78,11 @@ def test_a_drive_that_stands_in_a_quick_stop_is_not_said_to_run(
     one = bridge(parameters(lift=LIFT))
     one.online()
     monkeypatch.setattr(ControlMachine, 'unconfirmed', True)
-    monkeypatch.setattr(ControlMachine, 'holds', sentences.quick_stop_holds('quick stop active'))
+    holds = sentences.quick_stop_holds('quick stop active')
+    monkeypatch.setattr(ControlMachine, 'holds', holds)
     status = client.diagnostics(DRIVE, lambda drive: drive['code'] == 'quick_stop_holds')
     assert (status['level'], status['state']) == ('WARN', 'disabled')
-    assert status['message'].startswith('quick stop active, holds; disabled: call ')
+    assert status['message'].startswith(f'{holds}; disabled: ')
 
 
 def test_the_control_word_has_no_topic(bridge: StartBridge, client: Client) -> None:
@@ -102,12 +106,12 @@ def test_fault_and_reset(bridge: StartBridge, client: Client, lift: dict[str, An
     assert trigger(client, 'reset_fault')[0]  # without a fault it succeeds
     assert enable(client)[0]
     drive.fault('trip')
-    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault')
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault'
+                                and drive['fault_code'] == FAULT)
     assert status['level'] == 'ERROR'
     assert '~/reset_fault' in status['message'] and '~/enable' in status['message']
     wait_until(lambda: drive.value('control_word') == 0)
-    success, message = enable(client)
-    assert not success and message.startswith('fault') and message.endswith('reset it first')
+    assert enable(client) == (False, sentences.reset_first(FAULT))
     assert trigger(client, 'quick_stop')[0]
     success, message = trigger(client, 'reset_fault')
     assert success, message
@@ -123,8 +127,9 @@ def test_a_fault_that_lasts_cannot_be_reset(bridge: StartBridge, client: Client)
     one.online()
     one.played['lift'].fault('trip=3600')
     client.diagnostics(DRIVE, lambda drive: drive['state'] == 'fault')
-    success, message = trigger(client, 'reset_fault')
-    assert not success and 'fault still present' in message
+    raw = int(one.played['lift'].value('status_word'))
+    assert trigger(client, 'reset_fault') == (
+        False, sentences.fault_present(0.5, sentences.status_word(raw)))
 
 
 def test_a_fault_says_which_it_is(bridge: StartBridge, client: Client) -> None:
@@ -132,12 +137,11 @@ def test_a_fault_says_which_it_is(bridge: StartBridge, client: Client) -> None:
     one.online()
     client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
     one.played['lift'].fault('trip')
-    status = client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '7 overcurrent')
-    assert status['level'] == 'ERROR'
-    assert status['message'].startswith('fault 7 overcurrent: remove its cause, then call ')
+    status = client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == FAULT)
+    assert (status['level'], status['code']) == ('ERROR', 'fault')
+    assert status['message'].startswith(f'fault {FAULT}: ')
     client.wait_logged('lift: fault 7 overcurrent: remove its cause')
-    success, message = enable(client)
-    assert not success and message.startswith('fault 7 overcurrent: remove its cause, then ')
+    assert enable(client) == (False, sentences.reset_first(FAULT))
     one.played['lift'].fault('ok')
     assert trigger(client, 'reset_fault')[0]
     client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
@@ -165,7 +169,8 @@ def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) 
     client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
     client.publish('/conveyor/command/speed_setpoint', Float64(data=300.0))
     wait_until(lambda: float(one.played['conveyor'].value('speed_setpoint')) == 300.0)
-    assert trigger(client, 'quick_stop', '/conveyor') == (True, 'neutral; it has no control word')
+    assert trigger(client, 'quick_stop', '/conveyor') == (
+        True, sentences.neutral_without_control())
     assert one.played['conveyor'].value('speed_setpoint') == 0.0
     names = {name for name, _ in client.node.get_service_names_and_types()}
     assert not {'/conveyor/enable', '/conveyor/reset_fault'} & names
@@ -182,8 +187,7 @@ def test_enable_that_gets_stuck_names_the_state(bridge: StartBridge, client: Cli
     one = bridge(parameters(lift={**LIFT, 'control_timeout': 0.5}))
     one.online()
     one.played['lift'].set_value('status_word', 0)
-    success, message = enable(client)
-    assert not success and 'stuck in state' in message and '0.5 s' in message
+    assert enable(client) == (False, sentences.stuck(0.5, 'not ready', sentences.status_word(0)))
     wait_until(lambda: one.played['lift'].value('control_word') == 0)  # with the next cycle
 
 
@@ -211,7 +215,8 @@ def test_going_offline_answers_what_is_under_way(bridge: StartBridge, client: Cl
     wait_until(lambda: one.node.drives['lift'].session.control.pending)
     one.played['lift'].fault('off')
     wait_until(future.done)
-    assert not future.result().success and 'no cyclic response' in future.result().message
+    assert (future.result().success, future.result().message) == (
+        False, SILENT)
 
 
 def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:

@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, parameters, StartBridge
-from clients import Client, ERROR, wait_until
+from clients import Client, ERROR, facts, wait_until
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from saying import says
 from std_msgs.msg import Float64
 from waiting import clock
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.core.sentences import answer_late, NOTHING
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
-from drive_can_bridge.transport.end_point import Counts
+from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
+from drive_can_bridge.transport.failures import with_outlook
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
+OTHER = 'drive_can_bridge: drive other'
+SETPOINT = '/conveyor/command/speed_setpoint'
 BUS_KEYS = {
     'state', 'code', 'load_percent', 'frames_sent', 'frames_received', 'frames_rejected',
     'error_frames',
@@ -35,8 +39,7 @@ def test_names_and_keys(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor=CONVEYOR, other={**CONVEYOR, 'station': 2}))
     one.online()
     message = client.topic('/diagnostics', DiagnosticArray).wait()
-    assert [status.name for status in message.status] == [
-        BUS, DRIVE, 'drive_can_bridge: drive other']
+    assert [status.name for status in message.status] == [BUS, DRIVE, OTHER]
     assert message.header.stamp.sec > 0
     for status, keys in zip(message.status, (BUS_KEYS, DRIVE_KEYS, DRIVE_KEYS)):
         assert keys == {pair.key for pair in status.values}
@@ -48,8 +51,8 @@ def test_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
     one.online()
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
     assert status['level'] == 'WARN' and status['command_age_s'] == 'nan'
-    assert 'publish 0 to /conveyor/command/speed_setpoint' in status['message']
-    client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
+    assert sentences.not_armed([f'0 to {SETPOINT}']) in status['message']
+    client.publish(SETPOINT, Float64(data=0.0))
     # a warning that an answer came too late goes by; busy machines have some
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'online'
                                 and drive['level'] == 'OK')
@@ -67,7 +70,8 @@ def test_a_drive_that_works(bridge: StartBridge, client: Client) -> None:
 def test_rearm_immediate_takes_any_command(bridge: StartBridge, client: Client) -> None:
     bridge(parameters(conveyor={**CONVEYOR, 'rearm': 'immediate'}))
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
-    assert 'publish a command to /conveyor/command/speed_setpoint' in status['message']
+    wanted = sentences.not_armed([f'a command to {SETPOINT}'])
+    assert wanted in status['message']
 
 
 def test_offline_says_where_to_look(bridge: StartBridge, client: Client) -> None:
@@ -76,12 +80,12 @@ def test_offline_says_where_to_look(bridge: StartBridge, client: Client) -> None
     assert client.transition(1) and client.transition(3)
     status = client.diagnostics(DRIVE, lambda drive: 'no answer' in drive['message'])
     assert (status['state'], status['level']) == ('offline', 'STALE')
-    assert 'not seen since start' in status['message'] and 'station' in status['message']
+    assert status['code'] == 'never_seen'
     one.played['conveyor'].fault('ok')
     client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
     one.played['conveyor'].fault('off')
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'offline')
-    assert status['level'] == 'ERROR' and 'check' in status['message']
+    assert (status['level'], status['code']) == ('ERROR', 'silent_since')
     assert int(status['missed_exchanges']) >= 5
 
 
@@ -90,11 +94,10 @@ def test_a_drive_slower_than_its_period_is_told(bridge: StartBridge, client: Cli
         **CONVEYOR, 'protocol': 'datamodel_standard', 'period': 0.1, 'parameter_timeout': 0.5}))
     one.online()
     one.played['conveyor'].fault('late=0.2')
-    status = client.diagnostics(DRIVE, lambda drive: 'an exchange takes' in drive['message'])
+    status = client.diagnostics(DRIVE, lambda drive: drive['code'] == 'slow_exchange')
     assert status['level'] == 'WARN'
-    assert 'the period is 100 ms: the drive is slow' in status['message']
     one.played['conveyor'].fault('ok')
-    client.diagnostics(DRIVE, lambda drive: 'an exchange takes' not in drive['message'])
+    client.diagnostics(DRIVE, lambda drive: drive['code'] == 'not_armed')
 
 
 def reporters(one: Bridge) -> tuple[BusReporter, DriveReporter]:
@@ -102,6 +105,12 @@ def reporters(one: Bridge) -> tuple[BusReporter, DriveReporter]:
     diagnostics = one.node.diagnostics
     assert diagnostics is not None
     return diagnostics.buses[0], diagnostics.drives[0]
+
+
+def told(reporter: DriveReporter) -> list[sentences.Sentence]:
+    """Return all that a report says."""
+    message = reporter.report(clock().now()).message
+    return list(message.fields.get('parts', [message]))
 
 
 def by_hand(**keys: Any) -> dict[str, Any]:
@@ -116,14 +125,14 @@ def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
     _, reporter = reporters(one)
     statistics = one.node.drives['conveyor'].session.statistics
 
-    def told_of_a_long_round() -> str:
+    def told_of_a_long_round() -> list[sentences.Sentence]:
         with one.node.exchanges['main'].lock:
             statistics.latency.add(100.0)
-        return reporter.report(clock().now()).message
-    assert 'an exchange takes' in told_of_a_long_round()
+        return told(reporter)
+    assert says('slow_exchange', period=0.1) in told_of_a_long_round()
     assert client.get('/conveyor', 'ramp_time') != [None]
-    assert 'an exchange takes' not in told_of_a_long_round()
-    assert 'an exchange takes' in told_of_a_long_round()
+    assert says('slow_exchange') not in told_of_a_long_round()
+    assert says('slow_exchange', period=0.1) in told_of_a_long_round()
 
 
 def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
@@ -134,15 +143,16 @@ def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
     with one.record() as recorder:
         recorder.send(0x00200000 | 30 << 4 | 1, bytes(8))
         wait_until(lambda: one.node.drives['conveyor'].foreign_text)
-    assert 'there must be one master only' in drive.report(clock().now()).message
-    assert 'master' not in drive.report(clock().now()).message
+    assert says('one_master_only') in told(drive)
+    assert says('one_master_only') not in told(drive)
     link.send_failures += 2
     link.last_error = 'send: transmit queue full'
     report = bus.report(clock().now())
     assert (report.level, report.message) == (
-        DiagnosticStatus.WARN, '2 frames not sent: send: transmit queue full')
+        DiagnosticStatus.WARN, says('frames_not_sent', frames=2, why=link.last_error))
     report = bus.report(clock().now())
-    assert (report.level, report.message[:8]) == (DiagnosticStatus.OK, 'virtual ')
+    assert (report.level, report.message) == (
+        DiagnosticStatus.OK, says('bus_up', interface='virtual'))
     assert report.facts['send_failures'] == '2'
 
 
@@ -156,7 +166,7 @@ def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
     link.frames_sent, link.send_failures = 1000, 1
     report = bus.report(clock().now())
     assert (report.level, report.message) == (
-        DiagnosticStatus.WARN, '4 frames not sent: the adapter refuses frames')
+        DiagnosticStatus.WARN, says('frames_not_sent', frames=4, why=REFUSED_FRAMES))
     assert report.facts['send_failures'] == '4'
     assert 997 <= int(report.facts['frames_sent']) < 1100
     assert bus.report(clock().now()).level == DiagnosticStatus.OK
@@ -200,8 +210,7 @@ def test_strangers_are_counted_and_told(bridge: StartBridge, client: Client) -> 
 @pytest.mark.parametrize(('seconds', 'words'), [
     (0.004, '4 ms'), (0.0003, '0.3 ms'), (0.1234, '123 ms')])
 def test_a_late_answer_in_words(seconds: float, words: str) -> None:
-    assert answer_late(seconds) == (
-        f'answer {words} after its period: the computer or the drive is too slow')
+    assert sentences.answer_late(seconds).startswith(f'answer {words} after')
 
 
 def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client) -> None:
@@ -209,7 +218,7 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
     one.online()
     drive, = one.node.drives.values()
     with drive.exchange.lock:
-        drive.session.report.unasked(NOTHING, 0.004, math.inf)
+        drive.session.report.unasked(sentences.NOTHING, 0.004, math.inf)
     client.wait_logged('conveyor: answer 4 ms after its period')
     status = client.diagnostics(DRIVE, lambda drive: int(drive['late_answers']) >= 1)
     assert int(status['frames_rejected']) == 0
@@ -217,24 +226,24 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
 
 def test_a_bus_that_is_not_there_yet(bridge: StartBridge, client: Client,
                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    there = False
+    there, why = False, 'virtual: no such device'
     original = link.open_port
 
     def open_port(*arguments: Any, **options: Any) -> Any:
         if not there:
-            raise BusUnavailable('virtual: no such device')
+            raise BusUnavailable(why)
         return original(*arguments, **options)
     monkeypatch.setattr(link, 'open_port', open_port)
     one = bridge()
-    assert client.wait_logged('virtual: no such device', ERROR) == (
-        'bus main: virtual: no such device; tried again every 0.1 s')
+    outlook = with_outlook(why, 0.1)
+    assert client.wait_logged(why, ERROR) == f'bus main: {outlook}'
     bus = client.diagnostics(BUS)
     assert (bus['state'], bus['level']) == ('down', 'ERROR')
-    assert 'no such device' in bus['message'] and 'tried again every 0.1 s' in bus['message']
+    assert bus['message'] == sentences.bus_not_up('down', outlook)
     drive = client.diagnostics(DRIVE)
     assert (drive['state'], drive['level']) == ('offline', 'STALE')
-    assert drive['message'] == 'bus main is down'
-    assert client.set('/conveyor', ramp_time=1.0) == [(False, 'bus down')]
+    assert drive['message'] == sentences.bus_of_drive_down('main')
+    assert client.set('/conveyor', ramp_time=1.0) == [(False, sentences.bus_down())]
     assert client.get('/conveyor', 'ramp_time') == [None]
     client.wait_logged('conveyor: read ramp_time (P30): bus down')
     there = True
@@ -251,15 +260,14 @@ def test_mapping_differs(bridge: StartBridge, client: Client) -> None:
     one = bridge(autostart=False)
     drive = one.played['conveyor']
     drive.set_value('p123', 99)
+    how = 'request map is 50, 99, configured 50, 51'
     assert client.transition(1)
     with one.record() as recorder:
         assert client.transition(3)
-        client.wait_logged('conveyor: mapping differs, no cyclic frame is sent: request map is '
-                           '50, 99, configured 50, 51', ERROR)
+        client.wait_logged(f'conveyor: mapping differs, no cyclic frame is sent: {how}', ERROR)
         status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
         assert status['level'] == 'ERROR'
-        assert 'request map is 50, 99, configured 50, 51' in status['message']
-        assert 'mapping: configure' in status['message']
+        assert status['message'] == sentences.maps_to_correct(sentences.mapping_differs(how))
         # parameter services work meanwhile
         drive.set_value('ramp_time', 1.5)
         assert client.get('/conveyor', 'ramp_time', 'p123') == [pytest.approx(1.5), 99]
@@ -293,9 +301,7 @@ def test_maps_that_the_drive_does_not_keep(bridge: StartBridge, client: Client) 
     drive.fault('refuse=p123')
     assert client.transition(1) and client.transition(3)
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
-    assert status['message'].endswith(
-        '; the drive does not keep the maps that are written: correct the drive or the '
-        'configuration')
+    assert status['code'] == 'maps_not_kept'
 
 
 def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None:
@@ -316,7 +322,7 @@ def test_the_last_message_says_that_it_is_the_last(bridge: StartBridge, client: 
     topic.wait()
     one.node.stop()
     message = topic.wait(lambda array: array.status[1].level == DiagnosticStatus.STALE)
-    assert message.status[1].message == 'bridge ended: start it again'
+    assert facts(message.status[1])['code'] == 'bridge_ended'
 
 
 REFUSING = """
@@ -343,5 +349,5 @@ def test_what_is_refused_is_never_ok(bridge: StartBridge, client: Client, tmp_pa
         del table.table._cells[address]
     status = client.diagnostics(DRIVE, lambda drive: drive['level'] != 'OK')
     assert (status['state'], status['level']) == ('online', 'WARN')
-    assert 'missing' in status['message'] and 'correct cyclic_response' in status['message']
+    assert status['code'] == 'poll_refused' and 'missing' in status['message']
     assert status['missed_exchanges'] == '0'

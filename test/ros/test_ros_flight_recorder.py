@@ -12,6 +12,7 @@ import pytest
 from std_srvs.srv import Trigger
 
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import Event, MappingDiffered, Noted, StationFound, StationLost
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
@@ -24,15 +25,15 @@ from drive_can_bridge.trace.tracer import Tracer
 OK, ERROR = DiagnosticStatus.OK, DiagnosticStatus.ERROR
 
 
-class Wanted(list[str]):
-    """The traces that were wanted, by bus and reason."""
+class Wanted(list[tuple[str, str, int]]):
+    """The traces that were wanted, by bus, reason and rank."""
 
     def __init__(self) -> None:
         super().__init__()
         self.occasions = Occasions(self._trigger)
 
     def _trigger(self, bus: str, reason: str, *, rank: int = 0) -> None:
-        self.append(f'{bus} {reason} {rank}')
+        self.append((bus, reason, rank))
 
     def tells(self, event: Event, state: DriveState, drive: str = 'lift') -> None:
         self.occasions.drive_told(drive, 'main', event, state)
@@ -45,14 +46,14 @@ class Wanted(list[str]):
 def test_each_error_that_begins_is_an_occasion_and_one_that_lasts_is_not() -> None:
     wanted = Wanted()
     wanted.reports(OK, ERROR, ERROR, ERROR)
-    assert wanted == ['main lift_error 0']
+    assert wanted == [('main', 'lift_error', 0)]
     wanted.reports(ERROR, about='drive conveyor')
     wanted.reports(ERROR, about='bus main')
-    assert wanted[1:] == ['main conveyor_error 0', 'main main_error 0']
+    assert wanted[1:] == [('main', 'conveyor_error', 0), ('main', 'main_error', 0)]
     for between in (OK, DiagnosticStatus.WARN, DiagnosticStatus.STALE):
         wanted.clear()
         wanted.reports(between, ERROR)
-        assert wanted == ['main lift_error 0']
+        assert wanted == [('main', 'lift_error', 0)]
 
 
 def test_each_fault_is_an_occasion_however_short() -> None:
@@ -64,12 +65,12 @@ def test_each_fault_is_an_occasion_however_short() -> None:
         wanted.tells(fault, DriveState.FAULT, 'conveyor')
         wanted.tells(gone, DriveState.DISABLED)
         wanted.tells(gone, DriveState.DISABLED, 'conveyor')
-        assert wanted == ['main lift_fault 2', 'main conveyor_fault 2']
+        assert wanted == [('main', 'lift_fault', 2), ('main', 'conveyor_fault', 2)]
         wanted.clear()
     wanted.tells(fault, DriveState.FAULT)
     wanted.occasions.forget('lift')     # the bridge is inactive for a while
     wanted.tells(StationFound(), DriveState.FAULT)
-    assert wanted == ['main lift_fault 2'] * 2
+    assert wanted == [('main', 'lift_fault', 2)] * 2
 
 
 def test_each_loss_is_an_occasion_and_a_fault_that_is_there_afterwards() -> None:
@@ -77,11 +78,11 @@ def test_each_loss_is_an_occasion_and_a_fault_that_is_there_afterwards() -> None
     for _ in range(2):
         wanted.tells(StationLost('no answer'), DriveState.OFFLINE)
         wanted.tells(StationFound(), DriveState.FAULT)
-    assert wanted == ['main lift_offline 1', 'main lift_fault 2'] * 2
+    assert wanted == [('main', 'lift_offline', 1), ('main', 'lift_fault', 2)] * 2
     wanted.clear()
     wanted.tells(MappingDiffered('request map'), DriveState.MAPPING_DIFFERS)
     wanted.occasions.bus_lost('main')
-    assert wanted == ['main lift_mapping differs 2', 'main bus_lost 3']
+    assert wanted == [('main', 'lift_mapping differs', 2), ('main', 'bus_lost', 3)]
 
 
 def recording(tmp_path: Path, **drives: dict[str, Any]) -> dict[str, Any]:
@@ -173,5 +174,4 @@ def test_nothing_is_recorded_unless_asked_for(bridge: StartBridge, client: Clien
     one = bridge()
     one.online()
     answer = client.call('/drive_can_bridge/save_trace', Trigger)
-    assert (answer.success, answer.message) == (
-        False, 'nothing is recorded: set trace_seconds of a bus')
+    assert (answer.success, answer.message) == (False, sentences.nothing_recorded())
