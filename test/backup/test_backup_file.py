@@ -45,7 +45,8 @@ def read(folder: Path, text: str) -> Backup:
 def test_written() -> None:
     head = head_of(FACTS, time='2026-11-22T08:15:00Z',
                    identity='firmware=10205 serial_number=4711')
-    assert written(FACTS, head, SETTINGS, remarks=['left out: gain: no answer']) == TEXT
+    remarks = ['left out: gain: no answer']
+    assert written(FACTS, head, SETTINGS, remarks=remarks) == TEXT
 
 
 def test_read(tmp_path: Path) -> None:
@@ -53,10 +54,11 @@ def test_read(tmp_path: Path) -> None:
     assert backup.node == '/conveyor'
     assert backup.drive == 'conveyor'
     assert backup.values == {'ramp_time': 2.5, 'brake_enabled': True, 'mode': -3}
-    assert backup.head == Head(
+    head = Head(
         '2026-11-22T08:15:00Z', 'main (socketcan can0, 125000 bit/s)', 'datamodel_extended', '1',
         'datamodel_example', 'ab' * 32, 'firmware=10205 serial_number=4711')
-    assert backup.problem('mode', 'no') == f'{tmp_path}/b.yaml:14: mode: no'
+    assert backup.head == head
+    assert backup.problem('mode', 'no').split(': ') == [f'{tmp_path}/b.yaml:14', 'mode', 'no']
 
 
 @pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
@@ -98,10 +100,10 @@ def test_output_of_ros2_param_dump(tmp_path: Path) -> None:
     assert backup.head == Head()
 
 
-def test_for_any_node(tmp_path: Path) -> None:
-    assert read(tmp_path, '/**:\n  ros__parameters:\n    a: 1\n').drive == ''
-    assert read(tmp_path, '/**/lift:\n  ros__parameters:\n    a: 1\n').drive == 'lift'
-    assert read(tmp_path, 'lift:\n  ros__parameters:\n    a: 1\n').drive == 'lift'
+@pytest.mark.parametrize(('node', 'drive'), [('/**', ''), ('/**/lift', 'lift'), ('lift', 'lift')])
+def test_for_any_node(tmp_path: Path, node: str, drive: str) -> None:
+    text = f'{node}:\n  ros__parameters:\n    a: 1\n'
+    assert read(tmp_path, text).drive == drive
 
 
 @pytest.mark.parametrize(('text', 'messages'), [

@@ -128,6 +128,11 @@ def at(place: str, code: str, **fields: Any) -> says:
     return says(code, file=file, line=int(line), key=key, **fields)
 
 
+def parts(**shares: float) -> str:
+    """Return the shares of a bus, in %, as a sentence lists them by drive."""
+    return ', '.join(f'{drive} {share} %' for drive, share in shares.items())
+
+
 #: plain scalars and what rcl makes of them
 SCALARS: list[tuple[str, object]] = [
     *((word, True) for word in ('y', 'Y', 'yes', 'Yes', 'YES', 'on', 'On', 'ON', 'true', 'True',

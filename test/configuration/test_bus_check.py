@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from configuration_builders import at, changed, FILE, load, local, problems, warnings, write
+from configuration_builders import at, changed, FILE, load, local, parts, problems, warnings, write
 import pytest
 from saying import says
 
@@ -161,7 +161,7 @@ def test_load_close_to_the_limit(tmp_path: Path) -> None:
     assert warnings(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 47543')) == []
     assert warnings(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 47542')) == [
         at('f.yaml:5: buses.main', 'high_load', load=70.00126204198392, bitrate=47542,
-           parts='conveyor 35.0 %, lift 35.0 %', most=70.0)]
+           parts=parts(conveyor=35.0, lift=35.0), most=70.0)]
     assert problems(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 33280')) == []
     assert len(problems(tmp_path, changed(FILE, 'bitrate: 125000', 'bitrate: 33279'))) == 1
 

@@ -114,10 +114,10 @@ def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: st
 """
     (tmp_path / 'other.yaml').write_text(
         'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
+    both = f'{ONE}, 11-bit identifier {purpose[:4]} here and {purpose}; predefined_set) there'
     assert problems(tmp_path, text, PROFILE) == [
         at('f.yaml:21: drives.fan.station', 'collides', station=1, other='pump', other_station=5,
-           bus='main', purpose=f'{ONE}, 11-bit identifier {purpose[:4]} here and {purpose}; '
-                               'predefined_set) there')]
+           bus='main', purpose=both)]
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -133,10 +133,10 @@ def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
         cyclic_response: [speed]
 """
     (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
+    both = f'{ONE}, process data to station 64 here and 080h (SYNC; predefined_set) there'
     assert problems(tmp_path, text, PROFILE) == [
         at('f.yaml:21: drives.fan.station', 'collides', station=64, other='pump', other_station=5,
-           bus='main', purpose=f'{ONE}, process data to station 64 here and 080h (SYNC; '
-                               'predefined_set) there')]
+           bus='main', purpose=both)]
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -223,7 +223,8 @@ def test_address_that_is_not_needed_may_be_missing(tmp_path: Path) -> None:
     bare = PROFILE.replace('number: 455, ', '')
     text = changed(FILE, 'period: 0.1', 'period: 0.1\n        addressing: canopen')
     assert problems(tmp_path, text, bare) == []
-    assert problems(tmp_path, FILE, PROFILE.replace('index: 0x2004, subindex: 6, ', '')) == []
+    bare = PROFILE.replace('index: 0x2004, subindex: 6, ', '')
+    assert problems(tmp_path, FILE, bare) == []
 
 
 @pytest.mark.parametrize(('request_', 'problem'), [
@@ -298,8 +299,8 @@ def test_mailbox_where_a_device_has_something_else_as_delivered(keys: str, taken
     assert warnings(tmp_path, file, PROFILE) == [
         at(f'f.yaml:16: drives.pump.{keys.split(":")[0]}', 'predefined_identifier',
            identifier=int(keys.split(':')[1], 0), taken=taken)]
-    assert not warnings(tmp_path, changed(file, 'period: 0.1',
-                                          'period: 0.1\n        predefined_set: false'), PROFILE)
+    without = changed(file, 'period: 0.1', 'period: 0.1\n        predefined_set: false')
+    assert not warnings(tmp_path, without, PROFILE)
 
 
 def test_mailbox_in_its_place_is_no_worry(tmp_path: Path) -> None:

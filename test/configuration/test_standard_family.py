@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 import re
 
-from configuration_builders import at, changed, FILE, load, problems, PROFILE, warnings
+from configuration_builders import at, changed, FILE, load, parts, problems, PROFILE, warnings
 import pytest
 from saying import says
 
@@ -163,24 +163,23 @@ def test_claims(drive: DriveConfiguration) -> None:
 # -- collisions -----------------------------------------------------------------------------------
 
 
+def collision(station: int, other: int, identifier: str) -> says:
+    return at('f.yaml:22: drives.lift.station', 'collides', station=station, other='conveyor',
+              other_station=other, bus='main', purpose=f'11-bit identifier {identifier}')
+
+
 def test_the_same_station_twice(tmp_path: Path) -> None:
-    assert found(tmp_path, changed(BOTH, 'station: 2', 'station: 1')) == [
-        at('f.yaml:22: drives.lift.station', 'collides', station=1, other='conveyor',
-           other_station=1, bus='main', purpose='11-bit identifier 3F1h')]
+    assert found(tmp_path, changed(BOTH, 'station: 2', 'station: 1')) == [collision(1, 1, '3F1h')]
 
 
 def test_the_request_of_one_is_the_response_of_another(tmp_path: Path) -> None:
     # answers of station 1 on 3F8h + 1 = 3F9h, requests to station 9 on 3F0h + 9 = 3F9h
     text = changed(with_keys('response_id_base: 0x3F8', text=BOTH), 'station: 2', 'station: 9')
-    assert found(tmp_path, text) == [
-        at('f.yaml:22: drives.lift.station', 'collides', station=9, other='conveyor',
-           other_station=1, bus='main', purpose='11-bit identifier 3F9h')]
+    assert found(tmp_path, text) == [collision(9, 1, '3F9h')]
     # and the other way round: the later drive answers where the earlier one is asked
     text = changed(changed(BOTH, 'station: 1', 'station: 9'), 'station: 2',
                    'station: 1\n        response_id_base: 0x3F8')
-    assert found(tmp_path, text) == [
-        at('f.yaml:22: drives.lift.station', 'collides', station=1, other='conveyor',
-           other_station=9, bus='main', purpose='11-bit identifier 3F9h')]
+    assert found(tmp_path, text) == [collision(1, 9, '3F9h')]
 
 
 def test_the_same_station_with_other_bases_is_another_drive(tmp_path: Path) -> None:
@@ -350,11 +349,11 @@ def test_overload_of_mixed_drives(tmp_path: Path) -> None:
     text = changed(MIXED, 'bitrate: 125000', 'bitrate: 50000')
     assert warnings(tmp_path, text, TABLE) == [
         at('f.yaml:5: buses.main', 'high_load', load=87.28, bitrate=50000,
-           parts='conveyor 54.0 %, lift 33.3 %', most=70.0)]
+           parts=parts(conveyor=54.0, lift=33.3), most=70.0)]
     text = changed(MIXED, 'bitrate: 125000', 'bitrate: 40000')
     assert found(tmp_path, text) == [
         at('f.yaml:5: buses.main', 'overload', load=109.1, bitrate=40000,
-           parts='conveyor 67.5 %, lift 41.6 %', most=100.0)]
+           parts=parts(conveyor=67.5, lift=41.6), most=100.0)]
 
 
 # -- names ----------------------------------------------------------------------------------------

@@ -12,11 +12,18 @@ import sys
 
 from configuration_builders import changed, FILE, write
 import pytest
+from transcripts import replayed, stories
 
 import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
 
 ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
+STORIES = stories(__file__, 'validate.yaml')
+LINE = (r'\w+: bus main \(\w+ \S+\), \w+, station [0-9]+, profile \w+, period [0-9.]+ ms, '
+        r'request \[[\w, ]*\], response \[[\w, ]+\], load [0-9.]+ %')
+NO_KEY = 'the adapter for slcan does not name'
+BESIDE_DEEP = {'f.yaml': FILE + '/other:\n  ros__parameters:\n    a:\n     ',
+               'table.yaml': 'protocols: [cannord]\nparameters:\n '}
 EXAMPLES = sorted(path.name for path in (ROOT / 'config').glob('*.yaml'))
 ENVIRONMENT = {**os.environ, 'PYTHONPATH': os.pathsep.join(
     filter(None, (str(ROOT), os.environ.get('PYTHONPATH'))))}
@@ -32,108 +39,33 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
 
 
-def test_good_file(tmp_path: Path) -> None:
-    done = run('validate', str(write(tmp_path)))
-    assert done.stdout == (
-        'conveyor: bus main (virtual demo), datamodel_extended, station 1, profile table, '
-        'period 20 ms, request [speed, limit], response [actual, current, status], load 13.3 %\n'
-        'lift: bus main (virtual demo), datamodel_extended, station 2, profile table, '
-        'period 20 ms, request [speed], response [actual, status], load 13.3 %\n')
-    assert (done.returncode, done.stderr) == (0, '')
+@pytest.mark.parametrize('story', STORIES)
+def test_lines(story: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(Path())
 
-
-def test_warnings(tmp_path: Path) -> None:
-    path = write(tmp_path, changed(FILE, 'bitrate: 125000', 'rx_queue: 5'))
-    done = run('validate', str(path))
-    assert done.stderr == (
-        f'warning: {path}:8: buses.main.rx_queue: the adapter for virtual does not name this key '
-        "(did you mean 'rx_queue_size'?); it is handed over all the same\n")
-    assert done.returncode == 0
-    assert len(done.stdout.splitlines()) == 2
-
-
-def test_problems(tmp_path: Path) -> None:
-    text = changed(FILE, 'interface: virtual', 'interface: virtul')
-    path = write(tmp_path, changed(text, 'station: 1', 'statoin: 1'))
-    done = run('validate', str(path))
-    assert done.stderr.splitlines() == [
-        f"{path}:6: buses.main.interface: 'virtul' is no interface of python-can, did you mean "
-        "'virtual'?",
-        f'{path}:10: drives.conveyor.station: missing, allowed is an integer',
-        f"{path}:13: drives.conveyor.statoin: unknown key, did you mean 'station'?"]
-    assert (done.returncode, done.stdout) == (1, '')
-
-
-@pytest.mark.parametrize(('text', 'line', 'what'), [
-    ('/**:\n  ros__parameters:\n    buses: {main: [\n    drives: x\n', 3,
-     "did not find expected ',' or ']'"),
-    ('a: [', 2, 'did not find expected node content'),
-    ('a: 1\nb: [[1]]\nc: {', 4, 'did not find expected node content')])
-def test_broken_yaml_is_one_problem(tmp_path: Path, text: str, line: int, what: str) -> None:
-    path = write(tmp_path, text)
-    done = run('validate', str(path))
-    assert done.stderr == f'{path}:{line}: yaml: not valid YAML: {what}\n'
-    assert (done.returncode, done.stdout) == (1, '')
-
-
-def test_broken_yaml_of_a_profile_is_one_problem(tmp_path: Path) -> None:
-    table = tmp_path / 'table.yaml'
-    path = write(tmp_path)
-    table.write_text('protocols: [[1]]\nparameters: {a: {number: [2}}\n', encoding='utf-8')
-    done = run('validate', str(path))
-    assert done.stderr == f"{table}:2: yaml: not valid YAML: did not find expected ',' or ']'\n"
-    assert (done.returncode, done.stdout) == (1, '')
-
-
-@pytest.mark.parametrize(('name', 'line'), [
-    ('nothing.yaml', 'drive_can validate: nothing.yaml: No such file or directory\n'),
-    ('/', 'drive_can validate: /: Is a directory\n')])
-def test_no_file(name: str, line: str) -> None:
-    done = run('validate', name)
-    assert (done.returncode, done.stdout, done.stderr) == (1, '', line)
-
-
-def test_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    path = tmp_path / 'pipe.yaml'
-    os.mkfifo(path)
-    done = run('validate', str(path))
-    assert (done.returncode, done.stdout, done.stderr) == (
-        1, '', f'drive_can validate: {path}: not a regular file, allowed is one\n')
-    os.mkfifo(tmp_path / 'table.yaml')
-    good = tmp_path / 'f.yaml'
-    good.write_text(changed(FILE, '    autostart: true\n',
-                            f'    profile_directories: [{tmp_path}]\n'), encoding='utf-8')
-    done = run('validate', str(good))
-    assert done.returncode == 1
-    assert f"{good}:14: drives.conveyor.profile: 'table' is unknown" in done.stderr
-
-
-def test_file_that_is_too_large(tmp_path: Path) -> None:
-    path = write(tmp_path)
-    with path.open('ab') as file:
-        file.truncate(5 << 20)
-    done = run('validate', str(path))
-    assert (done.returncode, done.stdout, done.stderr) == (
-        1, '', f'drive_can validate: {path}: too large, allowed are 4 MiB\n')
-    path = write(tmp_path)
-    with (tmp_path / 'table.yaml').open('ab') as file:
-        file.truncate(5 << 20)
-    done = run('validate', str(path))
-    assert done.stderr.splitlines()[0] == (
-        f'{path}:14: drives.conveyor.profile: {tmp_path}/table.yaml cannot be read (too large, '
-        'allowed are 4 MiB), allowed is a readable file')
-
-
-@pytest.mark.parametrize('nest', ['[', '{a: ', '- ', '? ', '[{', '!!map {a: '])
-def test_absurd_nesting(tmp_path: Path, nest: str) -> None:
-    deep = nest * (200_000 // len(nest))
-    path = write(tmp_path, FILE + f'/other:\n  ros__parameters:\n    a:\n     {deep}')
-    done = run('validate', str(path))
-    assert done.stderr == f'{path}:29: yaml: nested too deep, allowed are 32 levels\n'
-    path = write(tmp_path, profile=f'protocols: [cannord]\nparameters:\n {deep}')
-    done = run('validate', str(path))
-    assert done.stderr == (
-        f'{tmp_path}/table.yaml:3: yaml: nested too deep, allowed are 32 levels\n')
+    def step(step: str) -> list[str]:
+        verb, _, rest = step.partition(' ')
+        if verb == 'validate':
+            done = run(verb, *rest.split())
+            errors = done.stderr.replace(str(ROOT), '…').splitlines()
+            return [*done.stdout.splitlines(), *(f'! {line}' for line in errors),
+                    *([f'[{done.returncode}]'] if done.returncode else [])]
+        file, _, text = rest.partition(' ')
+        if verb == 'change':
+            Path('f.yaml').write_text(changed(Path('f.yaml').read_text(), *rest.split(' => ')))
+        elif verb == 'write':
+            Path(file).write_text(json.loads(text))
+        elif verb == 'pipe':
+            Path(file).unlink(missing_ok=True)
+            os.mkfifo(file)
+        elif verb == 'enlarge':
+            os.truncate(file, 5 << 20)
+        elif verb == 'nest':
+            nest = json.loads(text)
+            Path(file).write_text(BESIDE_DEEP[file] + nest * (200_000 // len(nest)))
+        return []
+    assert replayed(STORIES[story], step) == STORIES[story]
 
 
 @pytest.mark.parametrize(('arguments', 'program'), [
@@ -182,16 +114,14 @@ def test_shipped_examples(name: str) -> None:
     file = ROOT / 'config' / name
     done = run('validate', str(file))
     assert done.returncode == 0
-    # each python-can names the keys of its adapters itself
-    assert all('the adapter for slcan does not name' in line for line in done.stderr.splitlines())
+    for line in done.stderr.splitlines():   # each python-can names the keys of its adapters itself
+        assert NO_KEY in line
     text = file.read_text(encoding='utf-8')
     drives = re.findall(r'^      (\w+):', text[text.index('\n    drives:'):], re.MULTILINE)
     lines = done.stdout.splitlines()
     assert [line.split(':')[0] for line in lines] == drives
     for line in lines:
-        assert re.fullmatch(
-            r'\w+: bus main \(\w+ \S+\), \w+, station [0-9]+, profile \w+, period [0-9.]+ ms, '
-            r'request \[[\w, ]*\], response \[[\w, ]+\], load [0-9.]+ %', line)
+        assert re.fullmatch(LINE, line)
 
 
 def test_problem_in_a_profile(tmp_path: Path) -> None:

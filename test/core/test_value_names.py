@@ -6,7 +6,8 @@ import pytest
 
 from drive_can_bridge.core.value_names import joined, taken_apart
 
-NAMES = ((0, 'terminals'), (3, 'bus'), (-1, 'motor by digital input 2'), (7, 'E7: too hot'))
+BY_INPUT = 'motor by digital input 2'
+NAMES = ((0, 'terminals'), (3, 'bus'), (-1, BY_INPUT), (7, 'E7: too hot'))
 
 
 def test_one_line_and_back() -> None:
@@ -18,7 +19,7 @@ def test_one_line_and_back() -> None:
 def test_a_value_by_its_name() -> None:
     source = parameter('source', 51, type=INT16, values=NAMES)
     assert [source.name_of(value) for value in (0, 3, -1, 5)] == [
-        'terminals', 'bus', 'motor by digital input 2', '']
+        'terminals', 'bus', BY_INPUT, '']
     assert source.value_named('bus') == 3
     assert source.value_named('3') is source.value_named('') is None
     scaled = parameter('fault', 700, scale=0.1, values=((102, 'time-out'),))

@@ -62,7 +62,7 @@ def test_a_bool_is_made_of_nothing_else(text: str) -> None:
 
 
 def test_text_is_printable_and_short() -> None:
-    assert printable('Grüße, 50 µs') == 'Grüße, 50 µs'
+    assert printable('Grüße, µs') == 'Grüße, µs'
     assert printable('a\tb\x1b[2J\x9b') == 'a\\tb\\x1b[2J\\x9b'
     assert len(printable('x' * 1000)) == 256
 
@@ -149,11 +149,10 @@ def test_documents_have_numbers_for_programs() -> None:
 def test_names_of_values_stand_beside_the_number_and_are_read() -> None:
     told = ParameterInfo('source', ValueKind.INTEGER, facts={
         'type': 'uint16', 'values': '0:terminals 3:panel of the drive'})
-    assert [told.text(value) for value in (0, 3, 5)] == [
-        '0 terminals', '3 panel of the drive', '5']
-    assert told.assignment(3) == 'source=3 panel of the drive'
-    assert [told.parse(text) for text in ('terminals', '3 panel of the drive', '3', '5')] == [
-        0, 3, 3, 5]
-    assert told.width == len('3 panel of the drive')
+    panel = '3 panel of the drive'
+    assert [told.text(value) for value in (0, 3, 5)] == ['0 terminals', panel, '5']
+    assert told.assignment(3) == f'source={panel}'
+    assert [told.parse(text) for text in ('terminals', panel, '3', '5')] == [0, 3, 3, 5]
+    assert told.width == len(panel)
     with pytest.raises(ValueRefused):
         told.parse('panel')

@@ -15,24 +15,22 @@ def clean(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def test_traffic_stays_here_by_default(clean: pytest.MonkeyPatch) -> None:
-    environment.prepare(None)
-    assert environment.in_words() == 'ROS domain 0, on this machine only'
-    assert environment.export_command() == 'export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST'
-
-
-def test_what_the_environment_says_is_obeyed(clean: pytest.MonkeyPatch) -> None:
-    clean.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
-    clean.setenv('ROS_DOMAIN_ID', '5')
-    environment.prepare(None)
-    assert environment.in_words() == 'ROS domain 5, on the network'
-    environment.prepare(7)
-    assert environment.export_command() == (
-        'export ROS_DOMAIN_ID=7 ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET')
-
-
-def test_the_older_variable_counts_too(clean: pytest.MonkeyPatch) -> None:
-    clean.setenv('ROS_LOCALHOST_ONLY', '1')
-    environment.prepare(None)
-    assert 'ROS_AUTOMATIC_DISCOVERY_RANGE' not in environment.export_command()
-    assert environment.in_words() == 'ROS domain 0, on this machine only'
+@pytest.mark.parametrize(('given', 'domain', 'words', 'export'), [
+    ({}, None, 'ROS domain 0, on this machine only',
+     'export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST'),
+    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_DOMAIN_ID': '5'}, None,
+     'ROS domain 5, on the network',
+     'export ROS_DOMAIN_ID=5 ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET'),
+    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_DOMAIN_ID': '5'}, 7,
+     'ROS domain 7, on the network',
+     'export ROS_DOMAIN_ID=7 ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET'),
+    # the older variable counts, too
+    ({'ROS_LOCALHOST_ONLY': '1'}, None, 'ROS domain 0, on this machine only',
+     'export ROS_LOCALHOST_ONLY=1'),
+])
+def test_what_is_told(clean: pytest.MonkeyPatch, given: dict[str, str], domain: int | None,
+                      words: str, export: str) -> None:
+    for name, value in given.items():
+        clean.setenv(name, value)
+    environment.prepare(domain)
+    assert (environment.in_words(), environment.export_command()) == (words, export)

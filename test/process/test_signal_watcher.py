@@ -91,8 +91,8 @@ def test_a_request_to_suspend_is_refused_and_is_no_signal_that_ends_anything(
 
 def test_why_it_ends_by_itself(bench: World) -> None:
     watcher = SignalWatcher(bench.clock)
-    bench.clock.worker(lambda: watcher.fatal('no thread is left'), 'the one that dies').start()
-    assert watcher.wait() == 'no thread is left'
+    bench.clock.worker(lambda: watcher.fatal('defect'), 'the one that dies').start()
+    assert watcher.wait() == 'defect'
     assert not watcher.signalled
 
 

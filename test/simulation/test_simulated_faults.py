@@ -126,7 +126,7 @@ class TestAnswers:
         made = drive()
         for text in ('duplicate', 'length=2', 'late=0.1', 'late=0.2'):
             made.fault(text, 0.0)
-        assert made.faults_text == 'duplicate, length=2, late=0.2'
+        assert made.faults_text.split(', ') == ['duplicate', 'length=2', 'late=0.2']
         ask(made, POLL, 1.0)
         made.handle_timer(1.2)
         assert [str(f) for f in made.take_frames()] == ['103FFFF0#0000', '103FFFF0#0000']
@@ -201,8 +201,8 @@ class TestDrive:
         made = drive()
         for fault in ('needs=ramp_time:torque_limit', 'needs=ramp_time:p50', 'stuck=p30'):
             made.fault(fault, 0.0)
-        assert made.faults_text == (
-            'needs=ramp_time:torque_limit, needs=ramp_time:p50, stuck=p30')
+        assert made.faults_text.split(', ') == [
+            'needs=ramp_time:torque_limit', 'needs=ramp_time:p50', 'stuck=p30']
         made.fault('ok', 0.0)
         assert made.faults_text == 'ok'
 

@@ -10,7 +10,8 @@ from typing import Any
 from clocks import REAL
 from jumping import JumpingClock
 import pytest
-from simulation_builders import bridge, configuration, frame, INT16, parameter, RO
+from simulation_builders import bridge, configuration, frame, INT16, parameter, RO, RULES
+from transcripts import replayed, stories
 from waiting import wait_for
 from world import World
 
@@ -26,6 +27,14 @@ from drive_can_bridge.simulation.registers import Refusal
 from drive_can_bridge.simulation.simulation import make_drives, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint
+
+STORIES = stories(__file__, 'console.yaml')
+#: what the simulation says of its bus
+OPEN = 'bus main: open'
+LOST = 'bus main: lost: {}; trying again every 0.05 s'
+ABSENT = 'bus main: virtual x: absent; trying again every 0.05 s'
+FULL = 'bus main: send: transmit queue full'
+DEFECT = 'bus main: RuntimeError: a mistake of ours'
 
 POLL = frame('003FFFF0#0000000000000000')
 ANSWER = frame('103FFFF0#000000C80003A5A5')
@@ -77,7 +86,7 @@ class Scripted:
         self.failures = failures or []
         self.said: list[str] = []
         self.complaints: list[str] = []
-        self.shown: list[str] = []
+        self.shown: list[tuple[str, str, bool]] = []
         self.simulation = Simulation(
             bridge(*drives), clock, open_bus=self.open, say=self.said.append,
             complain=self.complaints.append, show_frame=self.show)
@@ -89,7 +98,7 @@ class Scripted:
         return self.ports[-1]
 
     def show(self, bus: str, shown: Frame, sent: bool) -> None:
-        self.shown.append(f'{bus} {shown} {"T" if sent else "R"}')
+        self.shown.append((bus, str(shown), sent))
 
 
 @pytest.fixture
@@ -106,8 +115,8 @@ def test_request_and_answer(scripted: Scripted) -> None:
     wait_for(lambda: len(port.sent) == 2, 'answers')
     assert port.sent == [ANSWER, frame('105FFFF0#000000C80003A5A5')]
     assert scripted.shown == [
-        'main 003FFFF0#0000000000000000 R', 'main 103FFFF0#000000C80003A5A5 T',
-        'main 005FFFF0#0000000000000000 R', 'main 105FFFF0#000000C80003A5A5 T']
+        ('main', '003FFFF0#0000000000000000', False), ('main', '103FFFF0#000000C80003A5A5', True),
+        ('main', '005FFFF0#0000000000000000', False), ('main', '105FFFF0#000000C80003A5A5', True)]
     assert scripted.simulation.drives['lift'].requests == 1
 
 
@@ -145,10 +154,11 @@ def test_faults_and_violations_are_said_once(scripted: Scripted) -> None:
     conveyor.fault('silent')
     for _ in range(3):
         scripted.ports[0].put(frame('003001E0#0000000000000000'))
-    rule = 'frame that the manual does not define (ignored)'
+    rule = RULES['undefined']
     wait_for(lambda: conveyor.violations == {rule: 3}, 'violations')
     wait_for(lambda: len(scripted.said) == 2, 'lines')
-    assert scripted.said == ['conveyor: fault silent', f'conveyor: violation: {rule}']
+    assert scripted.said == [
+        f'conveyor: {text}' for text in ('fault silent', f'violation: {rule}')]
     assert conveyor.faults_text == 'silent'
 
 
@@ -159,13 +169,11 @@ def test_lost_bus_is_opened_again(scripted: Scripted) -> None:
     assert scripted.ports[0].closed
     scripted.ports[1].put(POLL)
     wait_for(lambda: scripted.ports[1].sent == [ANSWER], 'answer')
-    assert scripted.complaints == [
-        'bus main: lost: receive: unplugged; trying again every 0.05 s', 'bus main: open']
+    assert scripted.complaints == [LOST.format('receive: unplugged'), OPEN]
     scripted.ports[1].send_failure = BusUnavailable('send: unplugged')
     scripted.ports[1].put(POLL)
     wait_for(lambda: len(scripted.ports) == 3, 'third port')
-    assert scripted.complaints[2:3] == [
-        'bus main: lost: send: unplugged; trying again every 0.05 s']
+    assert scripted.complaints[2:3] == [LOST.format('send: unplugged')]
 
 
 def test_answer_that_cannot_be_sent_is_lost(scripted: Scripted) -> None:
@@ -174,7 +182,7 @@ def test_answer_that_cannot_be_sent_is_lost(scripted: Scripted) -> None:
     port.put(POLL)
     port.put(POLL)
     wait_for(lambda: port.sent == [ANSWER], 'second answer')
-    assert scripted.complaints == ['bus main: send: transmit queue full']
+    assert scripted.complaints == [FULL]
 
 
 def test_bus_that_is_not_there_yet(bench: World) -> None:
@@ -182,8 +190,7 @@ def test_bus_that_is_not_there_yet(bench: World) -> None:
     with made.simulation:
         wait_for(lambda: made.ports, 'port')
         wait_for(lambda: len(made.complaints) == 2, 'lines')
-    assert made.complaints == [
-        'bus main: virtual x: absent; trying again every 0.05 s', 'bus main: open']
+    assert made.complaints == [ABSENT, OPEN]
     assert made.ports[0].closed
 
 
@@ -198,7 +205,7 @@ def test_thread_that_fails_says_so(bench: World) -> None:
     with made.simulation:
         made.ports[0].put(RuntimeError('a mistake of ours'))
         wait_for(lambda: made.simulation.failure, 'failure')
-    assert made.complaints == ['bus main: RuntimeError: a mistake of ours']
+    assert made.complaints == [DEFECT]
     assert made.ports[0].closed
 
 
@@ -268,18 +275,20 @@ class TestConsole:
             return list(said), list(complaints)
         return obey
 
-    def test_faults(self, lines: Any, scripted: Scripted) -> None:
-        assert lines('conveyor late=0.5 duplicate') == ([], [])
-        assert scripted.simulation.drives['conveyor'].faults_text == 'late=0.5, duplicate'
-        assert scripted.simulation.drives['lift'].faults_text == 'ok'
+    @pytest.mark.parametrize('story', STORIES)
+    def test_lines(self, story: str, lines: Any) -> None:
+        def step(step: str) -> list[str]:
+            said, complaints = lines(step)
+            return [*said, *(f'! {line}' for line in complaints)]
+        assert replayed(STORIES[story], step) == STORIES[story]
+
+    def test_spaces_and_line_ends_do_not_count(self, lines: Any, scripted: Scripted) -> None:
+        assert lines('conveyor silent') == ([], [])
+        assert scripted.simulation.drives['conveyor'].faults_text == 'silent'
         assert lines('  conveyor   ok \r') == ([], [])
         assert scripted.simulation.drives['conveyor'].faults_text == 'ok'
 
-    def test_questions(self, lines: Any) -> None:
-        line = ('lift: datamodel_extended station 2 on bus main, 0 requests, 0 answers, '
-                '0 EEPROM writes, faults: ok')
-        assert lines('lift') == ([line], [])
-        assert lines('list')[0][1] == line
+    def test_help_and_nothing(self, lines: Any) -> None:
         assert '  drop=N                 every Nth answer is lost (1: all)' in lines('help')[0]
         assert lines('') == ([], [])
 
@@ -288,19 +297,10 @@ class TestConsole:
         scripted.ports[0].put(frame('003001E1#00C8000000000000'))
         wait_for(lambda: conveyor.eeprom_writes == 1, 'write')
         assert conveyor.wear == {'ramp_time': 1}
-        assert lines('status')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1',
-                                          lines('lift')[0][0]]
-        assert lines('conveyor')[0][1:] == ['conveyor: EEPROM writes: ramp_time 1']
+        wear = 'conveyor: EEPROM writes: ramp_time 1'
+        assert lines('status')[0][1:] == [wear, lines('lift')[0][0]]
+        assert lines('conveyor')[0][1:] == [wear]
         assert lines('list')[0][1:] == [lines('lift')[0][0]]
-
-    @pytest.mark.parametrize(('line', 'complaint'), [
-        ('lft silent', "no drive 'lft'; drives: conveyor, lift; also: status, list, help"),
-        ('list all', "no drive 'list'; drives: conveyor, lift; also: status, list, help"),
-        ('lift late', "'late' is not a fault, write late=SECONDS"),
-        ('lift stuck=p999', "lift has no parameter 'p999'"),
-    ])
-    def test_lines_that_make_no_sense(self, lines: Any, line: str, complaint: str) -> None:
-        assert lines(line) == ([], [complaint])
 
     def test_standard_input(self, monkeypatch: pytest.MonkeyPatch) -> None:
         reading, writing = os.pipe()
@@ -329,5 +329,6 @@ class TestConsole:
         assert LineReader().fileno is None
 
     def test_a_line_counts_as_a_whole(self, lines: Any, scripted: Scripted) -> None:
-        assert len(lines('lift silent nonsense')[1]) == 1
+        faults = 'silent nonsense'
+        assert len(lines(f'lift {faults}')[1]) == 1
         assert scripted.simulation.drives['lift'].faults_text == 'ok'

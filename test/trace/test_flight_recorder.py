@@ -79,6 +79,16 @@ def test_a_frame_leaves_nothing_behind() -> None:
         tracemalloc.stop()
 
 
+#: what is said of traces
+TOLD = {
+    'trace': 'bus main: trace of conveyor offline, 2 frames of the last 10 s: {}',
+    'last': 'bus main: one trace in 10 s at most; the last, 1 s ago, is {}',
+    'next': 'bus main: one trace in 10 s at most; that of lift fault follows in 10 s',
+    'silence': 'bus main: not a single frame in the last 10 s',
+    'no place': 'bus main: no trace of asked: Not a directory: ',
+}
+
+
 class Recording:
     """A recorder of one bus, what it says, and its traces."""
 
@@ -129,8 +139,7 @@ def test_a_trace_has_what_came_before_and_after(bench: World, tmp_path: Path) ->
         records = list(read_records(path, pytest.fail))
         assert [record.identifier for record in records] == [0x222, 0x333]
         assert all(0.0 < 1e-9 * clock().stamp() - record.time < 2.0 for record in records)
-        assert made.said == [f'bus main: trace of conveyor offline, 2 frames of the last 10 s: '
-                             f'{path}']
+        assert made.said == [TOLD['trace'].format(path)]
 
 
 def test_one_trace_in_ten_seconds(bench: World, tmp_path: Path) -> None:
@@ -151,8 +160,7 @@ def test_one_trace_in_ten_seconds_for_whoever_asks(bench: World, tmp_path: Path)
         assert path == str(made.traces[0]) and not refusal
         path, refusal = made.save()
         assert not path
-        assert refusal == (f'bus main: one trace in 10 s at most; the last, 1 s ago, is '
-                           f'{made.traces[0]}')
+        assert refusal == TOLD['last'].format(made.traces[0])
         assert len(made.traces) == 1
 
 
@@ -165,8 +173,7 @@ def test_a_failure_has_its_trace_whoever_has_asked_for_one(
         made.hear('222#')
         made.recorder.trigger('main', 'lift fault')
         path, refusal = made.save()
-        assert not path and refusal.startswith(
-            'bus main: one trace in 10 s at most; that of lift fault follows in 10 s')
+        assert not path and refusal.startswith(TOLD['next'])
         assert len(made.traces) == 1, 'one in so many s'
         wait_for(lambda: len(made.traces) == 2, 'the trace of the failure')
         assert clock().now() > asked + flight.SPACING
@@ -216,8 +223,8 @@ def test_a_failure_does_not_wait_for_a_trace_that_somebody_asked_for(
         wait_for(lambda: len(told) == 2, 'two traces')
     finally:
         recorder.close()
-    assert [text.split(',')[0] for text in told] == [
-        'bus other: trace of lift fault', 'bus main: trace of asked']
+    assert [text.split(':')[0] for text in told] == ['bus other', 'bus main']
+    assert [text.split(',')[0].rpartition(' of ')[2] for text in told] == ['lift fault', 'asked']
 
 
 def test_the_gravest_reason_names_the_trace(bench: World, tmp_path: Path) -> None:
@@ -232,7 +239,7 @@ def test_the_gravest_reason_names_the_trace(bench: World, tmp_path: Path) -> Non
 
 def test_nothing_heard_nothing_written(bench: World, tmp_path: Path) -> None:
     with recording(tmp_path) as made:
-        assert made.save() == ('', 'bus main: not a single frame in the last 10 s')
+        assert made.save() == ('', TOLD['silence'])
         assert not list(tmp_path.iterdir())
         made.hear()
         assert made.save()[0]
@@ -276,7 +283,7 @@ def test_a_place_that_cannot_be_written(bench: World, tmp_path: Path) -> None:
         made.hear()
         path, refusal = made.save()
         assert not path and refusal in made.complained
-        assert refusal.startswith('bus main: no trace of asked: Not a directory: ')
+        assert refusal.startswith(TOLD['no place'])
 
 
 def test_buses_that_are_not_recorded(bench: World, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from builders import INT16, parameter
 import pytest
+from saying import says
 from servo_builders import (
     MODES_OF, POSITION, servo, TABLE, TARGET, TORQUE, TORQUE_TARGET, VELOCITY, VELOCITY_TARGET,
 )
@@ -28,7 +29,7 @@ def test_all_modes_are_fine() -> None:
 def test_the_mode_and_its_setpoint() -> None:
     drive = servo()
     drive = replace(drive, options=replace(drive.options, mode=None))
-    assert 'allowed is one of' in dict(FAMILY.check(drive))['mode']
+    assert dict(FAMILY.check(drive))['mode'] == says('one_missing')
     assert '60FFh.00h' in wrong(request=())['cyclic_request']
     narrow = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT16)
     assert 'int32' in wrong(request=(narrow,))['profile.parameters.target_velocity.type']
@@ -49,11 +50,12 @@ def test_what_is_interpolated_needs_sync(options: dict[str, Any]) -> None:
 
 
 def test_lists_that_are_too_short_say_what_is_needed() -> None:
-    assert 'needed are 2' in wrong(response=(POSITION, VELOCITY))['response_pdos']
+    assert wrong(response=(POSITION, VELOCITY))['response_pdos'] == says(
+        'pdos_too_small', needed=2)
     assert wrong(response=(POSITION, VELOCITY), response_pdos=(1, 3)) == {}
     # 2 + 4 bytes, then 4 + 2: no entry is torn
-    assert 'needed are 2' in wrong(request=(VELOCITY_TARGET, replace(
-        VELOCITY_TARGET, name='other', index=0x2000)))['request_pdos']
+    assert wrong(request=(VELOCITY_TARGET, replace(VELOCITY_TARGET, name='other', index=0x2000)))[
+        'request_pdos'] == says('pdos_too_small', needed=2)
     assert 'twice' in wrong(response_pdos=(1, 1))['response_pdos']
 
 
@@ -64,7 +66,8 @@ def test_what_the_bridge_sends_by_itself() -> None:
     mode = parameter('mode', None, index=0x6060, subindex=0)
     assert 'key mode' in wrong(request=(VELOCITY_TARGET, mode))['cyclic_request']
     status = parameter('status', None, index=0x6041, subindex=0)
-    assert 'published by itself' in wrong(response=(status,))['cyclic_response']
+    assert wrong(response=(status,))['cyclic_response'] == says(
+        'status_word_mapped', name='status')
     assert 'profile.parameters.status_word' in wrong(table=(*TABLE, parameter(
         'status_word', None, index=0x6041)))
 

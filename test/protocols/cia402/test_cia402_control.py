@@ -191,7 +191,8 @@ class TestQuickStop:
             ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
         axis.live(5.0)
         assert axis.words() == ['0200']
-        assert axis.session.control.holds == says('quick_stop_holds', state='quick stop active')
+        assert axis.session.control.holds == says(
+            'quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value)
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
 
