@@ -1155,6 +1155,11 @@ def maps_to_correct(why: str) -> str:
 
 
 @sentence
+def drive_to_correct(why: str) -> str:
+    return f'{why}; correct the drive or the configuration'
+
+
+@sentence
 def maps_not_kept(why: str) -> str:
     return (f'{why}; the drive does not keep the maps that are written: correct the drive or '
             f'the configuration')

@@ -115,6 +115,7 @@ class Session(ABC):
     :ivar retry: how long and how often the drive is asked.
     :ivar users: what they want of the drive; the family says who serves that.
     :ivar report: events, and what is missing while the drive is offline.
+    :ivar remedy: says what to do about a drive whose state is ``mapping differs``.
     :ivar stage: what is being done for the drive.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
@@ -140,6 +141,7 @@ class Session(ABC):
         self.statistics = DriveStatistics()
         self.outbox = Outbox()
         self.report = Reporter(self.statistics, sentences.not_activated())
+        self.remedy: Callable[[str], Sentence] = sentences.drive_to_correct
         self.duty = StopDuty()
         self.sent = LastSent(image.request)
         self.sample_parameters = image.sample

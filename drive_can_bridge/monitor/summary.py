@@ -154,17 +154,27 @@ class Lines:
     A line for each drive, again and again.
 
     That a drive is online arrives before its first sample, up to some seconds on a busy machine. A
-    line that says ``online`` has the values, so until then it says ``offline``. Samples that this
-    monitor did not ask for, because there are too many, are not waited for.
+    line that says ``online`` has the values, so until then there is none of a drive that is new,
+    and one that was told of before is ``offline`` still. Samples that this monitor did not ask
+    for, because there are too many, are not waited for.
     """
 
     def __init__(self) -> None:
         self._online_since: dict[str, float] = {}
+        self._told: set[str] = set()
 
     def look(self, snapshot: Snapshot, now: float) -> list[str]:
-        """Return a line for each drive."""
-        return [line(drive) if self._known(drive, now) or not drive.online
-                else f'{drive.label} offline' for drive in snapshot.drives]
+        """Return a line for each drive of which it is known how it is."""
+        told = []
+        for drive in snapshot.drives:
+            if self._known(drive, now) or not drive.online:
+                told.append(line(drive))
+            elif drive.name in self._told or now - self._online_since[drive.name] > _PATIENCE:
+                told.append(f'{drive.label} offline')
+            else:
+                continue
+            self._told.add(drive.name)
+        return told
 
     def _known(self, drive: DriveSnapshot, now: float) -> bool:
         if not drive.online:

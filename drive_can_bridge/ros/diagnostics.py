@@ -245,10 +245,7 @@ class DriveReporter:
         if not session.active:
             return DiagnosticStatus.STALE, self.inactive
         if state is DriveState.MAPPING_DIFFERS:
-            said = (sentences.maps_not_kept
-                    if session.configuration.options.mapping == 'configure'
-                    else sentences.maps_to_correct)
-            return DiagnosticStatus.ERROR, said(session.offline_advice)
+            return DiagnosticStatus.ERROR, session.remedy(session.offline_advice)
         if state is DriveState.OFFLINE:
             level = DiagnosticStatus.ERROR if session.ever_online else DiagnosticStatus.STALE
             return level, absence(drive)

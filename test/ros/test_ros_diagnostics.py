@@ -304,6 +304,20 @@ def test_maps_that_the_drive_does_not_keep(bridge: StartBridge, client: Client) 
     assert status['code'] == 'maps_not_kept'
 
 
+def test_what_no_map_can_mend(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(conveyor={
+        'bus': 'main', 'protocol': 'cia402', 'station': 1, 'profile': 'cia402_servo',
+        'mode': 'csp', 'period': 0.02, 'cyclic_request': ['target_position'],
+        'cyclic_response': ['actual_position']}), autostart=False)
+    one.played['conveyor'].set_value('x6502.0', 0x25)
+    assert client.transition(1) and client.transition(3)
+    status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'mapping differs')
+    assert (status['level'], status['code']) == ('ERROR', 'drive_to_correct')
+    assert status['message'] == (
+        'mapping differs: mode csp (8) is none of those that 6502h offers (00000025h); '
+        'correct the drive or the configuration')
+
+
 def test_mapping_configure_rewrites(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={**CONVEYOR, 'mapping': 'configure'}))
     one.online()

@@ -11,7 +11,7 @@ Whatever nobody answers ends it; it begins anew then. What differs from the conf
 cannot be made to fit, is told in words, and the drive is not cycled.
 """
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from enum import Enum
 import math
@@ -64,11 +64,13 @@ class Outcome:
 
     :param text: what differs, or how it runs on.
     :param status: the status word that it began with, where it is ready.
+    :param remedy: says what to do about what differs.
     """
 
     found: Found
     text: Sentence = NOTHING
     status: int = 0
+    remedy: Callable[[str], Sentence] = sentences.drive_to_correct
 
 
 class _End(Exception):
@@ -340,7 +342,8 @@ class BringUp:
             if entry >> 16 & 0x7F == self._options.bridge_node and entry & 0xFFFF:
                 if entry & 0xFFFF < 2000 * interval:
                     raise _differs(sentences.watch_too_short(
-                        _place(CONSUMER, place), entry & 0xFFFF, interval))
+                        _place(CONSUMER, place), entry & 0xFFFF, interval),
+                        sentences.maps_to_correct)
                 self.tell(sentences.watch_stays(_place(CONSUMER, place)))
                 return place
         return None
@@ -375,7 +378,7 @@ class BringUp:
         """End here where what differs is not to be written."""
         options = self._options
         if options.mapping != 'configure':
-            raise _differs(text)
+            raise _differs(text, sentences.maps_to_correct)
         if not options.nmt_start and self._node.state is not NmtState.PRE_OPERATIONAL:
             raise _differs(sentences.not_pre_operational(text))
 
@@ -403,8 +406,10 @@ class BringUp:
             self._may_write(difference)
             refusal = yield from self._write(wanted, identifier, transmit=transmit)
             difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
+            if refusal and difference:
+                raise _differs(refusal)
             if difference:
-                raise _differs(refusal or difference)
+                raise _differs(difference, sentences.maps_not_kept)
 
     def _types(self, *, transmit: bool) -> tuple[int, ...]:
         event = pdo.EVENT_PROFILE, pdo.EVENT_MAKER
@@ -525,8 +530,9 @@ def _silent(reply: Reply) -> bool:
     return reply.data is None and reply.abort is None
 
 
-def _differs(text: Sentence) -> _End:
-    return _End(Outcome(Found.DIFFERS, text))
+def _differs(text: Sentence, remedy: Callable[[str], Sentence] = sentences.drive_to_correct,
+             ) -> _End:
+    return _End(Outcome(Found.DIFFERS, text, remedy=remedy))
 
 
 def _place(index: int, subindex: int = 0) -> str:

@@ -231,7 +231,7 @@ class Cia402Session(Session):
             if found is Found.READY:
                 self._start_cycling(outcome.status, now)
                 return
-            self._differs = found is Found.DIFFERS
+            self._differs, self.remedy = found is Found.DIFFERS, outcome.remedy
             self.report.advice = text or sentences.set_up_unanswered()
             again = now + LOOK_AGAIN
             if found is Found.DIFFERS:

@@ -89,6 +89,8 @@ class ExtendedSession(Session):
         self._wanted = (numbers.numbers(drive.cyclic_request),
                         numbers.numbers(drive.cyclic_response))
         self._rewrites: bool = options.mapping == 'configure'
+        if not self._rewrites:
+            self.remedy = sentences.maps_to_correct
         self.encode_cycle = self._codec.encode_request
         self._answers = Answers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
@@ -262,6 +264,8 @@ class ExtendedSession(Session):
         failure = yield from procedures.write_maps(
             *self._map_bases, request=request, response=response)
         self._rewritten_at = self._channel.now
+        self.remedy = (sentences.maps_not_kept if failure.code in ('', 'write_read_back')
+                       else sentences.drive_to_correct)
         if failure:
             self._tell(sentences.maps_not_written(failure))
         else:

@@ -139,6 +139,66 @@ class TestConfigure:
         assert sample[1:] == (1000, 0, 0)
 
 
+def fixed(*places: tuple[int, int]) -> dict[tuple[int, int], int]:
+    """Return objects that refuse to be written."""
+    return dict.fromkeys(places, 0x06010002)
+
+
+class TestRemedy:
+    """What is to be done about a drive that does not fit: only some of it has to do with maps."""
+
+    COUNTS, NO_MODE = {(0x1019, 0): b'\x0A'}, {(0x6502, 0): bytes(4)}
+
+    @pytest.mark.parametrize(('objects', 'refuses', 'options', 'remedy'), [
+        # nothing was written
+        (NO_MODE, {}, {}, 'drive_to_correct'),
+        (COUNTS, {}, {}, 'drive_to_correct'),
+        ({}, {}, {'nmt_start': False, 'heartbeat_producer': 0.0}, 'drive_to_correct'),
+        # or not taken
+        ({}, fixed((0x1800, 2)), {}, 'drive_to_correct'),
+        ({}, fixed((0x1600, 1)), {}, 'drive_to_correct'),
+        ({}, fixed((0x1400, 1)), {}, 'drive_to_correct'),
+        ({}, fixed((0x1800, 1)), {}, 'drive_to_correct'),
+        ({}, fixed((0x6060, 0)), {}, 'drive_to_correct'),
+        ({(0x1005, 0): bytes.fromhex('81000000')}, fixed((0x1005, 0)), {}, 'drive_to_correct'),
+        ({(0x1800, 5): bytes(2)}, fixed((0x1800, 5)), {'transmission': 'event'},
+         'drive_to_correct'),
+        # where mapping: configure would write it
+        ({}, {}, {'mapping': 'verify'}, 'maps_to_correct'),
+        ({**FITS, (0x1006, 0): b'\1\0\0\0'}, {}, {'mapping': 'verify'}, 'maps_to_correct'),
+        ({**FITS, (0x1016, 1): bytes.fromhex('8F017F00')}, {}, {'mapping': 'verify'},
+         'maps_to_correct'),
+        # where it would not help
+        ({**FITS, **COUNTS}, {}, {'mapping': 'verify'}, 'drive_to_correct'),
+        ({**FITS, **NO_MODE}, {}, {'mapping': 'verify'}, 'drive_to_correct'),
+        ({**FITS, **NO_MODE}, {}, {'mapping': 'assume'}, 'drive_to_correct')])
+    def test_what_to_do(self, objects: dict[Any, Any], refuses: dict[tuple[int, int], int],
+                        options: dict[str, Any], remedy: str) -> None:
+        axis = Axis(objects=objects, **options)
+        axis.drive.fixed = refuses
+        axis.start()
+        differs(axis)
+        assert axis.session.remedy(axis.session.offline_advice) == says(
+            remedy, why=says('mapping_differs'))
+
+    @pytest.mark.parametrize('lacks', [(0x1803, 1), (0x6041, 0), (0x6064, 0)])
+    def test_an_object_that_it_lacks(self, lacks: tuple[int, int]) -> None:
+        axis = Axis('csp', response_pdos=(4,))
+        del axis.drive.objects[lacks]
+        axis.start()
+        differs(axis)
+        assert axis.session.remedy('') == says('drive_to_correct')
+
+    def test_a_map_that_it_takes_and_does_not_keep(self) -> None:
+        axis = Axis()
+        write = axis.drive.write
+        axis.drive.write = (    # type: ignore[method-assign]
+            lambda index, *rest: None if index == 0x1A00 else write(index, *rest))
+        axis.start()
+        assert '1A00h.00h' in differs(axis)
+        assert axis.session.remedy('') == says('maps_not_kept')
+
+
 class TestFaultReaction:
 
     REACTION, FAULT = bytes.fromhex('1F02'), bytes.fromhex('1802')

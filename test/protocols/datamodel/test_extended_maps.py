@@ -121,6 +121,7 @@ def test_maps_differ(request_map: str, response_map: str, text: str) -> None:
     assert talk.events() == [MappingDiffered(text)]
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.session.offline_advice == f'mapping differs: {text}'
+    assert talk.session.remedy('') == says('maps_to_correct')
     assert talk.until(11.001) == []
 
 
@@ -421,6 +422,7 @@ def test_failing_rewrite_backs_off() -> None:
         'write_read_back', what='map parameter 122', found=99, wanted=0))
     assert talk.events(MappingDiffered, MappingWritten) == [MappingDiffered(why)]
     assert talk.session.offline_advice == says('mapping_differs')
+    assert talk.session.remedy('') == says('maps_not_kept')
     assert [entry for entry in keeper.trace if ':=' in entry] == [
         '10.000 122:=0', '11.020 122:=0', '13.040 122:=0', '17.060 122:=0']
 
@@ -455,6 +457,7 @@ def test_rewrite_that_somebody_undoes_is_not_repeated_at_once() -> None:
     told = talk.events(MappingDiffered)
     assert told
     assert told[0].text == says('maps_wait')
+    assert talk.session.remedy('') == says('maps_not_kept')
 
 
 def test_rewrites_that_somebody_undoes_now_and_then_become_rare() -> None:
@@ -488,6 +491,7 @@ def test_drive_that_falls_silent_in_a_rewrite() -> None:
     assert keeper.registers[122] == 0  # every request word is ignored: that is safe
     assert talk.events(MappingDiffered) == [
         MappingDiffered(says('maps_not_written', why=says('no_answer_for_map', number=122)))]
+    assert talk.session.remedy('') == says('drive_to_correct')
 
 
 def test_maps_that_cannot_be_read_are_not_written() -> None:
@@ -497,6 +501,7 @@ def test_maps_that_cannot_be_read_are_not_written() -> None:
     keeper.live(talk, 10.5)
     assert keeper.trace == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert talk.session.remedy('') == says('drive_to_correct')
 
 
 # -- what is not believed -------------------------------------------------------------------------
