@@ -168,6 +168,11 @@ def not_in_one_frame(fits: str) -> str:
     return f'cannot be written in one frame, nothing was written: {fits}'
 
 
+@sentence
+def nothing_written(why: str) -> str:
+    return f'{why}; nothing was written'
+
+
 # -- requests: why a value or a name is refused before any frame ----------------------------------
 
 
@@ -254,6 +259,17 @@ def sent_by_group(name: str, leader: str) -> str:
 @sentence
 def mapping_parameter() -> str:
     return 'mapping parameter: not written while the bridge is active'
+
+
+@sentence
+def joint_quantity_ignored(quantity: str) -> str:
+    return (f'joint_command has a {quantity}, which is ignored: joint.{quantity}_command is not '
+            f'configured')
+
+
+@sentence
+def joint_not_named(joint: str) -> str:
+    return f'joint_command without an entry named {joint}'
 
 
 # -- control: what became of enable, disable, quick stop and fault reset --------------------------
