@@ -1063,6 +1063,36 @@ def one_half(of: str, writable: bool) -> str:
     return f'one half of {of}: set that' if writable else f'read-only: one half of {of}'
 
 
+# -- services -------------------------------------------------------------------------------------
+
+
+@sentence
+def rearm_would_jump(setpoint: str) -> str:
+    return f'{setpoint} would jump: it has neutral_from, which needs rearm: neutral'
+
+
+@sentence
+def nobody_answered() -> str:
+    return 'nobody answered: is its bridge still running?'
+
+
+@sentence
+def nobody_offers(service: str) -> str:
+    return f'nobody offers {service}: no control word, or its bridge does not run'
+
+
+@sentence
+def answer_not_delivered(service: str) -> str:
+    return (f'an answer of {service} could not be delivered: its caller takes none (another QoS, '
+            f'or DDS has not found all of it)')
+
+
+@sentence
+def answers_hold_up(reason: str) -> str:
+    return (f'answers hold up the whole process while they wait for a caller that DDS has not '
+            f'found yet: rclpy sends them ({reason})')
+
+
 # -- the log, and traces --------------------------------------------------------------------------
 
 
