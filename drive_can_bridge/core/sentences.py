@@ -168,6 +168,11 @@ def not_in_one_frame(fits: str) -> str:
     return f'cannot be written in one frame, nothing was written: {fits}'
 
 
+@sentence
+def nothing_written(why: str) -> str:
+    return f'{why}; nothing was written'
+
+
 # -- requests: why a value or a name is refused before any frame ----------------------------------
 
 
@@ -254,6 +259,17 @@ def sent_by_group(name: str, leader: str) -> str:
 @sentence
 def mapping_parameter() -> str:
     return 'mapping parameter: not written while the bridge is active'
+
+
+@sentence
+def joint_quantity_ignored(quantity: str) -> str:
+    return (f'joint_command has a {quantity}, which is ignored: joint.{quantity}_command is not '
+            f'configured')
+
+
+@sentence
+def joint_not_named(joint: str) -> str:
+    return f'joint_command without an entry named {joint}'
 
 
 # -- control: what became of enable, disable, quick stop and fault reset --------------------------
@@ -1045,6 +1061,36 @@ def never_written(number: int) -> str:
 @sentence
 def one_half(of: str, writable: bool) -> str:
     return f'one half of {of}: set that' if writable else f'read-only: one half of {of}'
+
+
+# -- services -------------------------------------------------------------------------------------
+
+
+@sentence
+def rearm_would_jump(setpoint: str) -> str:
+    return f'{setpoint} would jump: it has neutral_from, which needs rearm: neutral'
+
+
+@sentence
+def nobody_answered() -> str:
+    return 'nobody answered: is its bridge still running?'
+
+
+@sentence
+def nobody_offers(service: str) -> str:
+    return f'nobody offers {service}: no control word, or its bridge does not run'
+
+
+@sentence
+def answer_not_delivered(service: str) -> str:
+    return (f'an answer of {service} could not be delivered: its caller takes none (another QoS, '
+            f'or DDS has not found all of it)')
+
+
+@sentence
+def answers_hold_up(reason: str) -> str:
+    return (f'answers hold up the whole process while they wait for a caller that DDS has not '
+            f'found yet: rclpy sends them ({reason})')
 
 
 # -- the log, and traces --------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
+from drive_can_bridge.core.sentences import answer_not_delivered, answers_hold_up
 from drive_can_bridge.ros.middleware import GONE, RCLError
 
 #: rcl/types.h
@@ -281,8 +282,7 @@ class Answers:
         if not known:
             # it tells of callers out of reach by a warning of Python's, with a line of its source
             warnings.filterwarnings('ignore', 'failed to send response', RuntimeWarning)
-            self._info(f'answers hold up the whole process while they wait for a caller that DDS '
-                       f'has not found yet: rclpy sends them ({reason})')
+            self._info(answers_hold_up(str(reason)))
 
     def _defer(self, rcl: RclResponses, response: Response) -> None:
         """Leave an answer to the thread that may wait; enough wait there: it is lost."""
@@ -320,9 +320,7 @@ class Answers:
             name = service.service_name
         except GONE:    # meanwhile; nobody misses the answer
             return
-        self._warn(f'answer of {name}',
-                   f'an answer of {name} could not be delivered: its caller takes none (another '
-                   f'QoS, or DDS has not found all of it)')
+        self._warn(f'answer of {name}', answer_not_delivered(name))
 
     # -- the thread that waits for clients out of reach -------------------------------------------
 

@@ -44,6 +44,7 @@ from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.sentences import rearm_would_jump
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
@@ -274,8 +275,7 @@ class BridgeNode(LifecycleNode):
         drive = None if runtime is None else runtime.drive_of(name)
         if drive is not None and name.endswith('.rearm') and value == 'immediate':
             for setpoint in drive.session.setpoints.held:
-                return (f'{setpoint.parameter.name} would jump: it has neutral_from, which needs '
-                        f'rearm: neutral')
+                return rearm_would_jump(setpoint.parameter.name)
         return ''
 
     def _parameter_changed(self, name: str, value: Any) -> None:

@@ -20,6 +20,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.sentences import joint_not_named, joint_quantity_ignored
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.words import value_text
@@ -150,8 +151,7 @@ class CommandIntake:
             entry = message.names.index(joint.name)
         except ValueError:
             self._session.statistics.commands_refused += 1
-            self._warn('joint name', f'joint_command without an entry named {joint.name}',
-                       once=True)
+            self._warn('joint name', joint_not_named(joint.name), once=True)
             return
         for quantity, values in message.columns:
             if entry < len(values):
@@ -187,8 +187,7 @@ class CommandIntake:
     def _tell_ignored(self, quantity: str) -> None:
         if quantity not in self._told:
             self._told.add(quantity)
-            self._inform(f'joint_command has a {quantity}, which is ignored: '
-                         f'joint.{quantity}_command is not configured')
+            self._inform(joint_quantity_ignored(quantity))
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a command that is thrown away."""

@@ -29,7 +29,7 @@ from drive_can_bridge.core.requests import (
     Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import bridge_inactive, Sentence
+from drive_can_bridge.core.sentences import bridge_inactive, nothing_written, Sentence
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
@@ -231,7 +231,7 @@ class ParameterServices:
         excess = self._excess([message.name for message in request.parameters],
                               'set parameters')
         if excess:
-            response.result = SetParametersResult(reason=f'{excess}; nothing was written')
+            response.result = SetParametersResult(reason=nothing_written(excess))
             return response
         items: list[tuple[Parameter, int]] = []
         for message in request.parameters:
@@ -239,7 +239,7 @@ class ParameterServices:
                 items.append(self._checked(message))
             except ValueRefused as error:
                 name = printable(message.name, NAME_SHOWN)
-                reason = f'{name}: {error}; nothing was written'
+                reason = nothing_written(f'{name}: {error}')
                 self._failed(f'set {name}', reason, 1)
                 response.result = SetParametersResult(reason=reason)
                 return response

@@ -13,6 +13,8 @@ from std_msgs.msg import Bool, Float64, Int64
 from waiting import pause
 from world import World
 
+from drive_can_bridge.core import sentences
+
 SPEED, LIMIT = '/conveyor/command/speed_setpoint', '/conveyor/command/torque_limit'
 POSITION = '/conveyor/command/position_setpoint'
 TWO_SETPOINTS = {**CONVEYOR, 'cyclic_request': ['speed_setpoint', 'position_setpoint']}
@@ -113,7 +115,7 @@ def test_time_out_goes_neutral_by_setpoint(bridge: StartBridge, client: Client) 
         assert recorder.words()[0] == 0
         status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
         assert status['level'] == 'WARN'
-        assert '0 to /conveyor/command/speed_setpoint' in status['message']
+        assert f'0 to {SPEED}' in status['message']
 
 
 @pytest.mark.parametrize('value, reason', [
@@ -184,8 +186,9 @@ def test_integers_and_bools(bridge: StartBridge, client: Client, tmp_path: Any) 
         'cyclic_response': ['actual']}))
     one.online()
     status = client.diagnostics(DRIVE, lambda drive: drive['state'] == 'not armed')
-    assert '5 to /conveyor/command/counts' in status['message']
-    assert 'false to /conveyor/command/brake' in status['message']
+    neutral = [f'{value} to /conveyor/command/{name}' for name, value in (
+        ('counts', '5'), ('brake', 'false'), ('wide', '0'))]
+    assert sentences.not_armed(neutral) in status['message']
     with one.record() as recorder:
         wait_until(recorder.words)
         assert recorder.words() == (5, 0, 0, 0)
@@ -240,11 +243,10 @@ def test_joint_command(bridge: StartBridge, client: Client) -> None:
         client.wait_logged('command speed_setpoint refused: inf')
         wait_until(lambda: refused(one) == 5)
         told = [text for text in client.logged(0) if 'which is ignored' in text]
-        assert told == ['conveyor: joint_command has a position, which is ignored: '
-                        'joint.position_command is not configured']
+        assert told == [f'conveyor: {sentences.joint_quantity_ignored("position")}']
         assert not [text for text in client.logged() if text in told]
         warnings = [text for text in client.logged() if 'without an entry' in text]
-        assert warnings == ['conveyor: joint_command without an entry named belt']
+        assert warnings == [f'conveyor: {sentences.joint_not_named("belt")}']
         client.publish(topic, JointState(name=['belt']))
         client.publish(topic, JointState(name=['belt'], velocity=[30 * one_rpm]))
         wait_until(lambda: recorder.words()[:2] == (300, 250))

@@ -180,7 +180,7 @@ def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) 
     one.played['conveyor'].fault('off')
     client.diagnostics('drive_can_bridge: drive conveyor',
                        lambda drive: drive['state'] == 'offline')
-    assert trigger(client, 'quick_stop', '/conveyor') == (False, 'drive offline')
+    assert trigger(client, 'quick_stop', '/conveyor') == (False, sentences.drive_offline())
 
 
 def test_enable_that_gets_stuck_names_the_state(bridge: StartBridge, client: Client) -> None:
@@ -197,10 +197,10 @@ def test_all_refuse_while_offline(bridge: StartBridge, client: Client) -> None:
     assert enable(client)[0]
     one.played['lift'].fault('silent')
     wait_until(lambda: not one.node.drives['lift'].session.online)
-    assert enable(client) == (False, 'drive offline')
-    assert enable(client, False) == (False, 'drive offline')
-    assert trigger(client, 'reset_fault') == (False, 'drive offline')
-    assert trigger(client, 'quick_stop') == (False, 'drive offline')
+    assert enable(client) == (False, sentences.drive_offline())
+    assert enable(client, False) == (False, sentences.drive_offline())
+    assert trigger(client, 'reset_fault') == (False, sentences.drive_offline())
+    assert trigger(client, 'quick_stop') == (False, sentences.drive_offline())
     one.played['lift'].fault('ok')
     one.online()
     wait_until(lambda: one.played['lift'].value('control_word') == 0)
@@ -227,8 +227,8 @@ def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
     wait_until(lambda: one.node.drives['lift'].session.control.pending)
     assert client.transition(4)
     wait_until(future.done)
-    assert (future.result().success, future.result().message) == (False, 'bridge inactive')
-    assert enable(client) == (False, 'bridge inactive')
+    assert (future.result().success, future.result().message) == (False, sentences.bridge_inactive())
+    assert enable(client) == (False, sentences.bridge_inactive())
 
 
 def test_a_stop_waits_for_no_other_service(bridge: StartBridge, client: Client) -> None:

@@ -18,15 +18,22 @@ from drive_can_bridge.ros.messages import facts_of
 from drive_can_bridge.ros.values import constraints
 
 
-def test_as_the_contract_writes_it() -> None:
-    torque = Parameter(
-        'actual_torque', number=209, index=0x2004, subindex=0x10, type=ParameterType.INT16,
-        scale=0.1, unit='N m', scaled=True, access=RO, storage=RAM)
-    assert constraints(torque, Role.CYCLIC) == (
-        'unit="N m" number=209 index=0x2004 subindex=0x10 type=int16 scale=0.1 offset=0 '
-        'access=ro storage=ram protected=false role=cyclic')
-    assert constraints(parameter('key', 44, access=WO, storage=EEPROM), None) == (
-        'number=44 type=uint16 access=wo storage=eeprom protected=false')
+@pytest.mark.parametrize(('described', 'role', 'text'), [
+    (Parameter('actual_torque', number=209, index=0x2004, subindex=0x10, type=ParameterType.INT16,
+               scale=0.1, unit='N m', scaled=True, access=RO, storage=RAM), Role.CYCLIC,
+     'unit="N m" number=209 index=0x2004 subindex=0x10 type=int16 scale=0.1 offset=0 '
+     'access=ro storage=ram protected=false role=cyclic'),
+    (parameter('key', 44, access=WO, storage=EEPROM), None,
+     'number=44 type=uint16 access=wo storage=eeprom protected=false'),
+    # what does not apply is absent
+    (Parameter('p80', ParameterType.UINT32, 80, listed=False, width_known=False), None,
+     'number=80 access=rw protected=false'),
+    (Parameter('p613.5', number=613, subindex=5, protected=True), None,
+     'number=613 subindex=5 type=uint16 access=rw protected=true'),
+    (Parameter('frequency', access=RO), Role.CYCLIC,
+     'type=uint16 access=ro protected=false role=cyclic')])
+def test_as_the_contract_writes_it(described: Parameter, role: Role | None, text: str) -> None:
+    assert constraints(described, role) == text
 
 
 @pytest.mark.parametrize('unit', ['rpm', 'N m', '%', "'", '"', '\\', 'a "b" \\c', '°C', 'a=b',
@@ -36,17 +43,6 @@ def test_whatever_the_unit_is_it_can_be_taken_apart(unit: str) -> None:
     found = dict(pair.split('=', 1) for pair in shlex.split(text))
     assert found['unit'] == unit
     assert (float(found['scale']), float(found['offset'])) == (1 / 3, -273.15)
-
-
-def test_what_does_not_apply_is_absent() -> None:
-    plain = Parameter('p80', ParameterType.UINT32, 80, listed=False, width_known=False)
-    assert constraints(plain, None) == 'number=80 access=rw protected=false'
-    element = Parameter('p613.5', number=613, subindex=5, protected=True)
-    assert constraints(element, None) == (
-        'number=613 subindex=5 type=uint16 access=rw protected=true')
-    nowhere = Parameter('frequency', access=RO)
-    assert constraints(nowhere, Role.CYCLIC) == (
-        'type=uint16 access=ro protected=false role=cyclic')
 
 
 @pytest.mark.parametrize('facts', FAMILIES, ids=lambda row: row.protocol)

@@ -5,6 +5,8 @@ from bridges import parameters, StartBridge
 from clients import Client
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core import sentences
+
 AXIS = {'bus': 'main', 'protocol': 'cia402', 'station': 1, 'profile': 'cia402_servo',
         'mode': 'csp', 'period': 0.02, 'cyclic_request': ['target_position'],
         'cyclic_response': ['actual_position'], 'missed_limit': 100, 'parameter_timeout': 2.0,
@@ -15,10 +17,10 @@ AXIS = {'bus': 'main', 'protocol': 'cia402', 'station': 1, 'profile': 'cia402_se
 def test_home(bridge: StartBridge, client: Client) -> None:
     bridge(parameters(slide={**AXIS, 'homing': True})).online('slide')
     refused = client.call('/slide/home', Trigger)
-    assert (refused.success, 'enable it first' in refused.message) == (False, True)
+    assert (refused.success, refused.message) == (False, sentences.homing_needs_enabled())
     assert client.call('/slide/enable', SetBool, SetBool.Request(data=True)).success
     homed = client.call('/slide/home', Trigger)
-    assert (homed.success, homed.message) == (True, 'homed')
+    assert (homed.success, homed.message) == (True, sentences.homed())
 
 
 def test_only_where_it_was_asked_for(bridge: StartBridge, client: Client) -> None:

@@ -17,6 +17,8 @@ from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 from waiting import clock, pause
 
+from drive_can_bridge.core import sentences
+
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
 UNCONFIGURED_SHUTDOWN = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
@@ -96,11 +98,11 @@ def test_inactive_sends_nothing(bridge: StartBridge, client: Client) -> None:
         client.publish('/conveyor/command/speed_setpoint', Float64(data=0.0))
         assert client.get('/conveyor', 'ramp_time', 'nothing') == [None, None]
         assert client.set('/conveyor', ramp_time=1.0, jog_speed=1.0) == [
-            (False, 'bridge inactive')] * 2
+            (False, sentences.bridge_inactive())] * 2
         assert client.set_atomically('/conveyor', jog_speed=1.0) == (
-            False, 'jog_speed: bridge inactive; nothing was written')
+            False, sentences.nothing_written(f'jog_speed: {sentences.bridge_inactive()}'))
         status = client.diagnostics(DRIVE)
-        assert status['state'] == 'offline' and 'inactive' in status['message']
+        assert (status['state'], status['code']) == ('offline', 'activate_bridge')
         client.diagnostics('drive_can_bridge: bus main', lambda bus: bus['state'] == 'up')
         assert not recorder.requests()
     client.wait_logged('read parameters: bridge inactive')

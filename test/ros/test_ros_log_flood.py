@@ -5,10 +5,14 @@ from bridges import LIFT, parameters, StartBridge
 from clients import Client, WARN
 import pytest
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
 from drive_can_bridge.ros import log as log_module
 
 FLIPS = 400
+FAULT = sentences.fault_came(sentences.status_word(8), False)
+GONE = sentences.fault_gone(sentences.status_word(1))
+DANGER = sentences.may_still_be_running(sentences.stop_not_answered())
 
 
 def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
@@ -22,18 +26,17 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
     before = len(client.logged(0))
     with lift.exchange.lock:
         for _ in range(FLIPS):
-            lift.handle_event(Noted('fault (status word 0008h)', warning=True))
-            lift.handle_event(StationLost('no answer'))
+            lift.handle_event(Noted(FAULT, warning=True))
+            lift.handle_event(StationLost('silent'))
             lift.handle_event(StationFound())
-            lift.handle_event(Noted('fault gone (status word 0001h)', warning=True))
-        lift.handle_event(Noted('told to stop, but no answer: it may still be running',
-                                warning=True, danger=True))
+            lift.handle_event(Noted(GONE, warning=True))
+        lift.handle_event(Noted(DANGER, warning=True, danger=True))
     assert lift.times_lost == FLIPS
-    client.wait_logged('lift: told to stop, but no answer: it may still be running', WARN)
-    client.wait_logged('lift: fault gone (status word 0001h) (395 more times in ')
+    client.wait_logged(f'lift: {DANGER}', WARN)
+    client.wait_logged(f'lift: {GONE} (395 more times in ')
     lines = [line for line in client.logged(0)[before:] if line.startswith('lift')]
-    assert lines[:8] == ['lift: fault (status word 0008h)', 'lift: offline: no answer',
-                         'lift: online', 'lift: fault gone (status word 0001h)'] * 2
-    assert lines.index('lift: told to stop, but no answer: it may still be running') == 20
-    client.wait_logged('it may still be running (this came last, ')
+    assert lines[:8] == [
+        f'lift: {text}' for text in (FAULT, 'offline: silent', 'online', GONE)] * 2
+    assert lines.index(f'lift: {DANGER}') == 20
+    client.wait_logged(f'{DANGER} (this came last, ')
     assert len(client.logged(0)) - before <= 20 + 1 + 4 + 1

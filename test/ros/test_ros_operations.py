@@ -13,6 +13,7 @@ import rclpy
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core.sentences import nobody_answered, nobody_offers
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT
@@ -112,9 +113,9 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
             operations.stop('/lift', Stop.DISABLE, told.append, now)
             assert operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT - 0.1)
             assert not operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT)
-            assert told[1:] == [Outcome(False, 'nobody answered: is its bridge still running?')]
+            assert told[1:] == [Outcome(False, nobody_answered())]
             operations.stop('/conveyor', Stop.DISABLE, told.append, now)
-            assert 'nobody offers /conveyor/enable: no control word' in told[-1].text
+            assert told[-1].text == nobody_offers('/conveyor/enable')
         finally:
             client.node.destroy_service(service)
 

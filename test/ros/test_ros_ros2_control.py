@@ -22,6 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import clock
 import yaml
 
+from drive_can_bridge.core.sentences import rearm_would_jump
 from drive_can_bridge.simulation.registers import Mechanics
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
@@ -335,8 +336,7 @@ def test_nothing_creeps_for_a_long_time(arm: Arm) -> None:
 
 def test_rearm_stays_neutral(arm: Arm) -> None:
     (answer,) = arm.client.set('/drive_can_bridge', **{'drives.wrist.rearm': 'immediate'})
-    assert answer == (False, 'position_setpoint would jump: it has neutral_from, which needs '
-                             'rearm: neutral')
+    assert answer == (False, rearm_would_jump('position_setpoint'))
 
 
 def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:

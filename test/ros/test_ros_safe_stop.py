@@ -9,6 +9,7 @@ import pytest
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.exchange.exchange import BusExchange
 
 LIFTS = parameters(lift=LIFT)
@@ -58,10 +59,11 @@ def test_a_control_word_without_slot_is_written_at_the_end(bridge: StartBridge,
 
 def ends_safely(one: Bridge, client: Client, recorder: Recorder) -> None:
     wait_until(lambda: one.fatal)
-    assert one.fatal == ['buses.main: internal error: RuntimeError: a defect']
+    defect = sentences.internal_error('RuntimeError', 'a defect')
+    assert one.fatal == [f'buses.main: {defect}']
     one.node.stop()
     wait_until(lambda: last_cycles(recorder) == [(0, 0, 0, 0)] * 3)
-    client.wait_logged('internal error: RuntimeError: a defect', ERROR)
+    client.wait_logged(defect, ERROR)
 
 
 def test_a_dead_timer_thread_ends_the_bridge_safely(bridge: StartBridge, client: Client,

@@ -21,6 +21,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.sentences import nobody_answered, nobody_offers
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import is_ros_name, Outcome, Place, Status, Stop
@@ -45,7 +46,7 @@ _STOPS: dict[Stop, tuple[str, Any, Callable[[], Any]]] = {
     Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request),
     Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False)),
 }
-_SILENCE = Outcome(False, 'nobody answered: is its bridge still running?')
+_SILENCE = Outcome(False, nobody_answered())
 
 
 def stamp_of(message: Any) -> float:
@@ -323,8 +324,7 @@ class Operations:
                  else Outcome(response.success, printable(response.message)))
         service = self._stops.get((drive, stop))
         if service is None:
-            done(Outcome(False, f'nobody offers {drive}/{_STOPS[stop][0]}: no control word, or '
-                                f'its bridge does not run'))
+            done(Outcome(False, nobody_offers(f'{drive}/{_STOPS[stop][0]}')))
         else:
             service.send(_STOPS[stop][2](), take, now)
 
