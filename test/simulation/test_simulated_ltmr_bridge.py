@@ -8,6 +8,7 @@ from cable import Cable
 from hypothesis import given, Phase, settings, strategies as st
 from ltmr_builders import LTMR, names, NODE
 import pytest
+from saying import says
 from simulation_builders import RULES
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
@@ -96,7 +97,7 @@ def test_a_lost_answer_to_a_write() -> None:
     line.until(1.002)
     # only this one answer is lost; whatever is sent again would be answered
     line.fault('ok')
-    assert line.wait(request) == ['no answer in 0.5 s, 1 attempt']
+    assert line.wait(request) == [says('no_answer', timeout=0.5, attempts=1)]
     line.until(5.0)
     assert line.session.online
     assert line.writes('8C02') == ['3200']
