@@ -18,6 +18,11 @@ from transcripts import replayed, stories
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
 
+#: why nobody is asked
+REFUSED = {
+    'used': 'bus main: drive lift is used by process {} ',
+    'master': 'bus main: another master talks to drive lift (3F2#1E00); end it first\n',
+}
 #: why a right value is not written beside a wrong one
 ANOTHER = 'another value of this command is refused'
 STORIES = stories(__file__, 'commands.yaml')
@@ -221,7 +226,7 @@ def test_in_use(run: Run, world: World) -> None:
     with open_drives(world.file):
         code, lines, errors = run('write', 'lift', 'ramp_time=2')
     assert (code, lines) == (1, [])
-    assert errors.startswith(f'bus main: drive lift is used by process {os.getpid()} ')
+    assert errors.startswith(REFUSED['used'].format(os.getpid()))
 
 
 def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
@@ -229,7 +234,7 @@ def test_another_master_ends_it(run: Run, tmp_path: Path) -> None:
         with stranger(own, frame('3F2#1E00'), after=0.4):
             code, lines, errors = run('read', 'conveyor', file=own.file)
     assert (code, lines) == (1, [])
-    assert errors == ('bus main: another master talks to drive lift (3F2#1E00); end it first\n')
+    assert errors == REFUSED['master']
 
 
 # -- completion -----------------------------------------------------------------------------------

@@ -39,8 +39,8 @@ SAID = {
     'silence': 'no answer to parameter tasks',
     'which': 'which drive? There are: ',
     'set': 'To be set',
-    'to be set': '\nTo be set in the file:\n  conveyor:\n    value_order: low_first\n'
-                 '    index_byte: high\n',
+    'keys': '\nTo be set in the file:\n  conveyor:\n    value_order: low_first\n'
+            '    index_byte: high\n',
 }
 Device = Callable[[Frame], list[Frame]]
 
@@ -529,7 +529,7 @@ def test_the_command(bench: World, tmp_path: Path, capsys: pytest.CaptureFixture
         out, err = capsys.readouterr()
         assert out.splitlines()[0].split() == ['drive', 'key', 'found', 'in', 'the', 'file',
                                                'rests', 'on']
-        assert out.endswith(SAID['to be set'])
+        assert out.endswith(SAID['keys'])
         assert not err
         assert drive_can('probe', '--params-file', other, '--json') == 0
         documents = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
