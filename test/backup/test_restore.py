@@ -15,6 +15,14 @@ from drive_can_bridge.backup.restore import (
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive
 
+#: what is said while a drive is away, and of backups of another one
+TOLD = {
+    'away': 'pump: answers no more; waiting up to 10 s for it, so that general_configuration is '
+            'set back',
+    'serial number': 'it is a backup of serial_number_4=77, the drive is serial_number_4=5',
+    'profile': 'it is a backup with profile tesys_t_ltmr (abababababab…), the drive has '
+               'tesys_t_ltmr ({}…)',
+}
 MODE = 0x0001
 
 
@@ -227,8 +235,7 @@ class TestMode:
         with shop.reached('pump') as drive:
             result = restored(drive, file, wait=wait, hints=hints)
         assert not result.complete
-        assert hints == ['pump: answers no more; waiting up to 10 s for it, so that '
-                         'general_configuration is set back']
+        assert hints == [TOLD['away']]
         # it came back in the mode, which it keeps in EEPROM
         assert self.mode(shop) == 0x0010
         assert result.steps == []
@@ -314,9 +321,7 @@ class TestFile:
             assert strangers(read_backup(file), drive, identity) == []
             other = same.replace('serial_number_4=5', 'serial_number_4=77')
             file = shop.write_backup('pump', other, flc1_ratio=50.0)
-            assert strangers(read_backup(file), drive, identity) == [
-                'it is a backup of serial_number_4=77, the drive is serial_number_4=5']
+            assert strangers(read_backup(file), drive, identity) == [TOLD['serial number']]
             file = shop.write_backup('pump', same.replace(digest, 'ab' * 32), flc1_ratio=50.0)
-            text, = strangers(read_backup(file), drive, identity)
-            assert text == ('it is a backup with profile tesys_t_ltmr (abababababab…), the drive '
-                            f'has tesys_t_ltmr ({digest[:12]}…)')
+            assert strangers(read_backup(file), drive, identity) == [
+                TOLD['profile'].format(digest[:12])]

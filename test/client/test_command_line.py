@@ -56,10 +56,16 @@ def test_no_line_has_all_that_a_file_has(tmp_path: Path,
     assert len(lines) > 1 and max(map(len, lines)) <= 4000
 
 
+TABLE = """\
+name      count  what
+a             5
+longer  1000000  b"""
+
+
 def test_columns() -> None:
-    assert column_lines(('name', 'count', 'what'), [('a', '5', ''), ('longer', '1000000', 'b')],
-                        numbers=('count',)) == [
-        'name      count  what', 'a             5', 'longer  1000000  b']
+    lines = column_lines(('name', 'count', 'what'), [('a', '5', ''), ('longer', '1000000', 'b')],
+                         numbers=('count',))
+    assert '\n'.join(lines) == TABLE
 
 
 @pytest.mark.parametrize('words', [

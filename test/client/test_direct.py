@@ -24,6 +24,14 @@ from drive_can_bridge.exchange.one_master import InUse
 
 pytestmark = pytest.mark.usefixtures('bench')
 
+#: what is said of drives that need more than to be asked
+SAID = {
+    'pre-operational': 'drive offline: node is pre-operational',
+    'offline': 'no answer; drive offline',
+    'hint': 'answers no PKW, --nmt-start starts it',
+    'supervised': 'mixer: P513 is not 0: the drive supervises telegrams once it has got one, and '
+                  'faults when they end',
+}
 #: everything that only a master sends to these drives, but acyclic requests
 CYCLIC_REQUEST = 0x003FFFF0
 MIXER_PROCESS_DATA = 0x260
@@ -169,9 +177,8 @@ def test_no_process_data_and_no_nmt(drives: Drives, world: World, tmp_path: Path
         opened['mixer'].write({'acceleration_time': 3.0})
         wait_for(lambda: 0x705 in {each.identifier for each in own.seen()}, 'a heartbeat')
         outcome = opened['pump'].read('trip_code')['trip_code']
-        assert outcome.reason.startswith(('drive offline: node is pre-operational',
-                                          'no answer; drive offline'))
-        assert outcome.reason.endswith('answers no PKW, --nmt-start starts it')
+        assert outcome.reason.startswith((SAID['pre-operational'], SAID['offline']))
+        assert outcome.reason.endswith(SAID['hint'])
         identifiers = {each.identifier for each in own.seen()}
         assert 0 not in identifiers
         assert not identifiers & set(range(MIXER_PROCESS_DATA, 0x264))
@@ -190,9 +197,7 @@ def test_supervision_of_telegrams_is_warned_about(tmp_path: Path) -> None:
             assert drives.warnings == ()
         world.drives['mixer'].set_value('p513', 20)
         with open_drives(world.file) as drives:
-            assert drives.warnings == (
-                'mixer: P513 is not 0: the drive supervises telegrams once it has got one, and '
-                'faults when they end',)
+            assert drives.warnings == (SAID['supervised'],)
 
 
 def test_a_silent_drive_costs_little(tmp_path: Path) -> None:

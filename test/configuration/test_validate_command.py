@@ -214,30 +214,28 @@ def test_terminals_that_lack_characters(encoding: str, subcommand: str) -> None:
     assert b'\\u2026' in done.stdout
 
 
-@pytest.mark.parametrize(('error', 'line'), [
-    (ValueError('odd'), 'drive_can: internal error, please report it: ValueError: odd\n'),
-    (ModuleNotFoundError('no', name='rclpy'),
-     'drive_can: this needs a Python module that is not installed: rclpy\n'),
-    (OSError(28, 'No space left on device'), 'drive_can: No space left on device\n'),
-    (OSError('odd'), 'drive_can: odd\n'),
+@pytest.mark.parametrize(('error', 'code', 'line'), [
+    (ValueError('odd'), 1, ': internal error, please report it: ValueError: odd'),
+    (ModuleNotFoundError('no', name='rclpy'), 1,
+     ': this needs a Python module that is not installed: rclpy'),
+    (OSError(28, 'No space left on device'), 1, ': No space left on device'),
+    (OSError('odd'), 1, ': odd'),
+    (KeyboardInterrupt(), 130, ' validate: interrupted'),
 ])
 def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-                           error: BaseException, line: str) -> None:
+                           error: BaseException, code: int, line: str) -> None:
     def fail(*_: object) -> int:
         raise error
 
     monkeypatch.setattr(front_end, '_run', fail)
-    assert front_end.main([]) == 1
-    assert capsys.readouterr() == ('', line)
+    assert front_end.main(['validate'] if code == 130 else []) == code
+    assert capsys.readouterr() == ('', f'drive_can{line}\n')
 
 
-def test_interrupted(monkeypatch: pytest.MonkeyPatch,
-                     capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_is_how_the_endless_ones_end(monkeypatch: pytest.MonkeyPatch) -> None:
     def stop(*_: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(front_end, '_run', stop)
-    assert front_end.main(['validate']) == 130
-    assert capsys.readouterr() == ('', 'drive_can validate: interrupted\n')
     for endless in (['simulate'], ['record'], ['decode', '--live']):
         assert front_end.main(endless) == 0

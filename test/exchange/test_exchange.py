@@ -639,6 +639,10 @@ def test_frames_that_were_not_sent_do_not_count() -> None:
 # -- what must not happen -------------------------------------------------------------------------
 
 
+#: how ``ZeroDivisionError('a defect')`` is told
+DEFECT = 'internal error: ZeroDivisionError: a defect'
+
+
 def test_misconfigured_bus_is_fatal() -> None:
     bench = Bench(drive())
     bench.exchange.bus_misconfigured('unknown')
@@ -648,8 +652,9 @@ def test_misconfigured_bus_is_fatal() -> None:
 
 def test_defect_of_the_reader_is_fatal() -> None:
     bench = Bench(drive())
-    bench.exchange.link_failed('KeyError: 5')
-    assert bench.bus_notes.told == [('fatal', 'main', 'internal error: KeyError: 5', False)]
+    reason = 'KeyError: 5'
+    bench.exchange.link_failed(reason)
+    assert bench.bus_notes.told == [('fatal', 'main', f'internal error: {reason}', False)]
     assert bench.exchange.bus_state == 'failed'
 
 
@@ -669,8 +674,7 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -
     wait_for(lambda: bench.link.sent)
     failing = True
     wait_for(lambda: len(bench.bus_notes.told) > 1)
-    assert bench.bus_notes.told[-1] == (
-        'fatal', 'main', 'internal error: ZeroDivisionError: a defect', False)
+    assert bench.bus_notes.told[-1] == ('fatal', 'main', DEFECT, False)
     # the lock is free, and the drives are stopped all the same
     bench.link.take()
     assert bench.exchange.deactivate() is True
@@ -699,8 +703,7 @@ def test_a_session_that_fails_keeps_no_other_from_its_stop(
     assert [text for text in sent if text.startswith('005')] == [f'005FFFF0#{ZEROS}'] * 3
     assert [text for text in sent if text.startswith('003')] == [NEUTRAL] * 3 * stopped
     assert bench.sessions[1].stopped
-    assert bench.exchange.bus_reason == (
-        '' if stopped else 'first: internal error: ZeroDivisionError: a defect')
+    assert bench.exchange.bus_reason == ('' if stopped else f'first: {DEFECT}')
 
 
 def test_frames_that_nobody_else_should_send_are_counted() -> None:

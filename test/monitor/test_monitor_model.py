@@ -129,8 +129,6 @@ def test_a_silent_bridge_takes_its_drives_along_in_words() -> None:
     drive, = snapshot.drives
     assert (drive.state, drive.level, drive.online) == ('unknown', Level.STALE, False)
     assert drive.silent
-    assert 'may still be running' in drive.advice
-    assert line(drive) == f'conveyor offline ({drive.advice})'
     assert snapshot.buses[0].state == 'unknown'
     assert model.silent(NOW + 5.0) == (BRIDGE, '/conveyor')
     assert model.silent(NOW + 1.0) == ()
@@ -163,7 +161,7 @@ def test_online_is_believed_at_once_until_diagnostics_say_more() -> None:
     model = model_of([drive_status()])
     model.went_online('/conveyor', True, NOW + 0.1)
     model.went_online('/conveyor', False, NOW + 0.2)
-    assert model.look(NOW + 0.3, AT).drives[0].advice == 'offline: it stopped answering'
+    assert model.look(NOW + 0.3, AT).drives[0].state == 'offline'
     model.diagnosed([drive_status(level=2, state='offline', message='offline: why')], AT + 1,
                     NOW + 1)
     assert model.look(NOW + 1, AT).drives[0].advice == 'offline: why'

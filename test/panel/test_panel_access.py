@@ -29,8 +29,8 @@ def test_the_token_of_each_role_opens_and_becomes_a_cookie() -> None:
     access = Access(port=PORT)
     for role in Role:
         entry = judge(access, query=f'token={access.tokens[role]}', cookie='')
-        assert entry == Entry(role, f'drive_can_panel_8080={access.tokens[role]}; HttpOnly; '
-                                    f'SameSite=Strict; Path=/')
+        cookie = f'drive_can_panel_8080={access.tokens[role]}; HttpOnly; SameSite=Strict; Path=/'
+        assert entry == Entry(role, cookie)
         assert judge(access, cookie=f'a=b; drive_can_panel_8080={access.tokens[role]}') == (
             Entry(role))
 

@@ -31,6 +31,11 @@ class Outcome(NamedTuple):
         return list(self.built.notes)
 
 
+def told(made: Outcome) -> str:
+    """Return what an import says of its file, a line each."""
+    return ''.join(f'{line}\n' for line in (*made.left_out, *made.notes))
+
+
 def bring_in(folder: Path, content: str | bytes, name: str = 'table.csv', *, columns: str = '',
              protocols: Sequence[str] = (), sign: str = '') -> Outcome:
     """Import a file; what comes out has to pass ``profile check``."""

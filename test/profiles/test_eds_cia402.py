@@ -3,8 +3,9 @@
 
 from pathlib import Path
 
-from import_builders import bring_in, Outcome
+from import_builders import bring_in, Outcome, told
 import pytest
+from transcripts import stories
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
@@ -94,10 +95,7 @@ def test_what_is_the_makers_own_is_raw_and_said_to_be(tmp_path: Path) -> None:
     assert (target.neutral_from, target.arming_tolerance) == ('actual_position', 100)
     velocity = made.parameters['target_velocity']
     assert (velocity.unit, velocity.minimum, velocity.maximum) == ('', -5000, 5000)
-    assert made.notes[1:] == [
-        "raw, because their unit is the maker's own: actual_position, actual_velocity, "
-        'target_position, profile_acceleration, target_velocity; scale and unit stand in the '
-        'manual', '1 objects of the maker have no unit in the file: they are raw']
+    assert told(made) == stories(__file__, 'imports.yaml')['axis.eds']
     assert made.built.text.count("# raw: its unit is the maker's own") == 5
 
 

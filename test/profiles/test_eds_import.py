@@ -5,12 +5,14 @@ import builtins
 from pathlib import Path
 from typing import Any
 
-from import_builders import bring_in, Outcome
+from import_builders import bring_in, Outcome, told
 import pytest
+from transcripts import stories
 
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.profiles.build import ImportFailed
 
+TOLD = stories(__file__, 'imports.yaml')
 EDS = """\
 [FileInfo]
 FileName=small.eds
@@ -94,6 +96,11 @@ DataType=0x0005
 AccessType=ro
 DefaultValue=0x0006
 """
+DRIVE = 'Müller & Söhne Drive 3000'
+RAMP_TIME = Parameter(
+    'ramp_time', index=0x2000, subindex=0, scale=0.01, unit='s', scaled=True,
+    storage=Storage.EEPROM, minimum=0.01, maximum=60.0,
+    description='Ramp time; From standstill to maximum speed')
 
 
 @pytest.fixture(autouse=True)
@@ -118,16 +125,13 @@ def line_of(text: str, occurrence: int = 1) -> int:
 
 def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     made = bring(tmp_path)
-    assert made.profile.description == 'Müller & Söhne Drive 3000'
+    assert made.profile.description == DRIVE
     assert made.profile.protocols == ('canopen_pkw',)
     assert made.profile.identity == ('identity_object_vendor_id',)
     assert list(made.parameters) == [
         'device_type', 'producer_heartbeat_time', 'identity_object_vendor_id', 'ramp_time',
         'speed_setpoint', 'flag', 'temperatures_motor', 'temperatures_2', 'mode']
-    assert made.parameters['ramp_time'] == Parameter(
-        'ramp_time', index=0x2000, subindex=0, scale=0.01, unit='s', scaled=True,
-        storage=Storage.EEPROM, minimum=0.01, maximum=60.0,
-        description='Ramp time; From standstill to maximum speed')
+    assert made.parameters['ramp_time'] == RAMP_TIME
     assert made.parameters['speed_setpoint'] == Parameter(
         'speed_setpoint', ParameterType.INT16, index=0x2001, subindex=0, scale=0.1, unit='rpm',
         scaled=True, storage=Storage.RAM, minimum=-3000.0, maximum=3000.0,
@@ -139,9 +143,7 @@ def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     assert made.parameters['mode'].type is ParameterType.UINT16
     assert [name for name, each in made.parameters.items() if each.protected] == [
         'producer_heartbeat_time']
-    assert made.left_out == [f'{line_of("[2003]")}: [2003]: Name of the drive: VISIBLE_STRING is '
-                             'none of the types of 16 or 32 bits']
-    assert made.notes == ['1 sub-indices 0 left out: they hold the number of entries']
+    assert told(made) == TOLD['small.eds']
 
 
 def test_dcf_and_other_names(tmp_path: Path) -> None:
@@ -188,7 +190,7 @@ def test_a_broken_section_costs_that_entry_only(tmp_path: Path, old: str, new: s
 
 def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
     made = bring(tmp_path, 'LowLimit=1\n', 'LowLimit=abc\n')
-    assert f"{line_of('[2000]')}: [2000]: Ramp time: LowLimit 'abc' is no number" in made.left_out
+    assert told(made) == TOLD['limit']
 
 
 @pytest.mark.parametrize(('old', 'new', 'note'), [
@@ -207,14 +209,13 @@ def test_an_object_that_stands_twice(tmp_path: Path) -> None:
     made = bring_in(tmp_path, EDS + '[2001]\nParameterName=Other\nDataType=6\nAccessType=rw\n',
                     'small.eds')
     assert 'speed_setpoint' in made.parameters and 'other' not in made.parameters
-    assert made.left_out[-1].endswith(
-        f'stands twice, the first in line {line_of("[2001]")} counts')
+    assert told(made) == TOLD['twice']
 
 
 @pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16', 'cp1252', 'latin-1'])
 def test_encodings(tmp_path: Path, encoding: str) -> None:
     made = bring_in(tmp_path, EDS.replace('\n', '\r\n').encode(encoding), 'small.eds')
-    assert made.profile.description == 'Müller & Söhne Drive 3000'
+    assert made.profile.description == DRIVE
     assert len(made.parameters) == 9
 
 

@@ -60,7 +60,8 @@ def test_interval(text: str, ends: tuple[float, float]) -> None:
 
 
 def test_interval_with_unit() -> None:
-    assert interval('0,00 ... 320,00 s', UNKNOWN)[1] == (320, 's')
+    text = '0,00 ... 320,00 s'
+    assert interval(text, UNKNOWN)[1] == (320, 's')
 
 
 @pytest.mark.parametrize('text', ['', '5', 'a to b', '1 to 2 to 3', 'to', '-'])

@@ -130,14 +130,14 @@ class Cable:
         """Ask the first drive for a control action; let time pass until it has its outcome."""
         refusal = self.sessions[0].services.control_refusal(action)
         if refusal:
-            return False, str(refusal)
+            return False, refusal
         request = ControlRequest(action)
         self.submit(request)
         limit = self.now + patience
         while True:
             for done in self.found(ControlCompleted):
                 if done.request is request:
-                    return done.success, str(done.message)
+                    return done.success, done.message
             assert self.now < limit
             self.run(0.01)
 

@@ -8,6 +8,7 @@ from cable import Cable
 from cia402_builders import BEGINNING, configuration, names
 from hypothesis import given, settings, strategies as st
 import pytest
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
@@ -82,8 +83,7 @@ def test_an_axis_stays_where_it_is_whatever_happens() -> None:
     cable.run(3.0)
     assert cable.sessions[0].online
     # it missed the bridge for longer than it waits
-    assert cable.control(ControlAction.ENABLE) == (
-        False, 'the drive missed the bridge: reset the fault')
+    assert cable.control(ControlAction.ENABLE) == (False, says('bridge_missed'))
     assert cable.control(ControlAction.RESET_FAULT)[0]
     assert cable.control(ControlAction.ENABLE)[0]
     cable.run(1.0)

@@ -72,10 +72,10 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
 
     # error-passive while sending: nobody acknowledges; it is told, and the exchange goes on
     adapter.report('p', sent=128)
-    facts = client.diagnostics(bus, state='^error-passive$')
+    facts = client.diagnostics(bus, state='^error-passive$', message=(
+        'no other node acknowledges: check that one is switched on, cable'))
     assert facts['level'] == '1'
     assert 'controller error-passive' in facts['message']
-    assert 'no other node acknowledges: check that one is switched on, cable' in facts['message']
     with again_and_again(lambda: adapter.send(b'e1a\r')):
         facts = client.diagnostics(bus, message='no acknowledgement')
     assert 'no other node acknowledges' in facts['message']
@@ -88,7 +88,7 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
     # bus-off: the drive is lost at once, and told why; the driver takes frames and drops them
     adapter.report('b', sent=255)
     client.online(drive, wanted=False)
-    assert 'check cable, shield, termination' in bridge.error('bus main: bus-off')
+    bridge.error('bus main: bus-off.*check cable, shield, termination')
     client.diagnostics(bus, state='^bus-off$')
     for _ in range(3):  # at every attempt
         facts = client.diagnostics(bus)
@@ -106,8 +106,8 @@ def test_controller_in_trouble(processes: Processes, client: Client, namespace: 
     # nothing leaves: the transmit queue fills, and no more is put into it than it holds at once
     adapter.stop_reading()
     client.online(drive, wanted=False)
-    line = bridge.error('bus main: send: transmit queue full')
-    assert 'no other node acknowledges: check that one is switched on, cable' in line
+    bridge.error('bus main: send: transmit queue full.*no other node acknowledges: check that one '
+                 'is switched on, cable')
     facts = client.diagnostics(bus, state='^down$', level='^2$',
                                message='no other node acknowledges')
     failures = int(facts['send_failures'])
@@ -163,7 +163,7 @@ def test_two_controllers_on_a_wire(processes: Processes, client: Client, namespa
     # its own controller is switched off; the drive's is not, and hears nothing any more
     ip('link', 'set', here, 'down')
     client.online(drive, wanted=False)
-    assert 'Network is down' in bridge.error(r'bus main: .*tried again every 0\.2 s')
+    bridge.error(r'bus main: .*Network is down.*tried again every 0\.2 s')
     assert client.diagnostics(bus, state='^down$')['level'] == '2'
     count = len(simulator.frames())
     ip('link', 'set', here, 'up')

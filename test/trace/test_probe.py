@@ -30,6 +30,18 @@ from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES, Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
 STORIES = stories(__file__, 'probe.yaml')
+#: what the command says
+SAID = {
+    'too many': 'more than eight numbers answer',
+    'hazard': 'is a write of a parameter in EEPROM to a CANnord inverter',
+    'timeout': 'P513 is not 0: the inverter supervises telegrams once it has got one, and trips '
+               'when they end',
+    'silence': 'no answer to parameter tasks',
+    'which': 'which drive? There are: ',
+    'set': 'To be set',
+    'keys': '\nTo be set in the file:\n  conveyor:\n    value_order: low_first\n'
+            '    index_byte: high\n',
+}
 Device = Callable[[Frame], list[Frame]]
 
 
@@ -283,7 +295,7 @@ def test_datamodel_undecided() -> None:
     found = Bench(everything).probe(LIFT)
     assert values(found) == dict.fromkeys(
         ('parameter_offset', 'cyclic_request', 'cyclic_response'))
-    assert 'more than eight numbers answer' in found['parameter_offset'].reason
+    assert SAID['too many'] in found['parameter_offset'].reason
 
 
 # -- simulated drives, set to each variant --------------------------------------------------------
@@ -447,7 +459,7 @@ def test_maps_of_an_even_station_need_a_word(tmp_path: Path,
         'station: 1 ', 'station: 2 ', 1), encoding='utf-8')
     monkeypatch.setattr('sys.stdin', open('/dev/null'))
     assert drive_can('probe', 'conveyor', '--params-file', file) == 2
-    assert 'is a write of a parameter in EEPROM to a CANnord inverter' in capsys.readouterr().err
+    assert SAID['hazard'] in capsys.readouterr().err
 
 
 # -- other masters, and the command line ----------------------------------------------------------
@@ -487,8 +499,7 @@ def test_a_telegram_time_out_is_told() -> None:
     prober = FAMILIES['cannord'].make_prober(INVERTER)
     bench = Bench(scripted(answers, 0x264, 0x265))
     Asker(BusConfiguration('main', 'virtual', 'x'), bench, [INVERTER], bench.clock).probe(prober)
-    assert prober.notes == ['P513 is not 0: the inverter supervises telegrams once it has got '
-                            'one, and trips when they end']
+    assert prober.notes == [SAID['timeout']]
 
 
 def drive_can(*arguments: object) -> int:
@@ -518,8 +529,7 @@ def test_the_command(bench: World, tmp_path: Path, capsys: pytest.CaptureFixture
         out, err = capsys.readouterr()
         assert out.splitlines()[0].split() == ['drive', 'key', 'found', 'in', 'the', 'file',
                                                'rests', 'on']
-        assert out.endswith('\nTo be set in the file:\n  conveyor:\n    value_order: low_first\n'
-                            '    index_byte: high\n')
+        assert out.endswith(SAID['keys'])
         assert not err
         assert drive_can('probe', '--params-file', other, '--json') == 0
         documents = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -531,8 +541,8 @@ def test_the_command(bench: World, tmp_path: Path, capsys: pytest.CaptureFixture
         assert not [rule for rule in drive.violations if 'sub-index' not in rule]
     assert drive_can('probe', '--params-file', file) == 1
     out = capsys.readouterr().out
-    assert 'undecided' in out and 'no answer to parameter tasks' in out
-    assert 'To be set' not in out
+    assert 'undecided' in out and SAID['silence'] in out
+    assert SAID['set'] not in out
 
 
 @pytest.mark.parametrize(('words', 'told'), [
@@ -544,7 +554,7 @@ def test_which_drive(words: list[str], told: str, tmp_path: Path,
         assert told in capsys.readouterr().err
         return
     assert drive_can('probe', '--params-file', config_file('all_families.yaml')) == 2
-    assert 'which drive? There are: ' in capsys.readouterr().err
+    assert SAID['which'] in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures('bench')

@@ -27,6 +27,25 @@ from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint
 
 STORIES = stories(__file__, 'scan.yaml')
+#: what is said of a bus, and of what was asked
+SAID = {
+    'maps': 'request map 50 51, response map 209 210',
+    'node': 'device type 00000000h, vendor 0h',
+    'servo': 'device type 00020192h (servo drive of CiA 402), vendor 5505h, product 402h',
+    'requests': 'requests to station {} of datamodel_extended',
+    'alone': 'send: transmit queue full: no other node acknowledges',
+    'master': 'there is another master',
+    'passive': 'nothing was asked: --passive',
+    'not asked': 'cannord is not asked: there is a CANopen node (5',
+    'left': '; not asked: {}: ',
+    'hazard': 'cannord: a task on 200h + 2·address is RPDO1',
+    'nobody': '--protocols cannord needs --yes where nobody can be asked\n',
+    'exists': 'drive_can scan: {} exists. Overwrite? Nothing was sent or written: nobody can be '
+              'asked here; --yes overwrites\n',
+    'none': 'no drive found',
+    'nothing found': '{}: not written, no drive was found\n',
+    'next': 'next: drive_can validate {}',
+}
 BITRATE = 125_000
 
 
@@ -124,9 +143,8 @@ def test_drives_are_found() -> None:
     for protocol in SAFE:
         survey.ask(protocol)
     assert [(each.protocol, each.station, each.text) for each in survey.sightings] == [
-        ('datamodel_extended', 3, 'request map 50 51, response map 209 210'),
-        ('datamodel_extended', 127, 'request map 50 51, response map 209 210')]
-    assert survey.nodes == {9: 'device type 00000000h, vendor 0h'}
+        ('datamodel_extended', 3, SAID['maps']), ('datamodel_extended', 127, SAID['maps'])]
+    assert survey.nodes == {9: SAID['node']}
     assert not survey.master
 
     bench = Bench(cannord(0), cannord(255), datamodel_standard(2), datamodel_standard(15))
@@ -220,7 +238,7 @@ def test_a_29_bit_drive_of_another_master(request_: str, answer: str, text: str,
     scanner = scanned('datamodel_extended', *pair, *again)
     [sighting] = scanner.sightings.values()
     assert sighting[2:] == (text, certainty)
-    assert scanner.master == f'requests to station {sighting.station} of datamodel_extended'
+    assert scanner.master == SAID['requests'].format(sighting.station)
 
 
 def test_a_mailbox_that_another_master_asks_for() -> None:
@@ -251,8 +269,7 @@ def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
     asked = len(bench.sent)
     survey.ask('cia402')
     sighting, = survey.sightings
-    assert sighting == ('cia402', 6, 'device type 00020192h (servo drive of CiA 402), '
-                        'vendor 5505h, product 402h', Certainty.CERTAIN)
+    assert sighting == ('cia402', 6, SAID['servo'], Certainty.CERTAIN)
     # what is known is not asked again
     assert not [frame for _, frame in bench.sent[asked:] if frame.identifier == 0x606 and (
         frame.data[1:4].hex() == '001000')]
@@ -297,14 +314,14 @@ def test_a_master_that_comes_while_asking_ends_it() -> None:
     survey = bench.survey()
     bench.answers.append(Frame(0x003FFFF0, bytes(8), True))
     survey.ask('datamodel_extended')
-    assert survey.master == 'requests to station 1 of datamodel_extended'
+    assert survey.master == SAID['requests'].format(1)
     assert len(bench.sent) <= 2
 
 
 def test_a_bus_that_takes_nothing() -> None:
     survey = Bench(deaf=True).survey()
     survey.ask('datamodel_extended')
-    assert survey.trouble == 'send: transmit queue full: no other node acknowledges'
+    assert survey.trouble == SAID['alone']
 
 
 @pytest.mark.parametrize('protocol', NAMED)
@@ -389,9 +406,7 @@ def test_what_is_there_is_asked_for(bench: World, tmp_path: Path,
         for existing in (output, beside):
             existing.write_text('by hand')
             assert drive_can(*arguments) == 2
-            assert capsys.readouterr().err == (
-                f'drive_can scan: {existing} exists. Overwrite? Nothing was sent or written: '
-                'nobody can be asked here; --yes overwrites\n')
+            assert capsys.readouterr().err == SAID['exists'].format(existing)
             assert existing.read_text() == 'by hand' and not frames
             existing.rename(tmp_path / 'kept')
         output.write_text('by hand')
@@ -407,7 +422,7 @@ def test_nothing_found_nothing_written(tmp_path: Path,
     arguments = ('scan', '--interface', 'virtual', '--channel', 'empty', '--listen', 0.1, '-o',
                  output, '--yes')
     assert drive_can(*arguments) == 1
-    assert capsys.readouterr().err.endswith(f'{output}: not written, no drive was found\n')
+    assert capsys.readouterr().err.endswith(SAID['nothing found'].format(output))
     assert not output.exists()
     output.write_text('by hand')
     assert drive_can(*arguments) == 1
@@ -453,10 +468,9 @@ def test_beside_a_bridge_all_drives_are_found_by_listening(
                   '500k', '--listen', 0.5, '--passive')
     assert {(each['protocol'], each['station']) for each in map(json.loads, out.splitlines())} == {
         (drive.protocol, drive.station) for drive in played.drives.values()}
-    assert 'there is another master' in err and 'only listening' in err
+    assert SAID['master'] in err and 'only listening' in err
     err = capsys.readouterr().err
-    assert 'there is another master' in err
-    assert '500000 bit/s, ' in err and 'nothing was asked: --passive' in err
+    assert SAID['master'] in err and SAID['passive'] in err and '500000 bit/s, ' in err
 
 
 def test_what_was_not_asked_is_named_with_the_next_command(
@@ -472,12 +486,12 @@ def test_what_was_not_asked_is_named_with_the_next_command(
         left = ', '.join(name for name in FAMILIES if name not in SAFE)
         first = next(name for name in FAMILIES if name not in SAFE)
         assert err[-2].startswith('500000 bit/s, ')
-        assert f'; not asked: {left}: ' in err[-2]
+        assert SAID['left'].format(left) in err[-2]
         assert err[-2].endswith(f'({again} --protocols {first})')
         assert err[-1] == f'next: {again} -o found.yaml'
         output = tmp_path / 'found.yaml'
         assert drive_can(*again.split()[1:], '--listen', 0.1, '-o', output) == 0
-        assert capsys.readouterr().err.splitlines()[-1] == f'next: drive_can validate {output}'
+        assert capsys.readouterr().err.splitlines()[-1] == SAID['next'].format(output)
 
 
 @pytest.mark.usefixtures('bench')
@@ -488,10 +502,9 @@ def test_named_families_need_a_word(capsys: pytest.CaptureFixture[str],
     monkeypatch.setattr('sys.stdin', open('/dev/null'))
     assert drive_can(*arguments) == 2
     err = capsys.readouterr().err
-    assert err.startswith('cannord: a task on 200h + 2·address is RPDO1')
-    assert err.endswith('--protocols cannord needs --yes where nobody can be asked\n')
+    assert err.startswith(SAID['hazard']) and err.endswith(SAID['nobody'])
     assert drive_can(*arguments, '--yes') == 1
-    assert 'no drive found' in capsys.readouterr().out
+    assert SAID['none'] in capsys.readouterr().out
 
 
 def test_named_families_are_not_asked_where_there_is_a_canopen_node(
@@ -501,7 +514,7 @@ def test_named_families_are_not_asked_where_there_is_a_canopen_node(
                     show_frame=lambda bus, frame, sent: frames.append(frame)):
         drive_can('scan', '--interface', 'virtual', '--channel', 'all_families', '--bitrate',
                   500_000, '--listen', 0.3, '--protocols', 'cannord,datamodel_standard', '--yes')
-    assert 'cannord is not asked: there is a CANopen node (5' in capsys.readouterr().err
+    assert SAID['not asked'] in capsys.readouterr().err
     assert not [frame for frame in frames if not frame.extended
                 and 0x200 <= frame.identifier < 0x400]
 

@@ -223,8 +223,8 @@ def test_a_database_that_cannot_be_written(way: str, tmp_path: Path) -> None:
     path = tmp_path / 'trace.db'
     told = subprocess.run([sys.executable, '-c', FULL, path, way], capture_output=True, text=True,
                           check=True)
-    assert told.stdout in (f'{path} {reason}\n' for reason in (
-        'disk I/O error', 'database or disk is full'))
+    reasons = ('disk I/O error', 'database or disk is full')
+    assert told.stdout in (f'{path} {reason}\n' for reason in reasons)
     assert told.stderr == ''
 
 

@@ -39,10 +39,12 @@ def test_what_may_work_later(error: Exception) -> None:
     assert not is_misconfiguration(wrapped(error))
 
 
-def test_what_becomes_of_a_bus_that_is_down() -> None:
-    assert with_outlook(gone('/dev/ttyACM0'), 1.0) == (
-        'adapter /dev/ttyACM0 is gone: unplugged? Goes on by itself when it is back')
-    assert with_outlook('no such device', 0.5) == 'no such device; tried again every 0.5 s'
+@pytest.mark.parametrize(('reason', 'period', 'told'), [
+    (gone('/dev/ttyACM0'), 1.0,
+     'adapter /dev/ttyACM0 is gone: unplugged? Goes on by itself when it is back'),
+    ('no such device', 0.5, 'no such device; tried again every 0.5 s')])
+def test_what_becomes_of_a_bus_that_is_down(reason: str, period: float, told: str) -> None:
+    assert with_outlook(reason, period) == told
 
 
 def test_a_kernel_without_socketcan_is_no_number() -> None:
