@@ -335,7 +335,6 @@ WORDS = {
         '{most}',
     'same_number': "'{name}' and '{other}' are both {address}, allowed is one of them",
     'number_missing': 'missing, allowed in {family} is 0 to {most}',
-    'number_out_of_range': '{number} is out of range, allowed is 0 to {most}',
     'no_subindex': '{family} knows no sub-index, allowed is number alone',
     'mapping_parameter':
         "'{name}' ({address}) is a mapping parameter, allowed are others than {base} to "

@@ -96,29 +96,31 @@ def test_a_good_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('old', 'new', 'found'), [
-    ('station: 1', 'station: 256', '13: drives.lift.station: 256 is out of range, '
-                                   'allowed is 0 to 255 (cannord)'),
-    ('station: 1', 'station: 2', '22: drives.hoist.station: 2 collides with drive lift (station '
-                                 '2) on bus main: both use process data to station 2; allowed is '
-                                 'a station of its own'),
-    ('broadcast: none', 'parameter_set: 5', '18: drives.lift.parameter_set: 5 is out of range, '
-                                            'allowed is an integer of 1 to 4'),
-    ('broadcast: none', 'value_order: middle', "18: drives.lift.value_order: 'middle' is "
-                                               'unknown, allowed is high_first or low_first'),
+    ('station: 1', 'station: 256',
+     at('f.yaml:13: drives.lift.station', 'value_out_of_range', value=256, least=0, most=255,
+        remark=' (cannord)')),
+    ('station: 1', 'station: 2',
+     at('f.yaml:22: drives.hoist.station', 'collides', station=2, other='lift', other_station=2,
+        bus='main', purpose='process data to station 2')),
+    ('broadcast: none', 'parameter_set: 5',
+     at('f.yaml:18: drives.lift.parameter_set', 'out_of_range', value=5,
+        allowed='an integer of 1 to 4')),
+    ('broadcast: none', 'value_order: middle',
+     at('f.yaml:18: drives.lift.value_order', 'unknown_word', value='middle', near='',
+        allowed='high_first or low_first')),
     ('[speed]', '[speed, second, third, fourth]',
-     '16: drives.lift.cyclic_request: 4 parameters are too many, allowed are at most 3 (5 with '
-     'extra_setpoints: true)'),
+     at('f.yaml:16: drives.lift.cyclic_request', 'too_many_parameters', count=4, most=3,
+        more=' (5 with extra_setpoints: true)')),
     ('[speed]', '[speed, position]',
-     "16: drives.lift.cyclic_request: 'position' is int32, process words carry bool, int16 or "
-     'uint16'),
-    ('[speed]', '[ramp]', "16: drives.lift.cyclic_request: 'ramp' is kept in EEPROM, which cyclic "
-                          'writing would wear out; allowed are parameters with storage ram'),
+     at('f.yaml:16: drives.lift.cyclic_request', 'not_16_bits', name='position', type='int32')),
+    ('[speed]', '[ramp]',
+     at('f.yaml:16: drives.lift.cyclic_request', 'kept_in_eeprom', name='ramp')),
     ('[speed]', '[speed]\n        extra_setpoints: true\n'
                 '        mapping: verify',
-     f'18: drives.lift.mapping: a key of {MAPPED}, allowed with cannord is to leave it out'),
+     at('f.yaml:18: drives.lift.mapping', 'key_of_others', owners=MAPPED, family='cannord')),
 ])
-def test_problems(tmp_path: Path, old: str, new: str, found: str) -> None:
-    assert problems(tmp_path, changed(FILE, old, new), PROFILE) == [f'f.yaml:{found}']
+def test_problems(tmp_path: Path, old: str, new: str, found: object) -> None:
+    assert problems(tmp_path, changed(FILE, old, new), PROFILE) == [found]
 
 
 def test_five_entries_with_extra_setpoints(tmp_path: Path) -> None:
@@ -136,20 +138,21 @@ def test_stations_at_the_ends(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('entry', 'found'), [
-    ('status_word: {number: 5}', "parameters.status_word: 'status_word' is built in for cannord, "
-                                 'allowed is any other name'),
-    ('far: {number: 2048}', 'parameters.far.number: 2048 is out of range, allowed is 0 to 2047'),
-    ('far: {number: 5, subindex: 256}', 'parameters.far.subindex: 256 is out of range, allowed '
-                                        'is an integer of 0 to 255'),
-    ('wide: {type: uint32}', 'parameters.wide.type: uint32 does not fit a process word, allowed '
-                             'without a number are bool, int16, uint16'),
-    ('part: {subindex: 1}', 'parameters.part.subindex: a sub-index without a number, allowed is '
-                            'number with subindex, or neither'),
-    ('kept: {storage: eeprom}', 'parameters.kept.storage: process data are not stored, allowed '
-                                'without a number is ram, or to leave it out'),
+    ('status_word: {number: 5}', at('table.yaml:13: parameters.status_word', 'built_in',
+                                    name='status_word', family='cannord')),
+    ('far: {number: 2048}', at('table.yaml:13: parameters.far.number', 'value_out_of_range',
+                               value=2048, least=0, most=2047, remark='')),
+    ('far: {number: 5, subindex: 256}', at('table.yaml:13: parameters.far.subindex',
+                                           'out_of_range', value=256,
+                                           allowed='an integer of 0 to 255')),
+    ('wide: {type: uint32}', at('table.yaml:13: parameters.wide.type', 'no_process_word',
+                                type='uint32')),
+    ('part: {subindex: 1}', at('table.yaml:13: parameters.part.subindex', 'subindex_alone')),
+    ('kept: {storage: eeprom}', at('table.yaml:13: parameters.kept.storage',
+                                   'process_data_stored')),
 ])
-def test_problems_of_a_profile(tmp_path: Path, entry: str, found: str) -> None:
-    assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [f'table.yaml:13: {found}']
+def test_problems_of_a_profile(tmp_path: Path, entry: str, found: object) -> None:
+    assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [found]
 
 
 def test_process_data_are_volatile(tmp_path: Path) -> None:

@@ -5,10 +5,17 @@ from dataclasses import asdict
 import math
 from pathlib import Path
 
-from configuration_builders import at, changed, FILE, load, problems, PROFILE, PROTOCOLS, warnings
+from configuration_builders import (
+    at, changed, FILE, load, local, problems, PROFILE, PROTOCOLS, warnings, write,
+)
 import pytest
 from saying import says
 
+from drive_can_bridge.configuration import profiles
+from drive_can_bridge.configuration.checks import DriveChecker
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.protocols.families import FAMILIES
 
 CASES = [
@@ -280,18 +287,47 @@ def test_name_too_long(tmp_path: Path) -> None:
     assert found[0].startswith(f'f.yaml:10: drives.{"c" * 101}: ')
 
 
-@pytest.mark.parametrize(('given', 'message'), [
-    ('datamodel_extende', "'datamodel_extende' is unknown (did you mean 'datamodel_extended'?)"),
-    ('xyz', "'xyz' is unknown"),
-    ('5', '5 is no protocol'),
-    ('[a]', 'a list is no protocol'),
+PROTOCOL = 'f.yaml:12: drives.conveyor.protocol'
+AVAILABLE = ', '.join(FAMILIES)
+
+
+@pytest.mark.parametrize(('given', 'found'), [
+    ('datamodel_extende', at(PROTOCOL, 'unknown_protocol', value='datamodel_extende',
+                             near=says('near', word='datamodel_extended'), allowed=AVAILABLE)),
+    ('xyz', at(PROTOCOL, 'unknown_protocol', value='xyz', near='', allowed=AVAILABLE)),
+    ('5', at(PROTOCOL, 'no_protocol', value=5, allowed=AVAILABLE)),
+    ('[a]', at(PROTOCOL, 'no_protocol', value=['a'], allowed=AVAILABLE)),
 ])
-def test_unknown_protocol(tmp_path: Path, given: str, message: str) -> None:
+def test_unknown_protocol(tmp_path: Path, given: str, found: object) -> None:
     text = changed(FILE, 'protocol: datamodel_extended', f'protocol: {given}\n        perod: 1')
     assert problems(tmp_path, text) == [
-        f'f.yaml:12: drives.conveyor.protocol: {message}; available: {", ".join(FAMILIES)}',
+        found,
         at('f.yaml:13: drives.conveyor.perod', 'unknown_key',
            hint=says('did_you_mean', word='period'))]
+
+
+def test_no_profile_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> Path:
+        raise FileNotFoundError
+    monkeypatch.setattr(profiles, 'profiles_directory', missing)     # an incomplete installation
+    path = write(tmp_path)
+    (tmp_path / 'empty').mkdir()
+    path.write_text(changed(path.read_text(), f'[{tmp_path}]', f'[{tmp_path}/empty]'))
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    assert local(tmp_path, caught.value.problems)[0] == at(
+        'f.yaml:14: drives.conveyor.profile', 'unknown_profile', name='table',
+        hint=says('no_profile_at_all'))
+
+
+def test_no_drive_gets_lost_in_silence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    check = DriveChecker.check
+
+    def lost(self: DriveChecker) -> DriveConfiguration | None:
+        drive = check(self)
+        return None if drive is not None and drive.name == 'lift' else drive
+    monkeypatch.setattr(DriveChecker, 'check', lost)
+    assert problems(tmp_path) == [at('f.yaml:19: drives.lift', 'nobody_knows')]
 
 
 def test_unknown_profile_names_the_places(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from configuration_builders import load
 import pytest
+from saying import says
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
@@ -90,6 +91,6 @@ def test_nothing_to_complain_about(drive: DriveConfiguration) -> None:
 
 @pytest.mark.parametrize('offset', [-123, 65532])
 def test_maps_moved_out_of_range(drive: DriveConfiguration, offset: int) -> None:
-    keys = {complaint.key for complaint in FAMILY.check(
-        with_options(drive, parameter_offset=offset))}
-    assert 'request_map_base' in keys
+    found = [(complaint.key, complaint.message) for complaint in FAMILY.check(
+        with_options(drive, parameter_offset=offset))]
+    assert ('request_map_base', says('map_out_of_range', base=122, offset=offset)) in found

@@ -69,6 +69,14 @@ def test_problem_of_a_drive(tmp_path: Path, old: str, new: str, expected: list[s
     assert problems(tmp_path, changed(AXIS, old, new), HELD) == expected
 
 
+def test_a_control_word_moves_nothing(tmp_path: Path) -> None:
+    text = changed(AXIS, '[angle]', '[word]')
+    profile = changed(HELD, 'type: uint16, storage: ram', 'type: int16, storage: ram, unit: rev, '
+                      'neutral_from: position, arming_tolerance: 1')
+    assert problems(tmp_path, text, profile) == [
+        at('f.yaml:16: drives.conveyor.cyclic_request', 'control_word_held', name='word')]
+
+
 def test_no_broadcast_group(tmp_path: Path) -> None:
     text = AXIS.replace('datamodel_extended', 'cannord').replace('period: 0.02',
                                                                  'broadcast: group')

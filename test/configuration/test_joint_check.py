@@ -64,17 +64,19 @@ def test_problem_of_a_joint(tmp_path: Path, old: str, new: str, expected: list[s
     assert problems(tmp_path, changed(FILE, old, new)) == expected
 
 
-@pytest.mark.parametrize(('new', 'line'), [
-    ('{name: a, effort_command: word}', "effort_command: 'word' is the control word, allowed is a "
-                                        'setpoint'),
-    ('{name: a, effort_command: flag}', "effort_command: 'flag' is a bool, allowed is a number"),
-    ('{name: a, effort_command: actual}', "effort_command: 'actual' is not in cyclic_request, "
-                                          'allowed: word, flag'),
+COMMAND = 'f.yaml:18: drives.conveyor.joint.effort_command'
+
+
+@pytest.mark.parametrize(('new', 'found'), [
+    ('word', at(COMMAND, 'control_word', name='word')),
+    ('flag', at(COMMAND, 'is_bool', name='flag')),
+    ('actual', at(COMMAND, 'not_in_list', name='actual', listed='cyclic_request',
+                  hint=says('allowed', words='word, flag'))),
 ])
-def test_command_that_is_no_setpoint(tmp_path: Path, new: str, line: str) -> None:
+def test_command_that_is_no_setpoint(tmp_path: Path, new: str, found: object) -> None:
     text = changed(FILE, '[speed, limit]', '[word, flag]')
-    assert problems(tmp_path, changed(text, 'rearm: neutral', f'joint: {new}')) == [
-        f'f.yaml:18: drives.conveyor.joint.{line}']
+    joint = f'joint: {{name: a, effort_command: {new}}}'
+    assert problems(tmp_path, changed(text, 'rearm: neutral', joint)) == [found]
 
 
 def test_empty_list(tmp_path: Path) -> None:

@@ -292,6 +292,15 @@ def test_section_for_another_namespace(tmp_path: Path, head: str, section: str,
         f'f.yaml:6: {section}', 'other_namespace', node='/drive_can_bridge')] if told else [])
 
 
+def test_section_with_a_name_that_no_bridge_has_by_itself(tmp_path: Path) -> None:
+    path = tmp_path / 'f.yaml'
+    path.write_text(f'/cell/other:\n  ros__parameters:\n{BUSES}', encoding='utf-8')
+    tree, problems = read_parameter_file(path)
+    assert tree is not None and problems == []
+    assert local(tmp_path, [each.text for each in tree.warnings]) == [
+        at('f.yaml:3: /cell/other', 'other_node_name', usual='drive_can_bridge')]
+
+
 def test_another_bridge_is_no_section_for_this_one(tmp_path: Path) -> None:
     path = tmp_path / 'f.yaml'
     path.write_text(f'/a/drive_can_bridge:\n  ros__parameters:\n{BUSES}'
@@ -408,7 +417,7 @@ def test_a_million_mistakes_are_told_in_as_many_lines_as_anybody_reads(tmp_path:
     with pytest.raises(ConfigurationError) as caught:
         configuration_from_file(file)
     assert len(caught.value.problems) == PROBLEMS_MAX + 1
-    assert caught.value.problems[-1].startswith('and ')
+    assert caught.value.problems[-1] == says('more', count=3000 - PROBLEMS_MAX)
 
 
 @pytest.mark.parametrize('text', [

@@ -4,10 +4,14 @@
 import math
 from pathlib import Path
 
-from configuration_builders import at, changed, FILE, load, problems, PROFILE, PROTOCOLS, warnings
+from configuration_builders import (
+    at, changed, FILE, load, local, problems, PROFILE, PROTOCOLS, warnings, write,
+)
 import pytest
 from saying import says
 
+from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
@@ -250,6 +254,25 @@ CASES = [
      [at('table.yaml:16: fault.parameter', 'write_only_one', name='order'),
       at('table.yaml:16: fault.codes.9', 'name_of_other', name='hot', other='7')]),
     ('control:\n', 'fault: {parameter: current, codes: {7: hot}}\ncontrol:\n', []),
+    ('control:\n', 'fault: {parameter: current, codes: {7: "7 hot"}}\ncontrol:\n',
+     [at('table.yaml:16: fault.codes.7', 'no_name', name='7 hot', longest=60)]),
+    ('control:\n', 'fault: {parameter: current, codes: {}}\ncontrol:\n',
+     [at('table.yaml:16: fault.codes', 'empty_mapping')]),
+    ('control:\n', 'fault: {parameter: current, bit: status.redy}\ncontrol:\n',
+     [at('table.yaml:16: fault.bit', 'no_bit', bit='redy', name='status',
+         hint=says('did_you_mean', word='ready'))]),
+    ('control:\n', 'fault: {parameter: current, bit: actual.fault}\ncontrol:\n',
+     [at('table.yaml:16: fault.bit', 'no_named_bits', name='actual')]),
+    ('control:\n', 'restore: {before: {limit: 70000}}\ncontrol:\n',
+     [at('table.yaml:16: restore.before.limit', 'cannot_be_written', value=70000,
+         allowed='0 to 65535')]),
+    ('control:\n', 'restore: {after: {flag: 2}}\ncontrol:\n',
+     [at('table.yaml:16: restore.after.flag', 'cannot_be_written', value=2,
+         allowed='true or false')]),
+    ('control:\n', 'restore: {before: {order: {a: true}}}\ncontrol:\n',
+     [at('table.yaml:16: restore.before.order.a', 'no_bit', bit='a', name='order',
+         hint=says('nothing_allowed')),
+      at('table.yaml:16: restore.before.order', 'write_only_bits', name='order')]),
     ('parameters:', 'parametrs:',
      [at('table.yaml:1: parameters', 'missing', allowed='a mapping'),
       at('table.yaml:3: parametrs', 'unknown_key', hint=says('did_you_mean', word='parameters'))]),
@@ -337,6 +360,13 @@ def test_limits_that_the_type_cannot_hold_are_narrowed(
     assert (parameter.minimum, parameter.maximum) == pytest.approx(limits, abs=1e-9)
 
 
+def test_nothing_says_when_there_is_a_fault(tmp_path: Path) -> None:
+    profile = PROFILE.partition('control:\n')[0] + 'fault: {parameter: current}\n'
+    assert warnings(tmp_path, profile=profile) == [at('table.yaml:16: fault', 'fault_without_bit')]
+    with_bit = changed(profile, 'current}', 'current, bit: status.fault}')
+    assert warnings(tmp_path, profile=with_bit) == []
+
+
 def test_subindex_of_another_protocol(tmp_path: Path) -> None:
     profile = changed(PROFILE, '[datamodel_extended]', '[datamodel_extended, cannord]')
     profile = changed(profile, 'number: 51', 'number: 51, subindex: 4')
@@ -361,3 +391,15 @@ def test_profile_that_cannot_be_read(tmp_path: Path) -> None:
     text = changed(FILE, 'profile: table', f'profile: {tmp_path}')
     assert problems(tmp_path, text) == [
         at('f.yaml:14: drives.conveyor.profile', 'no_file', name=str(tmp_path))]
+
+
+def test_profile_that_is_too_large(tmp_path: Path) -> None:
+    path = write(tmp_path, changed(FILE, 'profile: table', 'profile: large'))
+    large = tmp_path / 'large.yaml'
+    with large.open('wb') as file:
+        file.truncate(5 << 20)
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    assert local(tmp_path, caught.value.problems) == [
+        at('f.yaml:14: drives.conveyor.profile', 'cannot_be_read', path=large,
+           why='too large, allowed are 4 MiB')]

@@ -88,10 +88,7 @@ def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint
             yield Complaint(f'{place}.number', says('number_missing', family=family,
                                                     most=NUMBER_MAX))
             continue
-        if not 0 <= parameter.number <= NUMBER_MAX:
-            yield Complaint(f'{place}.number', says('number_out_of_range', number=parameter.number,
-                                                    most=NUMBER_MAX))
-        elif not 0 <= parameter.number + offset <= NUMBER_MAX:
+        if not 0 <= parameter.number + offset <= NUMBER_MAX:
             yield Complaint('parameter_offset', says('moved_out', offset=offset, name=name,
                                                      address=parameter.address, most=NUMBER_MAX))
         elif parameter.writable and parameter.number + offset == CYCLIC_PARAMETER:

@@ -12,12 +12,13 @@ from servo_builders import (
 )
 
 from drive_can_bridge.core.frame import worst_bits
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = FAMILIES['cia402']
 
 
-def wrong(mode: str = 'csv', **options: Any) -> dict[str, str]:
+def wrong(mode: str = 'csv', **options: Any) -> dict[str, Sentence]:
     return dict(FAMILY.check(servo(mode, **options)))
 
 
@@ -29,81 +30,113 @@ def test_all_modes_are_fine() -> None:
 def test_the_mode_and_its_setpoint() -> None:
     drive = servo()
     drive = replace(drive, options=replace(drive.options, mode=None))
-    assert dict(FAMILY.check(drive))['mode'] == says('one_missing')
-    assert '60FFh.00h' in wrong(request=())['cyclic_request']
+    assert dict(FAMILY.check(drive)) == {'mode': says('one_missing')}
+    assert wrong(request=()) == {'cyclic_request': says(
+        'setpoint_missing', name='csv', index=0x60FF, subindex=0)}
+    assert wrong('ip', request=()) == {'cyclic_request': says(
+        'setpoint_missing', name='ip', index=0x60C1, subindex=1)}
     narrow = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT16)
-    assert 'int32' in wrong(request=(narrow,))['profile.parameters.target_velocity.type']
+    assert wrong(request=(narrow,)) == {'profile.parameters.target_velocity.type': says(
+        'setpoint_type', type='int16', name='csv', wanted='int32')}
 
 
 @pytest.mark.parametrize('mode', ['csp', 'pp'])
 @pytest.mark.parametrize('neutral', [None, 0.0])
 def test_a_position_stays_where_it_is(mode: str, neutral: float | None) -> None:
     plain = replace(TARGET, neutral_from='', neutral=neutral)
-    assert 'neutral_from' in str(wrong(mode, request=(plain,)))
+    assert wrong(mode, request=(plain,)) == {
+        'profile.parameters.target_position.neutral_from': says('no_neutral_position', name=mode)}
 
 
 @pytest.mark.parametrize('options', [
     {'period': 0.03}, {'transmission': 'event'}])
 def test_what_is_interpolated_needs_sync(options: dict[str, Any]) -> None:
-    assert 'mode' in wrong('csp', **options)
-    assert 'mode' not in wrong('pv', **options)
+    for mode in ('csp', 'csv', 'cst', 'ip'):
+        assert wrong(mode, **options) == {'mode': says('interpolated', name=mode, most=0.02)}
+    assert wrong('pv', **options) == {}
 
 
 def test_lists_that_are_too_short_say_what_is_needed() -> None:
-    assert wrong(response=(POSITION, VELOCITY))['response_pdos'] == says(
-        'pdos_too_small', needed=2)
+    assert wrong(response=(POSITION, VELOCITY)) == {'response_pdos': says(
+        'pdos_too_small', count=1, plural='', listed='cyclic_response', needed=2)}
     assert wrong(response=(POSITION, VELOCITY), response_pdos=(1, 3)) == {}
     # 2 + 4 bytes, then 4 + 2: no entry is torn
-    assert wrong(request=(VELOCITY_TARGET, replace(VELOCITY_TARGET, name='other', index=0x2000)))[
-        'request_pdos'] == says('pdos_too_small', needed=2)
-    assert 'twice' in wrong(response_pdos=(1, 1))['response_pdos']
+    assert wrong(request=(VELOCITY_TARGET, replace(
+        VELOCITY_TARGET, name='other', index=0x2000))) == {'request_pdos': says(
+            'pdos_too_small', count=1, plural='', listed='cyclic_request', needed=2)}
+    assert wrong(response_pdos=(1, 1)) == {'response_pdos': says('pdo_twice')}
 
 
 def test_what_the_bridge_sends_by_itself() -> None:
     word = parameter('word', None, index=0x6040, subindex=0)
-    assert 'control word' in wrong(request=(VELOCITY_TARGET, word), request_pdos=(1, 2))[
-        'cyclic_request']
+    assert wrong(request=(VELOCITY_TARGET, word)) == {'cyclic_request': says(
+        'mapped_already', name='word',
+        taken='the control word, which the bridge sends by itself')}
     mode = parameter('mode', None, index=0x6060, subindex=0)
-    assert 'key mode' in wrong(request=(VELOCITY_TARGET, mode))['cyclic_request']
+    assert wrong(request=(VELOCITY_TARGET, mode)) == {'cyclic_request': says(
+        'mapped_already', name='mode', taken='the mode, which the key mode gives')}
+    again = replace(VELOCITY_TARGET, name='again')
+    assert wrong(request=(VELOCITY_TARGET, again), request_pdos=(1, 2)) == {
+        'cyclic_request': says('mapped_already', name='again',
+                               taken="the same object as 'target_velocity'")}
     status = parameter('status', None, index=0x6041, subindex=0)
-    assert wrong(response=(status,))['cyclic_response'] == says(
-        'status_word_mapped', name='status')
-    assert 'profile.parameters.status_word' in wrong(table=(*TABLE, parameter(
-        'status_word', None, index=0x6041)))
+    assert wrong(response=(status,)) == {'cyclic_response': says(
+        'status_word_mapped', name='status')}
+    assert wrong(table=(*TABLE, parameter('status_word', None, index=0x6041))) == {
+        'profile.parameters.status_word': says(
+            'built_in', name='status_word', family='cia402')}
 
 
 def test_times() -> None:
-    assert 'period' in wrong('pv', transmission='event', period=0.0105)
-    assert 'period' in wrong('pv', transmission='event', period=66.0)
-    assert 'heartbeat_timeout' in wrong(heartbeat_producer=0.4)
+    for period in (0.0105, 66.0):
+        assert wrong('pv', transmission='event', period=period) == {'period': says(
+            'no_event_timer', period=period, most=65.535)}
+    assert wrong(heartbeat_producer=0.4) == {'heartbeat_timeout': says(
+        'heartbeat_too_short', timeout=0.35, producer=0.4)}
     assert wrong(heartbeat_producer=0.4, heartbeat_timeout=0.0) == {}
-    assert 'station' in wrong(station=128)
+    for key in ('heartbeat_producer', 'bridge_heartbeat'):
+        assert wrong(**{key: 0.0009}) == {key: says('time_too_short', seconds=0.0009)}
+        assert wrong(**{key: 0.001}) == {}
+    assert wrong(station=128) == {'station': says(
+        'value_out_of_range', value=128, least=1, most=127)}
 
 
 def test_addresses() -> None:
-    assert 'profile.parameters.x.index' in wrong(table=(*TABLE, parameter('x', 5)))
+    number = parameter('x', 5)
+    assert wrong(table=(*TABLE, number)) == {
+        'profile.parameters.x.index': says('index_missing', family='cia402')}
+    both = parameter('x', 5, index=0x2000)
+    assert wrong(table=(*TABLE, both)) == {
+        'profile.parameters.x.number': says('no_numbers', family='cia402')}
+    for listed, first in (('request', VELOCITY_TARGET), ('response', POSITION)):
+        assert wrong(**{listed: (first, number)}) == {
+            f'cyclic_{listed}': says('no_index', name='x')}
 
 
 def test_what_is_suspicious() -> None:
-    def said(mode: str, **options: Any) -> list[str]:
-        return [key for key, _ in FAMILY.warnings(servo(mode, **options))]
-    assert said('csv') == []
-    assert said('csv', request=(VELOCITY_TARGET, TORQUE_TARGET)) == ['cyclic_request']
-    assert said('csv', ramp_bits=False) == ['ramp_bits']
-    assert said('vl', ramp_bits=False) == []
-    assert said('pp') == ['command_timeout']
-    assert said('pp', command_timeout=0.0) == []
+    def said(mode: str, **options: Any) -> dict[str, Sentence]:
+        return dict(FAMILY.warnings(servo(mode, **options)))
+    assert said('csv') == {}
+    assert said('csv', request=(VELOCITY_TARGET, TORQUE_TARGET)) == {'cyclic_request': says(
+        'setpoint_of_other_mode', name='target_torque', mode='csv')}
+    assert said('csv', ramp_bits=False) == {'ramp_bits': says('vl_only', mode='csv')}
+    assert said('vl', ramp_bits=False) == {}
+    assert said('pp', command_timeout=0.5) == {'command_timeout': says('pp_halts', timeout=0.5)}
+    assert said('pp', command_timeout=0.0) == {}
 
 
 def test_drives_of_one_bus() -> None:
-    def said(*drives: Any) -> list[tuple[str, str]]:
-        return [(drive.name, key) for drive, (key, _) in FAMILY.check_together(drives)]
+    def said(*drives: Any) -> list[tuple[str, str, Sentence]]:
+        return [(drive.name, *found) for drive, found in FAMILY.check_together(drives)]
     one = servo(name='one', station=1)
     assert said(one, servo(name='two', station=2)) == []
-    assert said(one, servo(name='two', station=2, period=0.02)) == [('two', 'period')]
+    assert said(one, servo(name='two', station=2, period=0.02)) == [('two', 'period', says(
+        'period_of_sync', period=0.02, other=0.01, drive='one'))]
     assert said(one, servo('pv', name='two', station=2, period=0.02, transmission='event')) == []
-    assert said(one, servo(name='two', station=2, bridge_node=126)) == [('two', 'bridge_node')]
-    assert said(one, servo(name='two', station=127)) == [('one', 'bridge_node')]
+    assert said(one, servo(name='two', station=2, bridge_node=126)) == [
+        ('two', 'bridge_node', says('bridge_node_differs', node=126, other=127, drive='one'))]
+    assert said(one, servo(name='two', station=127)) == [
+        ('one', 'bridge_node', says('node_of_drive', node=127, drive='two'))]
 
 
 def test_the_load_has_one_sync_for_all() -> None:
