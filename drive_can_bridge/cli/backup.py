@@ -129,8 +129,8 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
         complain(f'{drive.name}: has no settings that could be written to a file')
         return None
     left_out = [*missing, *useless]
-    time = datetime.fromtimestamp(1e-9 * args.clock.stamp(), timezone.utc)
-    head = head_of(drive.facts, time=time.strftime('%Y-%m-%dT%H:%M:%SZ'),
+    made_at = datetime.fromtimestamp(1e-9 * args.clock.stamp(), timezone.utc)
+    head = head_of(drive.facts, time=made_at.strftime('%Y-%m-%dT%H:%M:%SZ'),
                    identity=drive.identity())
     return written(drive.facts, head, settings, remarks=[
         f'left out: {name}: {reason}' for name, reason in left_out]), {

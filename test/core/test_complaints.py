@@ -21,7 +21,8 @@ ROWS = yaml.safe_load(Path(__file__).with_name('complaints.yaml').read_text(enco
 #: modules of stories about configurations; elsewhere ``says`` is mostly a sentence of a drive
 STORIES = [*(TESTS / 'configuration').glob('test_*.py'),
            TESTS / 'protocols' / 'cia402' / 'test_cia402_checks.py',
-           TESTS / 'protocols' / 'cannord' / 'test_cannord_group.py']
+           TESTS / 'protocols' / 'cannord' / 'test_cannord_group.py',
+           TESTS / 'ros' / 'test_ros_refusals.py']
 
 
 def named(files: Iterable[Path], *functions: str) -> Iterator[str]:
