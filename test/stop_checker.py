@@ -304,7 +304,7 @@ class World:
             self.partners.append(Partner(index, device, device.registers))
         self.leader = self.sessions[0]
         self.control = self.leader.control is not None
-        self.deaf = self.position_unknown = self.twice = self.refusing = False
+        self.deaf = self.mute = self.twice = self.refusing = False
         self.bus = self.active = True
         self.delay = PROMPT
         self.coming: list[tuple[float, int, int, str]] = []
@@ -341,7 +341,7 @@ class World:
         for partner in self.partners:
             answers = partner.device.takes(sent)
             partner.motor.look()
-            for answer in () if self.position_unknown else answers * (1 + self.twice):
+            for answer in () if self.mute else answers * (1 + self.twice):
                 heapq.heappush(self.coming, (
                     self.now + self.delay, next(self.number), partner.index, str(answer)))
 
@@ -420,7 +420,7 @@ class World:
                             f'{self.now - self.commanded_at:.3f} s old')
 
     def reachable(self) -> bool:
-        return self.bus and not (self.deaf or self.position_unknown or self.refusing)
+        return self.bus and not (self.deaf or self.mute or self.refusing)
 
     def judge(self) -> None:
         """Judge motors that run although they shall not."""
@@ -502,7 +502,7 @@ class World:
         self.deaf = True
 
     def _mute(self) -> None:
-        self.position_unknown = True
+        self.mute = True
 
     def _late(self) -> None:
         self.delay = LATE
@@ -511,7 +511,7 @@ class World:
         self.twice = True
 
     def _well(self) -> None:
-        self.deaf = self.position_unknown = self.twice = self.refusing = False
+        self.deaf = self.mute = self.twice = self.refusing = False
         self.delay = PROMPT
 
     def _power(self) -> None:
@@ -525,7 +525,7 @@ class World:
         for partner in self.partners:
             if isinstance(partner.device, (PkwNode, ServoDrive)):
                 partner.device.restarts()
-                if not self.position_unknown and not self.deaf and self.bus:
+                if not self.mute and not self.deaf and self.bus:
                     heapq.heappush(self.coming, (
                         self.now + 0.001, next(self.number), partner.index,
                         f'{0x700 + partner.device.node:03X}#00'))

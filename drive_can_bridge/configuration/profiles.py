@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 import hashlib
+import os
 from pathlib import Path as FilePath
 
 from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
@@ -67,6 +68,8 @@ class ProfileStore:
             path = directory / f'{name}{SUFFIX}'
             if _is_file(path):
                 return path
+            if os.path.exists(path):    # a pipe, say: nobody waits for what comes out of it
+                return says('cannot_be_read', path=path, why='not a regular file')
         if name.endswith(SUFFIX):
             return says('name_with_suffix', name=name, suffix=SUFFIX)
         known = sorted({path.stem for directory in self._directories

@@ -60,7 +60,7 @@ class Partner(ABC):
         self.configuration = self.configure(**options)
         self.talk = Conversation(self.configuration)
         self.now = 10.0
-        self.position_unknown = False
+        self.mute = False
         self.registers = {parameter.number or 0: 0 for parameter in TABLE}
         self.registers.update({209: 1000, 210: 250, 211: 1})
         self.frames: list[tuple[float, str]] = []
@@ -95,7 +95,7 @@ class Partner(ABC):
     def deliver(self, sent: list[str]) -> None:
         for text in sent:
             self.frames.append((self.now, text))
-            answers = [] if self.position_unknown else self.answers(text)
+            answers = [] if self.mute else self.answers(text)
             for answer in answers:
                 self.now += DELAY
                 self.deliver(self.talk.hears(answer, self.now))
@@ -378,7 +378,7 @@ def test_online_is_told_before_the_first_sample(make: type[Partner]) -> None:
 
 def test_silent_drive_is_not_online(make: type[Partner]) -> None:
     partner = make()
-    partner.position_unknown = True
+    partner.mute = True
     partner.start()
     partner.live(3.0)
     session = partner.talk.session
@@ -391,13 +391,13 @@ def test_silent_drive_is_not_online(make: type[Partner]) -> None:
 
 
 def test_loss_and_recovery(partner: Partner) -> None:
-    partner.position_unknown = True
+    partner.mute = True
     partner.live(1.0)
     lost, = partner.talk.events(StationLost)
     assert lost.reason
     assert not partner.talk.session.online
     assert partner.talk.session.statistics.missed >= 3
-    partner.position_unknown = False
+    partner.mute = False
     partner.live(2.0)
     assert partner.talk.session.online
     assert len(partner.talk.events(StationFound)) == 1
@@ -421,7 +421,7 @@ def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
 
 
 def test_deactivation_of_a_drive_that_stopped_answering(partner: Partner) -> None:
-    partner.position_unknown = True
+    partner.mute = True
     partner.deliver(partner.talk.deactivate(partner.now))
     partner.live(1.0)
     assert partner.talk.session.stopped
@@ -485,7 +485,7 @@ def test_end_while_the_bus_is_lost_is_told(partner: Partner) -> None:
 def test_a_stop_that_the_drive_did_not_hear_is_told(partner: Partner) -> None:
     """What was told to stand still when it had fallen silent already may not have heard it."""
     run(partner)
-    partner.position_unknown = True
+    partner.mute = True
     partner.talk.commands(0, 0.0, partner.now)
     partner.live(2.0)
     assert partner.registers[50] == 1000
@@ -502,7 +502,7 @@ def test_a_drive_that_is_silent_when_the_bridge_ends_is_told(make: type[Partner]
     partner.start()
     partner.enable()
     run(partner)
-    partner.position_unknown = True
+    partner.mute = True
     partner.live(2.5 * partner.configuration.period)
     assert partner.talk.session.online
     partner.deliver(partner.talk.deactivate(partner.now))
@@ -525,7 +525,7 @@ def test_stop_frames_that_the_bus_refuses_are_no_stop(partner: Partner) -> None:
 
 
 def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run(partner: Partner) -> None:
-    partner.position_unknown = True
+    partner.mute = True
     partner.talk.bus_down(partner.now)
     partner.deliver(partner.talk.bus_up(partner.now))
     partner.live(0.2)
@@ -637,10 +637,10 @@ def test_after_an_upset_it_wants_arming_again(partner: Partner, upset: str) -> N
     partner.live(0.1)
     partner.take()
     if upset == 'loss':
-        partner.position_unknown = True
+        partner.mute = True
         partner.live(0.2)
         partner.take()  # until the loss was noticed, the command was still in force
-        partner.position_unknown = False
+        partner.mute = False
     elif upset == 'bus':
         talk.bus_down(partner.now)
         partner.deliver(talk.bus_up(partner.now))
@@ -706,7 +706,7 @@ def test_requests_never_hold_up_the_exchange(partner: Partner) -> None:
 
 def test_requests_without_a_drive_end(make: type[Partner]) -> None:
     partner = make()
-    partner.position_unknown = True
+    partner.mute = True
     partner.start()
     for _ in range(3):
         partner.reads(GAIN, RAMP, DAMPING)
@@ -726,19 +726,19 @@ def test_requests_are_refused_while_nothing_can_be_sent(make: type[Partner]) -> 
 
 
 def test_64_requests_wait(partner: Partner) -> None:
-    partner.position_unknown = True
+    partner.mute = True
     for _ in range(70):
         partner.reads(GAIN)
     refused = outcomes(partner)
     assert refused == [['busy']] * len(refused)
     assert len(refused) in (5, 6)
-    partner.position_unknown = False
+    partner.mute = False
     partner.live(10.0)
     assert len(outcomes(partner)) == 70 - len(refused)
 
 
 def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
-    partner.position_unknown = True
+    partner.mute = True
     for reason in ('bus down', 'bridge inactive'):
         partner.reads(GAIN, RAMP)
         partner.reads(GAIN)

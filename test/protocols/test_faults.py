@@ -111,10 +111,10 @@ class TestKnown:
     def test_a_drive_that_is_found_in_fault(self, name: str, mapped: bool) -> None:
         partner = meet(name, mapped=mapped)
         trip(partner, 7)
-        partner.position_unknown = True
+        partner.mute = True
         partner.live(1.0)
         assert text(partner) == ''
-        partner.position_unknown = False
+        partner.mute = False
         partner.live(2.0)
         assert text(partner) == '7 overcurrent'
 

@@ -36,7 +36,7 @@ def word(partner: Partner, name: str) -> dict[str, int]:
 def test_nothing_was_sent_at_first(family: str) -> None:
     partner = PARTNERS[family]()
     assert set(told(partner).values()) == {None}
-    partner.position_unknown = True
+    partner.mute = True
     partner.deliver(partner.talk.bus_up(partner.now))
     assert set(told(partner).values()) == {None}
 

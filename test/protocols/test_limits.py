@@ -80,14 +80,14 @@ class TestInEveryState:
 
     def test_after_a_loss_the_last_one_is_sent(self, name: str, control: Any) -> None:
         partner = meet(name, control=control)
-        partner.position_unknown = True
+        partner.mute = True
         partner.live(1.0)
         assert len(partner.talk.events(StationLost)) == 1
         assert limits(partner, 30.0) is CommandOutcome.ACCEPTED
         partner.talk.bus_down(partner.now)
         partner.registers[51] = 7       # whoever had it meanwhile
         assert limits(partner, 40.0) is CommandOutcome.ACCEPTED
-        partner.position_unknown = False
+        partner.mute = False
         partner.deliver(partner.talk.bus_up(partner.now))
         partner.live(1.0)
         assert partner.talk.session.online
@@ -151,9 +151,9 @@ def test_a_drive_whose_maps_differ_is_stopped_without_it() -> None:
     partner = meet('datamodel_extended')
     limits(partner, 30.0)
     run(partner)
-    partner.position_unknown = True
+    partner.mute = True
     partner.live(1.0)
-    partner.position_unknown = False
+    partner.mute = False
     partner.registers[122], partner.registers[51] = 60, 7
     partner.registers[60] = 0
     partner.live(1.0)

@@ -60,12 +60,12 @@ class TestNeutral:
     def test_no_command_goes_through_meanwhile_and_neutral_arms_again(self, name: str) -> None:
         partner = meet(name, rearm_immediate=True)
         run(partner)
-        partner.position_unknown = True
+        partner.mute = True
         stop(partner)
         for _ in range(2):
             assert partner.talk.commands(0, 50.0, partner.now) is CommandOutcome.NOT_ARMED
         assert partner.talk.session.setpoints.at_rest
-        partner.position_unknown = False
+        partner.mute = False
         partner.live(0.3)
         assert told(partner) == [(True, says('neutral_without_control'))]
         assert partner.registers[50] == 0
@@ -92,7 +92,7 @@ class TestNeutral:
     def test_a_drive_that_does_not_answer_is_no_success(self, name: str) -> None:
         partner = meet(name, missed_limit=1000, control_timeout=0.5)
         run(partner)
-        partner.position_unknown = True
+        partner.mute = True
         stop(partner)
         assert told(partner) == []
         partner.live(1.0)
@@ -102,7 +102,7 @@ class TestNeutral:
     def test_a_drive_that_is_lost_meanwhile_is_no_success(self, name: str) -> None:
         partner = meet(name)
         run(partner)
-        partner.position_unknown = True
+        partner.mute = True
         stop(partner)
         partner.live(1.9)
         (success, _), = told(partner)
@@ -111,7 +111,7 @@ class TestNeutral:
 
     def test_offline_and_inactive_refuse(self, name: str) -> None:
         partner = meet(name)
-        partner.position_unknown = True
+        partner.mute = True
         partner.live(1.0)
         stop(partner)
         assert told(partner) == [(False, says('drive_offline'))]
@@ -125,7 +125,7 @@ class TestNeutral:
     def test_the_end_of_the_bridge_ends_it(self, name: str) -> None:
         partner = meet(name)
         run(partner)
-        partner.position_unknown = True
+        partner.mute = True
         stop(partner)
         partner.deliver(partner.talk.deactivate(partner.now))
         assert told(partner) == [(False, says('bridge_inactive'))]
@@ -170,7 +170,7 @@ def test_an_answer_that_runs_behind_does_not_count() -> None:
     partner = meet('datamodel_extended', period=0.1)
     run(partner)
     partner.live(0.1)
-    partner.position_unknown = True
+    partner.mute = True
     partner.live(0.1)       # this cycle is answered late
     late = [text for _, text in partner.take() if partner.setpoints(text)][-1]
     stop(partner)
@@ -179,6 +179,6 @@ def test_an_answer_that_runs_behind_does_not_count() -> None:
     for answer in partner.answers(late):
         partner.deliver(partner.talk.hears(answer, partner.now))
     assert told(partner) == []
-    partner.position_unknown = False
+    partner.mute = False
     partner.live(0.3)
     assert told(partner) == [(True, says('neutral_without_control'))]

@@ -151,7 +151,6 @@ class Cia402Session(Session):
         self._course = Life(self._channel)
         self.look_after(self._course, self._heartbeats, self._homing, self.exchange,
                         channel=self._channel)
-        self._differs = False           # what the last set-up has found
         self._stop_until = -math.inf
         self._forget_state()
 
@@ -204,7 +203,6 @@ class Cia402Session(Session):
     def fall_silent(self) -> None:
         super().fall_silent()
         self._stop.forget()
-        self._differs = False
         self._set.clear()
 
     def bus_down(self, now: float, reason: str) -> None:
@@ -220,7 +218,6 @@ class Cia402Session(Session):
         :param spacing: s since the last NMT at least.
         """
         bring_up, told = self._bring_up, NOTHING
-        self._differs = False
         again = bring_up.nmt_at + spacing
         if again > now:
             now = yield again
@@ -231,7 +228,7 @@ class Cia402Session(Session):
             if found is Found.READY:
                 self._start_cycling(outcome.status, now)
                 return
-            self._differs, self.remedy = found is Found.DIFFERS, outcome.remedy
+            self.remedy = outcome.remedy
             self.report.advice = text or sentences.set_up_unanswered()
             again = now + LOOK_AGAIN
             if found is Found.DIFFERS:
@@ -248,7 +245,6 @@ class Cia402Session(Session):
                     bring_up.wake(now)      # a node that was stopped answers nothing
             told = text or told
             now = yield again
-            self._differs = False
 
     def _start_cycling(self, status: int, now: float) -> None:
         exchange = self.exchange
@@ -563,7 +559,8 @@ class Cia402Session(Session):
 
     @property
     def state(self) -> DriveState:
-        if self._differs and not self.defect:
+        # also while it is looked at again
+        if self.report.advice.code == 'mapping_differs' and not self.defect:
             return DriveState.MAPPING_DIFFERS
         return super().state
 

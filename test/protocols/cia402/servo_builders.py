@@ -65,13 +65,13 @@ class Axis:
         self.now = 10.0
         self.beat_at = 10.05
         self.log: list[tuple[float, str]] = []
-        self.position_unknown = self.deaf = False
+        self.mute = self.deaf = False
 
     def deliver(self, sent: list[str]) -> None:
         for text in sent:
             self.log.append((round(self.now, 6), text))
             answers = [] if self.deaf else self.drive.takes(frame(text))
-            for answer in answers if not self.position_unknown else ():
+            for answer in answers if not self.mute else ():
                 self.now += self.DELAY
                 self.deliver(self.talk.hears(str(answer), self.now))
 
@@ -90,7 +90,7 @@ class Axis:
             if self.beat_at <= due:
                 self.now = max(self.now, self.beat_at)
                 self.beat_at += 0.1
-                if self.drive.number(0x1017) and not self.position_unknown:
+                if self.drive.number(0x1017) and not self.mute:
                     self.says('705#05' if self.drive.operational else '705#7F')
                 continue
             self.now = max(self.now, due)

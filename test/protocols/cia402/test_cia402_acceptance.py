@@ -68,9 +68,9 @@ def test_a_drive_that_brakes_may_miss_some_cycles_of_its_stop() -> None:
     axis.take()
     axis.deliver(axis.talk.deactivate(axis.now))
     axis.live(0.2)
-    axis.position_unknown = True
+    axis.mute = True
     axis.live(0.02)
-    axis.position_unknown = False
+    axis.mute = False
     axis.live(5.0)
     sent = axis.take()
     assert sent.count('205#070000000000') >= 100

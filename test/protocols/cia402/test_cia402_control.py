@@ -77,7 +77,7 @@ class TestTheWay:
         axis.deliver(axis.talk.asks(ENABLE, axis.now))
         while '205#0F0000000000' not in axis.take():
             axis.live(0.001)
-        axis.position_unknown = True
+        axis.mute = True
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
         axis.live(0.015)
         assert axis.words() == ['0700']
@@ -217,7 +217,7 @@ class TestQuickStop:
         axis = Axis().enabled()
         axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
         axis.live(0.0095)
-        axis.position_unknown = True
+        axis.mute = True
         axis.live(0.01)
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
         axis.take()

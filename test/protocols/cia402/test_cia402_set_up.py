@@ -181,6 +181,23 @@ class TestRemedy:
         assert axis.session.remedy(axis.session.offline_advice) == says(
             remedy, why=says('mapping_differs'))
 
+    def test_it_differs_while_it_is_looked_at_again(self) -> None:
+        axis = Axis(objects=self.NO_MODE)
+        axis.start()
+        seen = set()
+        deliver = axis.deliver
+
+        def watch(sent: list[str]) -> None:
+            seen.update((axis.session.state, axis.session.offline_advice.code) for _ in sent)
+            deliver(sent)
+        axis.deliver = watch  # type: ignore[method-assign]
+        axis.live(2.5)
+        assert sum('40026500' in text for text in axis.take()) > 1, 'it was looked at again'
+        assert seen == {(DriveState.MAPPING_DIFFERS, 'mapping_differs')}
+        axis.drive.objects[0x6502, 0] = bytes.fromhex('FFFFFFFF')
+        axis.live(1.5)
+        assert axis.session.online
+
     @pytest.mark.parametrize('lacks', [(0x1803, 1), (0x6041, 0), (0x6064, 0)])
     def test_an_object_that_it_lacks(self, lacks: tuple[int, int]) -> None:
         axis = Axis('csp', response_pdos=(4,))

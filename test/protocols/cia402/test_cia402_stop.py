@@ -68,7 +68,7 @@ class TestTheEnd:
 
     def test_of_one_that_has_fallen_silent(self) -> None:
         axis = running()
-        axis.position_unknown = True
+        axis.mute = True
         sent = end(axis)
         assert sent.count('205#070000000000') == 6
         assert WATCH_OFF not in sent
@@ -141,14 +141,14 @@ class TestLosses:
 
     def test_a_drive_that_falls_silent_gets_neutral_cycles_then_sdo(self) -> None:
         axis = running()
-        axis.position_unknown = True
+        axis.mute = True
         axis.live(0.2)
         sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
         quiet = sent.index('605#2B40600007000000')
         assert set(sent[quiet - 3:quiet]) == {'205#070000000000'}
         assert not any(text.startswith('205#') for text in sent[quiet:])
         assert axis.talk.events(StationLost)
-        axis.position_unknown = False
+        axis.mute = False
         axis.live(1.0)
         assert axis.session.online
         assert axis.session.state is DriveState.DISABLED

@@ -258,12 +258,12 @@ class TestEvent:
     def test_missed_is_a_period_and_a_half_without_a_set(self) -> None:
         axis = self.meet()
         before = axis.session.statistics.missed
-        axis.position_unknown = True
+        axis.mute = True
         axis.live(0.044)
         assert axis.session.statistics.missed - before in (2, 3)
         axis.live(0.1)
         assert not axis.session.online
-        axis.position_unknown = False
+        axis.mute = False
         axis.live(1.0)
         assert axis.session.online
 
