@@ -33,7 +33,7 @@ _DRIVE = re.compile(r'[a-z][a-z0-9_]*')
 _NONE = '-'
 #: settings that may all be misspelt
 _FEW = 3
-#: name, unit ('' where nobody knows it), and the values of both sides; None: it has no such setting
+#: name, unit ('' where nobody knows it), the values of both sides; None: it has no such setting
 Difference = tuple[str, str, Value | None, Value | None]
 #: names of what is left out that are told
 _NAMED_MAX = 5

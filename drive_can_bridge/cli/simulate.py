@@ -7,7 +7,7 @@ takes faults while the drives run (:class:`Console`).
 """
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import replace
 import os
@@ -16,7 +16,7 @@ import select
 import signal
 import sys
 import threading
-from typing import Any, TextIO
+from typing import TextIO
 
 from drive_can_bridge.cli.command import add_params_file, bitrate, FAILED, of_drive, WrongUsage
 from drive_can_bridge.clock import Clock

@@ -85,10 +85,11 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
     outcomes: list[tuple[Drive, WriteOutcome]] = []
     try:
         for drive in drives.values():
+            def told(outcome: WriteOutcome, drive: Drive = drive) -> None:
+                outcomes.append((drive, outcome))
             with counting(f'writing {drive.name}', len(wanted), args.clock.now) as step:
                 for name in wanted:
-                    drive.write({name: checked[drive, name][0]},
-                                told=lambda outcome: outcomes.append((drive, outcome)))
+                    drive.write({name: checked[drive, name][0]}, told=told)
                     step()
     finally:    # also what was written before Ctrl-C, or before the bus was lost
         _show(args, drives, wanted, outcomes)

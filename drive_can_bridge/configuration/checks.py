@@ -186,7 +186,8 @@ def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigur
             'overload', load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_MAX))
     else:
         tree.suspicious(('buses', bus.name), says(
-            'high_load', load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_WARNING))
+            'high_load', load=100 * total, bitrate=bus.bitrate, parts=parts,
+            most=100 * LOAD_WARNING))
 
 
 def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:
@@ -289,7 +290,8 @@ class _JointChecker:
             misspelt = [other.name for other in exchanged.values() if not other.listed]
             if nearest(name, misspelt, cutoff=0.8):
                 return None
-            hint = suggestion(name, exchanged) if exchanged else says('list_empty', listed=listed_in)
+            hint = (suggestion(name, exchanged) if exchanged
+                    else says('list_empty', listed=listed_in))
             self._wrong(key, says('not_in_list', name=name, listed=listed_in, hint=hint))
             return None
         if not parameter.listed:

@@ -212,8 +212,8 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
                 'second_section', section=section.name, first=ours[0].name)))
     if not problems:
         names = ', '.join(section.name for section in reader.sections)
-        problems.append(Problem(str(path), 1, MARK, says('no_section_of', names=names) if names else
-                                says('no_section')))
+        problems.append(Problem(str(path), 1, MARK, (
+            says('no_section_of', names=names) if names else says('no_section'))))
     return None, problems
 
 

@@ -201,8 +201,8 @@ def _check_bit(tree: Tree, text: str, parameters: dict[str, Parameter],
         return
     bits = dict(parameter.bits)
     if bit not in bits:
-        tree.wrong(path, says('no_bit', bit=bit, name=name, hint=suggestion(bit, bits)) if bits else
-                   says('no_named_bits', name=name))
+        tree.wrong(path, (says('no_bit', bit=bit, name=name, hint=suggestion(bit, bits)) if bits
+                          else says('no_named_bits', name=name)))
 
 
 def fault_table(section: dict[str, Any], parameters: dict[str, Parameter]) -> FaultTable:
@@ -495,8 +495,8 @@ def _check_limits(tree: Tree, path: Path, parameter: Parameter, entry: dict[str,
     elif low > high and all(tree.is_sound((*path, key)) for key in limits):
         scale = f' with scale {parameter.scale:g}' if 'scale' in entry and low == high + 1 else ''
         tree.wrong((*path, next(iter(limits))), says(
-            'no_value_between', type=parameter.type.value, scale=scale, limits=parameter.range_text,
-            nearest=_with_unit(parameter, _nearest(parameter))))
+            'no_value_between', type=parameter.type.value, scale=scale,
+            limits=parameter.range_text, nearest=_with_unit(parameter, _nearest(parameter))))
     if isinstance(entry.get('neutral'), bool):
         tree.wrong((*path, 'neutral'), says('is_bool', name=entry['neutral']))
     elif parameter.neutral is not None and all(tree.is_sound((*path, key)) for key in limits):

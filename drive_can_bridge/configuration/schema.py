@@ -101,7 +101,8 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
         patterns = error.schema.get('patternProperties', ())
         for key in error.instance:
             if key not in known and not any(re.search(pattern, key) for pattern in patterns):
-                yield (*path, key), says('unknown_key', hint=suggestion(str(key), known)), (*path, key)
+                what = says('unknown_key', hint=suggestion(str(key), known))
+                yield (*path, key), what, (*path, key)
     elif 'propertyNames' in error.relative_schema_path:
         here = (*path, error.instance)
         yield here, _message(error), here

@@ -434,7 +434,7 @@ def check_writable(path: Path, buses: int) -> None:
                             f'choose .log')
 
 
-# -- the texts of candump --------------------------------------------------------------------------
+# -- the texts of candump -------------------------------------------------------------------------
 
 Parsed = TypeVar('Parsed')
 #: linux/can.h, in identifiers of eight digits

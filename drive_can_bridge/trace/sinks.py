@@ -250,7 +250,7 @@ class LineWriter:
         return json.dumps(document, ensure_ascii=False) + '\n'
 
 
-# -- columns and curves -----------------------------------------------------------------------------
+# -- columns and curves ---------------------------------------------------------------------------
 
 #: shortest stretch of time of a curve in s, and how many there are at most: a picture has fewer
 #: columns of pixels

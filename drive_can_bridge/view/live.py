@@ -412,7 +412,7 @@ def _drive(frame: _Frame, snapshot: Snapshot, drive: DriveSnapshot) -> None:
     frame.fill('log of this drive', lambda lines: log_lines(told, frame.inner, lines))
 
 
-# -- in a terminal ---------------------------------------------------------------------------------
+# -- in a terminal --------------------------------------------------------------------------------
 
 _CHUNK = 1024
 #: s to wait for a terminal that takes nothing before it is left as it is

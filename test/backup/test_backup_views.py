@@ -74,7 +74,8 @@ class Story:
             '    ramp_time:', '    ramp:'))
 
     def _settings(self, name: str) -> str:
-        return '\n'.join(f'{key}: {value}' for key, value in read_backup(Path(name)).values.items())
+        values = read_backup(Path(name)).values
+        return '\n'.join(f'{key}: {value}' for key, value in values.items())
 
     def _remarks(self, name: str) -> str:
         return '\n'.join(line for line in Path(name).read_text().splitlines()

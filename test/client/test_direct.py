@@ -90,7 +90,8 @@ def test_a_write_arrives(drives: Drives, world: World, name: str, parameter: str
 @pytest.mark.parametrize(('name', 'wanted'), [
     ('conveyor', {
         'ramp_tim': (1.0, 'unknown parameter ramp_tim, did you mean ramp_time?'),
-        'actual_speed': (1.0, 'read-only'), 'ramp_time': (99.0, '99 is out of range: 0.01 to 60 s'),
+        'actual_speed': (1.0, 'read-only'),
+        'ramp_time': (99.0, '99 is out of range: 0.01 to 60 s'),
         'speed_setpoint': (5.0, 'setpoint speed_setpoint: only a running bridge sends it'),
         'p50': (7, 'setpoint speed_setpoint: only a running bridge sends it')}),
     ('conveyor', {
@@ -296,8 +297,8 @@ def test_names(world: World) -> None:
 def test_a_name_that_nobody_has(world: World, drives: Drives) -> None:
     for caught in (DriveCanError, KeyError):
         with pytest.raises(caught, match=re.escape(
-                "no drive 'conveyer' (did you mean 'conveyor'?); there are: conveyor, lift, mixer, "
-                'pump') + '$'):
+                "no drive 'conveyer' (did you mean 'conveyor'?); there are: conveyor, lift, "
+                'mixer, pump') + '$'):
             drives['conveyer']
     assert drives.get('conveyer') is None and 'conveyer' not in drives
     with pytest.raises(DriveCanError, match="did you mean 'lift'"):

@@ -56,7 +56,10 @@ CASES = [
     ('        protocol: datamodel_extended\n', '        xyz: 1\n',
      [f'f.yaml:10: drives.conveyor.protocol: missing, allowed is {PROTOCOLS}',
       at('f.yaml:12: drives.conveyor.xyz', 'unknown_key',
-         hint=says('allowed', words='bus, protocol, station, profile, period, cyclic_request, cyclic_response, missed_limit, command_timeout, rearm, parameter_timeout, control_timeout, parameter_retries, verify_writes, joint'))]),
+         hint=says('allowed', words=(
+             'bus, protocol, station, profile, period, cyclic_request, cyclic_response, '
+             'missed_limit, command_timeout, rearm, parameter_timeout, control_timeout, '
+             'parameter_retries, verify_writes, joint')))]),
     ('        protocol: datamodel_extended\n', '        mapping: verify\n',  # of some family
      [f'f.yaml:10: drives.conveyor.protocol: missing, allowed is {PROTOCOLS}']),
     ('period: 0.02', 'period: 0.004',
@@ -159,7 +162,12 @@ CASES = [
          allowed='an integer of -65535 to 65535')]),
     ('rearm: neutral', 'zzz: 1',
      [at('f.yaml:18: drives.conveyor.zzz', 'unknown_key',
-         hint=says('allowed', words='bus, protocol, station, profile, period, cyclic_request, cyclic_response, missed_limit, command_timeout, rearm, parameter_timeout, control_timeout, parameter_retries, verify_writes, joint, mapping, request_map_base, response_map_base, parameter_offset, eeprom_write_gap, length_policy, allow_fast_cycle'))]),
+         hint=says('allowed', words=(
+             'bus, protocol, station, profile, period, cyclic_request, cyclic_response, '
+             'missed_limit, command_timeout, rearm, parameter_timeout, control_timeout, '
+             'parameter_retries, verify_writes, joint, mapping, request_map_base, '
+             'response_map_base, parameter_offset, eeprom_write_gap, length_policy, '
+             'allow_fast_cycle')))]),
     ('[speed, limit]', '[speed, limt]',
      [at('f.yaml:16: drives.conveyor.cyclic_request', 'not_in_profile', name='limt',
          hint=says('did_you_mean', word='limit'))]),
@@ -173,7 +181,9 @@ CASES = [
      [at('f.yaml:16: drives.conveyor.cyclic_request', 'kept_in_eeprom', name='ramp')]),
     ('[speed, limit]', '[p50]',
      [at('f.yaml:16: drives.conveyor.cyclic_request', 'not_in_profile', name='p50',
-         hint=says('allowed', words='speed, limit, word, flag, angle, order, actual, current, status, position, frequency, ramp'))]),
+         hint=says('allowed', words=(
+             'speed, limit, word, flag, angle, order, actual, current, status, position, '
+             'frequency, ramp')))]),
     ('[speed, limit]', 'speed',
      [at('f.yaml:16: drives.conveyor.cyclic_request', 'wrong_type', value='speed', kind='a string',
          allowed='a list of strings')]),

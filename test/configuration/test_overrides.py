@@ -77,7 +77,9 @@ def test_good(good: dict[str, Any]) -> None:
       at('drives', 'wrong_kind', kind='an empty list', allowed='a mapping')]),
     ('unknown.key', 5,
      [at('unknown', 'unknown_key',
-         hint=says('allowed', words='autostart, diagnostics_period, joint_state_rate, profile_directories, buses, drives, use_sim_time, start_type_description_service'))]),
+         hint=says('allowed', words=(
+             'autostart, diagnostics_period, joint_state_rate, profile_directories, buses, '
+             'drives, use_sim_time, start_type_description_service')))]),
 ])
 def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
     assert problems({**good, name: value}) == expected

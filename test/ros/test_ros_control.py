@@ -227,7 +227,8 @@ def test_inactive_refuses(bridge: StartBridge, client: Client) -> None:
     wait_until(lambda: one.node.drives['lift'].session.control.pending)
     assert client.transition(4)
     wait_until(future.done)
-    assert (future.result().success, future.result().message) == (False, sentences.bridge_inactive())
+    assert (future.result().success, future.result().message) == (
+        False, sentences.bridge_inactive())
     assert enable(client) == (False, sentences.bridge_inactive())
 
 

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Lines that repeat, speakers that say too much: bounded, and nothing lost in silence."""
 
+from functools import partial
 import re
 
 from hypothesis import given, settings, strategies as st
@@ -75,8 +76,8 @@ class Log:
              'info': lambda: speaker.info(rest), 'warning': lambda: speaker.warning(rest),
              'urgent': lambda: speaker.warning(rest, urgent=True),
              'error': lambda: speaker.error(rest),
-             'topic': lambda: speaker.warn(topic, text),
-             'once': lambda: speaker.warn(topic, text, once=True),
+             'topic': partial(speaker.warn, topic, text),
+             'once': partial(speaker.warn, topic, text, once=True),
              'numbers': lambda: [speaker.info(str(number)) for number in range(int(rest))],
              'reset': speaker.reset, 'end': lambda: self.limit.sum_up(all_of_it=True),
              }[what]()
