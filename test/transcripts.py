@@ -22,6 +22,11 @@ def stories(test: str, name: str) -> dict[str, str]:
     return found
 
 
+def shown(lines: Iterable[str], errors: Iterable[str], code: int = 0) -> list[str]:
+    """Return what a command shows: its lines, ``!`` before complaints, its exit code if not 0."""
+    return [*lines, *(f'! {line}' for line in errors), *([f'[{code}]'] if code else [])]
+
+
 def replayed(transcript: str, step: Step) -> str:
     """Do the steps of a transcript once more, and return it as it is now."""
     lines: list[str] = []

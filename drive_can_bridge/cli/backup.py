@@ -66,7 +66,7 @@ def run(args: Namespace) -> int:
             if args.json:
                 print_json(document)
             else:
-                settings = counted(document['settings'], 'setting', 'settings')
+                settings = counted(document['settings'], 'setting')
                 say(f'{name}: {settings} in {files[name]}')
     return FAILED if None in made.values() else 0
 

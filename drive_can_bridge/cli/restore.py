@@ -109,7 +109,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return 0
     if drive.enabled() is Enabled.UNKNOWN:
         complain(f'{drive.name}: whether it is enabled is not known; it should stand still')
-    count = counted(len(plan.changes), 'setting', 'settings')
+    count = counted(len(plan.changes), 'setting')
     if not agreed(f'Write {count} to {drive.name}?', yes=args.yes,
                   otherwise=_NOTHING, yes_means='writes without asking'):
         return FAILED
@@ -249,7 +249,7 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if not args.json:
         modes = [change.name for change in (*plan.changes, *plan.kept) if change.not_all
                  and change.wanted is not None and change.left_alone in (None, LeftAlone.MODE)]
-        count = counted(len(plan.changes), 'setting', 'settings')
+        count = counted(len(plan.changes), 'setting')
         say(f'{drive.name}: {count} written, {len(plan.words)} read '
             f'back: as in the file{f", but for the mode in {_list(modes)}" if modes else ""}')
     return 0

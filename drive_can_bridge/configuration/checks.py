@@ -264,9 +264,9 @@ class _JointChecker:
                 units.add(parameter.unit)
             if key == 'position_command' and not parameter.neutral_from:
                 self._tree.suspicious(
-                    (*self._path, key), says('no_neutral_from', name=name,
-                        neutral=parameter.value_from_raw(parameter.neutral_raw),
-                        unit=parameter.unit))
+                    (*self._path, key), says(
+                        'no_neutral_from', name=name, unit=parameter.unit,
+                        neutral=parameter.value_from_raw(parameter.neutral_raw)))
         if not self._tree.is_sound(self._path):
             return None
         if values['pole_pairs'] != 1 and ELECTRICAL_FREQUENCY not in units:

@@ -47,11 +47,8 @@ class Problem(NamedTuple):
     @property
     def text(self) -> Sentence:
         """The line that users see, with the code and the fields of what is wrong, and where."""
-        text = Sentence(self)
-        text.code = self.message.code
-        text.fields = {**self.message.fields, 'file': self.file, 'line': self.line,
-                       'key': self.key}
-        return text
+        return Sentence(str(self), self.message.code, {
+            **self.message.fields, 'file': self.file, 'line': self.line, 'key': self.key})
 
 
 @dataclass(frozen=True)

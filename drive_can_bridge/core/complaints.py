@@ -361,9 +361,7 @@ class _Writer(string.Formatter):
 
 def says(code: str, **fields: Any) -> Sentence:
     """Return the sentence of a code."""
-    text = Sentence(_Writer().vformat(WORDS[code], (), fields))
-    text.code, text.fields = code, fields
-    return text
+    return Sentence(_Writer().vformat(WORDS[code], (), fields), code, fields)
 
 
 def hint(word: str, known: Iterable[str]) -> Sentence:

@@ -20,6 +20,8 @@ from functools import wraps
 import inspect
 from typing import Any, ParamSpec
 
+from drive_can_bridge.core.words import counted
+
 P = ParamSpec('P')
 
 
@@ -36,10 +38,15 @@ class Sentence(str):
     code: str
     fields: Mapping[str, Any]
 
+    def __new__(cls, text: str = '', code: str = '',
+                fields: Mapping[str, Any] | None = None) -> 'Sentence':
+        said = super().__new__(cls, text)
+        said.code, said.fields = code, fields or {}
+        return said
+
 
 #: where there is nothing to be said
 NOTHING = Sentence()
-NOTHING.code, NOTHING.fields = '', {}
 
 #: all sentences there are, by their codes
 CODES: dict[str, Callable[..., Sentence]] = {}
@@ -51,17 +58,10 @@ def sentence(make: Callable[P, str]) -> Callable[P, Sentence]:
 
     @wraps(make)
     def said(*args: P.args, **kwargs: P.kwargs) -> Sentence:
-        text = Sentence(make(*args, **kwargs))
-        text.code = make.__name__
-        text.fields = {**dict(zip(names, args)), **kwargs}
-        return text
+        return Sentence(make(*args, **kwargs), make.__name__, {**dict(zip(names, args)), **kwargs})
 
     CODES[make.__name__] = said
     return said
-
-
-def _counted(number: int, one: str) -> str:
-    return f'{number} {one}' if number == 1 else f'{number} {one}s'
 
 
 @sentence
@@ -74,9 +74,7 @@ def together(said: Iterable[Sentence]) -> Sentence:
     parts = [part for part in said if part]
     if len(parts) < 2:
         return parts[0] if parts else NOTHING
-    text = Sentence('; '.join(parts))
-    text.code, text.fields = parts[0].code, {'parts': parts}
-    return text
+    return Sentence('; '.join(parts), parts[0].code, {'parts': parts})
 
 
 # -- requests: why a parameter was not read or written --------------------------------------------
@@ -84,7 +82,7 @@ def together(said: Iterable[Sentence]) -> Sentence:
 
 @sentence
 def no_answer(timeout: float, attempts: int) -> str:
-    return f'no answer in {timeout:g} s, {_counted(attempts, "attempt")}'
+    return f'no answer in {timeout:g} s, {counted(attempts, "attempt")}'
 
 
 @sentence
@@ -149,12 +147,12 @@ def read_back_differs(found: str, wanted: str) -> str:
 
 @sentence
 def other_length(length: int, listed: str) -> str:
-    return f'the drive answers with {_counted(length, "byte")}, the profile says {listed}'
+    return f'the drive answers with {counted(length, "byte")}, the profile says {listed}'
 
 
 @sentence
 def too_long(length: int) -> str:
-    return f'{_counted(length, "byte")}: only objects of 1 to 4 bytes are numbers'
+    return f'{counted(length, "byte")}: only objects of 1 to 4 bytes are numbers'
 
 
 @sentence
@@ -1044,7 +1042,7 @@ def process_data_not_received() -> str:
 
 @sentence
 def no_such_element(number: int, text: str, parameter: int, elements: int) -> str:
-    return f'refused by the drive: {text}; P{parameter} has {_counted(elements, "element")}'
+    return f'refused by the drive: {text}; P{parameter} has {counted(elements, "element")}'
 
 
 @sentence
@@ -1187,7 +1185,7 @@ def not_seen(why: str) -> str:
 
 @sentence
 def drives_missing(online: int, drives: int, missing: Collection[str]) -> str:
-    return f'{online} of {_counted(drives, "drive")} online; not seen: {", ".join(missing)}'
+    return f'{online} of {counted(drives, "drive")} online; not seen: {", ".join(missing)}'
 
 
 @sentence

@@ -60,6 +60,6 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     return matches[0] if matches else None
 
 
-def counted(number: int, one: str, many: str) -> str:
-    """Return a number of things."""
-    return f'{number} {one if number == 1 else many}'
+def counted(number: int, one: str, many: str = '') -> str:
+    """Return a number of things; without ``many`` an s makes it the plural."""
+    return f'{number} {one if number == 1 else many or one + "s"}'

@@ -69,7 +69,7 @@ def counts_in_words(drives: Sequence[DriveSnapshot]) -> str:
     for _, state, count in counts(drives):
         states[state] += count
     told = ', '.join(f'{count} {state}' for state, count in states.items())
-    return counted(len(drives), 'drive', 'drives') + (f': {told}' if told else '')
+    return counted(len(drives), 'drive') + (f': {told}' if told else '')
 
 
 def principal(items: Sequence[Shown]) -> Shown | None:

@@ -122,7 +122,7 @@ class Actions:
                                           for drive in drives))
         failed = [f'{drive.name[1:]}: {outcome.text or "not stopped"}'
                   for drive, outcome in zip(drives, outcomes) if not outcome.success]
-        count = (f'{len(drives) - len(failed)} of {counted(len(drives), "drive", "drives")} '
+        count = (f'{len(drives) - len(failed)} of {counted(len(drives), "drive")} '
                  'stopped' if drives else 'no drive is known here: nothing was stopped')
         return JSONResponse({'success': bool(drives) and not failed, 'failed': failed,
                              'text': '\n'.join([*failed, count])})

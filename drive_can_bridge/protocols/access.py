@@ -15,7 +15,8 @@ from typing import Generic, Union
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request, WriteRequest)
+    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request, WriteRequest,
+)
 from drive_can_bridge.core.retry import RetryPolicy
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.words import value_text

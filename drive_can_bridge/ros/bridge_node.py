@@ -25,7 +25,8 @@ import shlex
 from typing import Any
 
 from rcl_interfaces.msg import (
-    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult)
+    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult,
+)
 from rclpy.context import Context
 from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -38,7 +39,8 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import (
-    check_dynamic, configuration_from_overrides, declared_parameters)
+    check_dynamic, configuration_from_overrides, declared_parameters,
+)
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration

@@ -314,7 +314,7 @@ class BridgeRuntime:
         for exchange in self.exchanges.values():
             exchange.activate()
         self._attendance.begin()
-        self._log.info(f'active: {counted(len(self.drives), "drive", "drives")} on '
+        self._log.info(f'active: {counted(len(self.drives), "drive")} on '
                        f'{counted(len(self.exchanges), "bus", "buses")}')
 
     def stop(self) -> None:

@@ -21,17 +21,22 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
-    EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX)
+    EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
+)
 from drive_can_bridge.transport.adapters import check_channel
 from drive_can_bridge.transport.bus_identity import (
-    adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES)
+    adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES,
+)
 from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
-    ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame)
+    ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
+)
 from drive_can_bridge.transport.failures import (
-    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause)
+    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause,
+)
 from drive_can_bridge.transport.serial_writer import (
-    AdapterAnswers, announcing, SerialWriter, watched)
+    AdapterAnswers, announcing, SerialWriter, watched,
+)
 
 # A frame's own time stamp is believed if it is that much older than now at most, or if the frame
 # may have waited for so long: adapters that count from power-up, and clocks that were set, fall

@@ -310,7 +310,7 @@ def _header(snapshot: Snapshot, setting: Setting, width: int) -> Text:
     header = Text(setting.title, style='bold', no_wrap=True)
     bridges, drives = len(snapshot.bridges), len(snapshot.drives)
     right = clock(snapshot.at)
-    who = (f'{counted(drives, "drive", "drives")}, {counted(bridges, "bridge", "bridges")}'
+    who = (f'{counted(drives, "drive")}, {counted(bridges, "bridge")}'
            if bridges else 'no bridge yet')
     namespace = f'below {setting.namespace}' if setting.namespace else ''
     for words in (who, setting.place, namespace):

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from transcripts import shown
 import world
 
 from drive_can_bridge.client import open_drives
@@ -41,8 +42,7 @@ class Said(NamedTuple):
     @property
     def view(self) -> list[str]:
         """Return all of it as lines."""
-        return [*self.lines, *(f'! {line}' for line in self.errors),
-                *([f'[{self.code}]'] if self.code else [])]
+        return shown(self.lines, self.errors, self.code)
 
 
 Command = Callable[..., Said]

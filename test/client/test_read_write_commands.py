@@ -13,7 +13,7 @@ import sys
 from builders import frame
 from client_builders import a_world, CONVEYOR, LIFT, parameter_file, stranger, World
 import pytest
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
@@ -69,8 +69,7 @@ def test_lines(story: str, run: Run, world: World) -> None:
         if first == 'values':
             return [' '.join(str(drive.value(name)) for name in words[1:])]
         code, lines, errors = run(first, *words)
-        return [*lines, *(f'! {line}' for line in errors.splitlines()),
-                *([f'[{code}]'] if code else [])]
+        return shown(lines, errors.splitlines(), code)
     assert replayed(STORIES[story], step) == STORIES[story]
 
 

@@ -25,7 +25,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as real
 from rclpy.logging import LoggingSeverity
 from rclpy.qos import (
     DurabilityPolicy, HistoryPolicy, qos_profile_services_default, QoSPolicyKind, QoSProfile,
-    ReliabilityPolicy)
+    ReliabilityPolicy,
+)
 from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
 from states import STATES, TRANSITIONS
 import yaml

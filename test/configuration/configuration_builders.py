@@ -110,14 +110,9 @@ def warnings(folder: Path, text: str = FILE, profile: str = PROFILE,
 
 def local(folder: Path, lines: Any) -> list[Sentence]:
     """Take a directory out of lines and out of their fields."""
-    found = []
-    for line in lines:
-        text = Sentence(line.replace(f'{folder}/', ''))
-        text.code = line.code
-        text.fields = {name: value.replace(f'{folder}/', '') if type(value) is str else value
-                       for name, value in line.fields.items()}
-        found.append(text)
-    return found
+    return [Sentence(line.replace(f'{folder}/', ''), line.code, {
+        name: value.replace(f'{folder}/', '') if type(value) is str else value
+        for name, value in line.fields.items()}) for line in lines]
 
 
 def at(place: str, code: str, **fields: Any) -> says:

@@ -12,7 +12,7 @@ import sys
 
 from configuration_builders import changed, FILE, write
 import pytest
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 
 import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
@@ -48,9 +48,8 @@ def test_lines(story: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         verb, _, rest = step.partition(' ')
         if verb == 'validate':
             done = run(verb, *rest.split())
-            errors = done.stderr.replace(str(ROOT), '…').splitlines()
-            return [*done.stdout.splitlines(), *(f'! {line}' for line in errors),
-                    *([f'[{done.returncode}]'] if done.returncode else [])]
+            errors = done.stderr.replace(str(ROOT), '…')
+            return shown(done.stdout.splitlines(), errors.splitlines(), done.returncode)
         file, _, text = rest.partition(' ')
         if verb == 'change':
             Path('f.yaml').write_text(changed(Path('f.yaml').read_text(), *rest.split(' => ')))

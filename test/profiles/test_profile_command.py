@@ -12,7 +12,7 @@ import sys
 from typing import Any
 
 import pytest
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 import yaml
 
 from drive_can_bridge.cli.main import main
@@ -69,8 +69,7 @@ def test_lines(story: str, table: Path, capsys: pytest.CaptureFixture[str],
             return []
         code = main([first, *words])
         out, err = capsys.readouterr()
-        return [*out.splitlines(), *(f'! {line}' for line in err.splitlines()),
-                *([f'[{code}]'] if code else [])]
+        return shown(out.splitlines(), err.splitlines(), code)
     assert replayed(STORIES[story], step) == STORIES[story]
 
 

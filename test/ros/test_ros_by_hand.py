@@ -13,7 +13,7 @@ from graph_builders import answer, hang, offer
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 
 from drive_can_bridge.cli import control
 from drive_can_bridge.cli.main import main
@@ -44,9 +44,8 @@ def replay(story: str, run: Run) -> None:
     """Run the commands of a story, and compare what they show."""
     def step(step: str) -> list[str]:
         code, lines, errors = run(*step.split())
-        told = [*lines, *(f'! {line}' for line in errors.splitlines()),
-                *([f'[{code}]'] if code else [])]
-        return [re.sub(r'domain \d+', 'domain N', line) for line in told]
+        return [re.sub(r'domain \d+', 'domain N', line)
+                for line in shown(lines, errors.splitlines(), code)]
     assert replayed(STORIES[story], step) == STORIES[story]
 
 

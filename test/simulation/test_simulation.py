@@ -11,7 +11,7 @@ from clocks import REAL
 from jumping import JumpingClock
 import pytest
 from simulation_builders import bridge, configuration, frame, INT16, parameter, RO, RULES
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 from waiting import wait_for
 from world import World
 
@@ -278,8 +278,7 @@ class TestConsole:
     @pytest.mark.parametrize('story', STORIES)
     def test_lines(self, story: str, lines: Any) -> None:
         def step(step: str) -> list[str]:
-            said, complaints = lines(step)
-            return [*said, *(f'! {line}' for line in complaints)]
+            return shown(*lines(step))
         assert replayed(STORIES[story], step) == STORIES[story]
 
     def test_spaces_and_line_ends_do_not_count(self, lines: Any, scripted: Scripted) -> None:

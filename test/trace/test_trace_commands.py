@@ -9,7 +9,7 @@ from pathlib import Path
 
 from builders import frame
 import pytest
-from transcripts import replayed, stories
+from transcripts import replayed, shown, stories
 from world import World
 
 from drive_can_bridge.cli import main as front_end
@@ -81,8 +81,7 @@ def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
         else:
             code = drive_can(first, *words, '--params-file', file.name)
             out, err = capsys.readouterr()
-            return [*out.splitlines(), *(f'! {line}' for line in err.splitlines()),
-                    *([f'[{code}]'] if code else [])]
+            return shown(out.splitlines(), err.splitlines(), code)
         return []
     assert replayed(STORIES[story], step) == STORIES[story]
 

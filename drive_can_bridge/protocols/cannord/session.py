@@ -44,7 +44,8 @@ from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import decode_main, EXTRA_LENGTH
 from drive_can_bridge.protocols.cannord.samples import Samples
 from drive_can_bridge.protocols.cannord.states import (
-    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER)
+    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
+)
 
 
 _SILENCE = 'no answer to process data'

@@ -47,7 +47,8 @@ from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxTransactor, Procedure)
+    MailboxChannel, MailboxTransactor, Procedure,
+)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.round import Rounds
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers

@@ -24,7 +24,8 @@ from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write)
+    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write,
+)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
