@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Which tests run against the wall clock, and which of them ``make test`` tells.
+Which tests run against the wall clock, and which of them ``make test`` runs.
 
 A test is *real* when its outcome hangs on how long things take: processes that talk to each other,
 what DDS does, signals, buses of the kernel, threads that wait for a time of this machine's clock.
 Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
-say so; otherwise the test has the mark ``real``. All of them are told by ``.ci/run``, one after
-the other. ``make test`` tells those of :data:`TOLD`: each executable and each fact about the
-machine once; the others have the mark ``ci``. As a program (``real.py [all]``) it prints in which
-files those are that are told.
+say so; otherwise the test has the mark ``real``. They run one after the other: in ``make test``
+those of :data:`CHOSEN`, each executable and each fact about the machine once; in ``.ci/run`` the
+others, too, which have the mark ``ci``. As a program (``real.py [all]``) it prints the files of
+those of ``make test``, or of all.
 """
 
 from pathlib import Path
@@ -26,8 +26,8 @@ FIXTURES = {
     'test/security/': {'run'},
 }
 
-#: what make test tells -> what it shows
-TOLD = {
+#: what make test runs -> what it shows
+CHOSEN = {
     # executables
     'test/system/test_system_families.py::test_run_write_and_stop[datamodel_extended]':
         'bridge, simulator and a client over DDS: it runs, is written to, and is stopped',
@@ -76,15 +76,15 @@ def mark(item: 'pytest.Item') -> None:
     if item.get_closest_marker('socketcan') is not None:    # a bus of the kernel
         item.add_marker('real')
     if item.get_closest_marker('real') is not None and not any(
-            item.nodeid == told or item.nodeid.startswith((f'{told}[', f'{told}::'))
-            for told in TOLD):
+            item.nodeid == chosen or item.nodeid.startswith((f'{chosen}[', f'{chosen}::'))
+            for chosen in CHOSEN):
         item.add_marker('ci')
 
 
 def files(everything: bool) -> list[str]:
-    """Return where the real tests are that are told."""
+    """Return the files of the real tests of ``make test``, or of all."""
     if not everything:
-        return sorted({told.partition('::')[0] for told in TOLD})
+        return sorted({chosen.partition('::')[0] for chosen in CHOSEN})
     elsewhere = (path for path in Path('test').rglob('test_*.py')
                  if not str(path).startswith(tuple(FIXTURES)))
     marked = {str(path) for path in elsewhere if 'mark.real' in path.read_text(encoding='utf-8')}
