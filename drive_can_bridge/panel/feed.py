@@ -79,7 +79,7 @@ class Feed:
         closely = frozenset().union(*(view.focus for view in self._views))
         self._source.focus(*closely)
         waiting = self._operations.poll(
-            {**{name: (Stop.QUICK_STOP,) for name in self.snapshot.unheard},
+            {**dict.fromkeys(self.snapshot.unheard, (Stop.QUICK_STOP,)),
              **{drive.name: stops(drive) for drive in self.snapshot.drives}}, now)
         if now >= self._due:
             self._due = now + PERIOD
