@@ -44,7 +44,8 @@ INTERNAL: dict[str, set[str]] = {
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
     'ros.client': {'', 'clock', 'core', 'ros.recognition'},
-    'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
+    'ros.monitor': {
+        '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {''},
     'client.drive': {'', 'core', 'process'},

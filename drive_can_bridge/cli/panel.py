@@ -92,7 +92,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         app = application(Feed(source, Operations(source.node), model, args.clock), access,
                           Setting(place, f'{socket.gethostname()} · {place.partition(",")[0]}',
                                   args.allow_writes))
-        serve(app, listener, args.clock, ended=ended, ready=ready)
+        serve(app, listener, access, args.clock, ended=ended, ready=ready)
     finally:
         source.close()
     return served

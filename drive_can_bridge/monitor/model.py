@@ -252,6 +252,7 @@ class Model:
         self._drives: dict[str, DriveRecord] = {}
         self._log: deque[LogLine] = deque(maxlen=LOG_MAX)
         self._anew: set[str] = set()
+        self._noticed: dict[str, float] = {}
 
     # -- what arrives -----------------------------------------------------------------------------
 
@@ -319,6 +320,11 @@ class Model:
         if not self._bridges or f'/{logger.replace(".", "/")}' in self._bridges:
             self._log.append(LogLine(at, level, printable(logger), printable(text, LOG_LIMIT)))
 
+    def noticed(self, drives: Iterable[str], now: float) -> None:
+        """Take the full names of all drives in the graph that nobody has told of."""
+        found = sorted(name for name in drives if name.startswith(self._prefix))[:DRIVES_MAX]
+        self._noticed = {name: self._noticed.get(name, now) for name in found}
+
     # -- what is known ----------------------------------------------------------------------------
 
     @property
@@ -373,7 +379,8 @@ class Model:
                        for full, drive in bridge.drives.items()]
         return Snapshot(at, tuple(bridges), tuple(buses), tuple(drives), tuple(
             line for line in self._log
-            if f'/{line.logger.replace(".", "/")}' in self._bridges))
+            if f'/{line.logger.replace(".", "/")}' in self._bridges),
+            {name: now - at for name, at in self._noticed.items() if name not in self._drives})
 
     # -- inside -----------------------------------------------------------------------------------
 

@@ -342,6 +342,8 @@ class Snapshot:
     Everything.
 
     :param at: s since the epoch.
+    :param unheard: full names of drives that are in the graph, and of which no bridge tells in its
+        diagnostics; s since that is so.
     """
 
     at: float = 0.0
@@ -349,6 +351,7 @@ class Snapshot:
     buses: tuple[BusSnapshot, ...] = ()
     drives: tuple[DriveSnapshot, ...] = ()
     log: tuple[LogLine, ...] = ()
+    unheard: Mapping[str, float] = field(default_factory=dict)
 
     def drive(self, name: str) -> DriveSnapshot | None:
         """Return a drive by its full name."""

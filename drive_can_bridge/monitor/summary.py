@@ -22,6 +22,8 @@ FEW = 6
 #: drives with the same trouble that are named
 _NAMED = 4
 _OTHER = '…'
+#: s that a bridge may take to tell of its drives for the first time
+_UNHEARD = 5.0
 #: what differs although the trouble is the same: times and counts, not which fault it is
 _VARYING = re.compile(r'\b\d+:\d\d:\d\d\b|(?<!fault )\b\d+(?:\.\d+)?\b')
 #: units of what moves
@@ -130,7 +132,7 @@ def _of_anybody(drive: DriveSnapshot) -> str:
 
 def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
     """
-    Say which bridges are silent, and what that means: a line for each.
+    Say which bridges are silent, and what that means: a line for each; and which drives none has.
 
     :param clock: writes a time of day.
     """
@@ -141,6 +143,10 @@ def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
             since = clock(snapshot.at - bridge.silent)
             lines.append(f'bridge {name}silent since {since}: its drives may still be running; '
                          'stop buttons have no effect')
+    unheard = [name for name, seconds in snapshot.unheard.items() if seconds > _UNHEARD]
+    if unheard:
+        lines.append(f'{", ".join(unheard[:_NAMED])}{", " + _OTHER if unheard[_NAMED:] else ""}: '
+                     'in the graph, but no bridge tells of it: may be running')
     return lines
 
 

@@ -255,7 +255,7 @@ def _enters(scope: Scope, entry: Entry) -> bool:
     """Let a connection in; False: all places are taken."""
     enter = scope.get(ENTER)    # a WebSocket has come in before it became one
     return enter is None or enter(
-        stop=entry.role is Role.OPERATOR and scope['path'] in _STOPS)
+        entry.role, stop=entry.role is Role.OPERATOR and scope['path'] in _STOPS)
 
 
 def _limited(receive: Receive) -> Receive:

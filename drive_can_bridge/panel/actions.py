@@ -117,14 +117,12 @@ class Actions:
 
     async def _stop_all(self) -> Response:
         """Stop all drives at once; say first which do not stand."""
-        drives = self._feed.snapshot.drives
-        outcomes = await asyncio.gather(*(self._feed.stop(drive, Stop.QUICK_STOP)
-                                          for drive in drives))
-        failed = [f'{drive.name[1:]}: {outcome.text or "not stopped"}'
-                  for drive, outcome in zip(drives, outcomes) if not outcome.success]
-        count = (f'{len(drives) - len(failed)} of {counted(len(drives), "drive")} '
-                 'stopped' if drives else 'no drive is known here: nothing was stopped')
-        return JSONResponse({'success': bool(drives) and not failed, 'failed': failed,
+        told = await self._feed.stop_all()
+        failed = [f'{name[1:]}: {outcome.text or "not stopped"}'
+                  for name, outcome in told if not outcome.success]
+        count = (f'{len(told) - len(failed)} of {counted(len(told), "drive")} '
+                 'stopped' if told else 'no drive is known here: nothing was stopped')
+        return JSONResponse({'success': bool(told) and not failed, 'failed': failed,
                              'text': '\n'.join([*failed, count])})
 
     async def _write(self, request: Request) -> Response:

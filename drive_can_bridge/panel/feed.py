@@ -79,7 +79,8 @@ class Feed:
         closely = frozenset().union(*(view.focus for view in self._views))
         self._source.focus(*closely)
         waiting = self._operations.poll(
-            {drive.name: stops(drive) for drive in self.snapshot.drives}, now)
+            {**dict.fromkeys(self.snapshot.unheard, (Stop.QUICK_STOP,)),
+             **{drive.name: stops(drive) for drive in self.snapshot.drives}}, now)
         if now >= self._due:
             self._due = now + PERIOD
             self._look(now)
@@ -121,8 +122,17 @@ class Feed:
         """Stop a drive; return what became of it."""
         if stop not in stops(drive):
             return Outcome(False, 'no control word: only quick stop stops it')
+        return await self._stop(drive.name, stop)
+
+    async def stop_all(self) -> list[tuple[str, Outcome]]:
+        """Stop all drives at once, whether their bridges tell of them or not; by full name."""
+        names = [*(drive.name for drive in self.snapshot.drives), *self.snapshot.unheard]
+        outcomes = await asyncio.gather(*(self._stop(name, Stop.QUICK_STOP) for name in names))
+        return list(zip(names, outcomes))
+
+    async def _stop(self, drive: str, stop: Stop) -> Outcome:
         return await self._told(lambda done: self._operations.stop(
-            drive.name, stop, done, self._clock.now()))
+            drive, stop, done, self._clock.now()))
 
     async def write(self, drive: str, name: str, value: Value) -> Outcome:
         """Write a parameter; return what became of it."""

@@ -19,12 +19,14 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.panel.access import ENTER
+from drive_can_bridge.panel.access import Access, ENTER, Entry, Role
 
 #: what is the matter with a port, not with the address
 _OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
 #: connections at once that have shown a token, and of others; a browser takes a handful
 CONNECTIONS_MAX, OUTSIDE_MAX = 200, 100
+#: of those with a token, so many are for operators: a stop takes a page with its button, too
+KEPT_FOR_OPERATORS = 50
 #: file descriptors that this takes, beside those of ROS
 _DESCRIPTORS = 1024
 #: s that a connection may take for its first byte and for its first request, and bytes of the
@@ -61,9 +63,11 @@ class Connection(H11Protocol):
     :param outside: those that have shown no token yet, the oldest first; of all connections.
     """
 
-    def __init__(self, outside: dict['Connection', None], *args: Any, **options: Any) -> None:
+    def __init__(self, outside: dict['Connection', None], access: Access, *args: Any,
+                 **options: Any) -> None:
         super().__init__(*args, **options)
         self._outside = outside
+        self._access = access
         self._heard = False
         app = self.app
 
@@ -89,12 +93,15 @@ class Connection(H11Protocol):
             super().data_received(data)
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        if not self.enter(stop=False):
+        # a WebSocket is no connection of this kind any more when the gate hears of it
+        entry = self._access.judge('websocket', 'GET', self.headers, b'')
+        if isinstance(entry, Entry) and not self.enter(entry.role, stop=False):
             self.show_out()
             return
+        self._outside.pop(self, None)
         super().handle_websocket_upgrade(event)
 
-    def enter(self, *, stop: bool) -> bool:
+    def enter(self, role: Role, *, stop: bool) -> bool:
         """
         Come in.
 
@@ -102,7 +109,8 @@ class Connection(H11Protocol):
         :return: False: all places are taken.
         """
         inside = len(self.connections) - len(self._outside)
-        if self in self._outside and inside >= CONNECTIONS_MAX and not stop:
+        places = CONNECTIONS_MAX - (0 if role is Role.OPERATOR else KEPT_FOR_OPERATORS)
+        if self in self._outside and inside >= places and not stop:
             return False
         self._outside.pop(self, None)
         return True
@@ -199,18 +207,19 @@ def log_to_standard_error(clock: Clock) -> None:
         logger.setLevel(level)
 
 
-def serve(app: ASGIApp, listener: socket.socket, clock: Clock, *, ended: Callable[[], bool],
-          ready: Callable[[], None]) -> None:
+def serve(app: ASGIApp, listener: socket.socket, access: Access, clock: Clock, *,
+          ended: Callable[[], bool], ready: Callable[[], None]) -> None:
     """
     Serve until the end; then the port is closed, however far this had come.
 
+    :param access: as behind ``app``; here it tells whose place a WebSocket takes.
     :param ended: tells whether this is to end.
     :param ready: is told when the first request can come, unless it is to end by then.
     """
     _make_room()
     log_to_standard_error(clock)
     config = uvicorn.Config(
-        app, http=partial(Connection, {}),     # type: ignore[arg-type]
+        app, http=partial(Connection, {}, access),     # type: ignore[arg-type]
         ws='auto', loop='asyncio', lifespan='on', log_config=None,
         access_log=False, ws_max_size=_MESSAGE_MAX, h11_max_incomplete_event_size=_HEAD_MAX,
         timeout_keep_alive=20, timeout_graceful_shutdown=_GRACE, server_header=False,

@@ -189,6 +189,32 @@ def test_the_bridge_does_not_notice(tmp_path: Path, capsys: pytest.CaptureFixtur
         watched.close()
 
 
+def test_a_drive_whose_bridge_says_nothing_is_noticed(tmp_path: Path) -> None:
+    from bridges import Bridge, LIFT, parameters
+    from drive_can_bridge.ros.monitor.client import MonitorClient
+    with world(int(os.environ['DRIVE_CAN_TEST_SEED']), ros=True) as bench:
+        silent = Bridge(tmp_path, {**parameters(lift=LIFT), 'diagnostics_period': 60.0},
+                        arguments=('-r', '__ns:=/cell'))
+        silent.begin()
+        silent.online()
+        bench.clock.live(5.0)
+        models = [Model(place) for place in ('', '/cell', '/other')]
+        sources = [MonitorClient(model) for model in models]
+
+        def unheard(seconds: float) -> list[list[str]]:
+            for _ in range(round(10 * seconds)):
+                for source in sources:
+                    source.poll(bench.clock.now())
+                bench.clock.live(0.1)
+            return [[*model.look(bench.clock.now(), 0.0).unheard] for model in models]
+        assert unheard(5.0) == [['/cell/lift'], ['/cell/lift'], []]
+        # until it says something
+        assert unheard(60.0) == [[], [], []]
+        for source in sources:
+            source.close()
+        silent.close()
+
+
 @pytest.mark.parametrize('arguments', [['--namespace', 'no-name'], ['something'], ['--speed']])
 def test_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ending:

@@ -65,7 +65,15 @@ def two_bridges() -> Model:
     return model
 
 
+def unheard() -> Model:
+    """Return drives in the graph that no bridge tells of, but for one."""
+    model = model_of([drive_status()])
+    model.noticed(['/cell/lift', '/cell/saw', f'/{model.drives[0][1:]}'], NOW)
+    return model
+
+
 DRIVES: dict[str, Callable[[], Model]] = {
+    'unheard': unheard,
     'fifteen': fifteen_drives, 'three': three_drives, 'nobody': Model, 'two_bridges': two_bridges,
     'with_files': lambda: alike('call ~/enable (drive_can enable {0}) of an online {0}.yaml'),
     'with_bus_off': lambda: alike('enable {}, online', bus_status(level=2, message='bus off'))}

@@ -9,8 +9,9 @@ import pytest
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
+from drive_can_bridge.panel.access import Access, Role
 from drive_can_bridge.panel.server import (
-    Connection, CONNECTIONS_MAX, FIRST_BYTE, OUTSIDE_MAX,
+    Connection, CONNECTIONS_MAX, FIRST_BYTE, KEPT_FOR_OPERATORS, OUTSIDE_MAX,
 )
 
 
@@ -61,7 +62,7 @@ class House:
 
     def comes(self) -> tuple[Connection, Wire]:
         wire: Any = Wire()
-        connection = Connection(self._outside, self._config, self._state, {},
+        connection = Connection(self._outside, Access(port=0), self._config, self._state, {},
                                 _loop=self)    # type: ignore[arg-type]
         connection.connection_made(wire)
         return connection, wire
@@ -88,10 +89,19 @@ def test_who_came_first_leaves_first() -> None:
 
 def test_inside_there_is_a_limit_but_not_for_stops() -> None:
     house = House()
-    inside = [house.comes()[0].enter(stop=False) for _ in range(CONNECTIONS_MAX + 1)]
+    inside = [house.comes()[0].enter(Role.OPERATOR, stop=False)
+              for _ in range(CONNECTIONS_MAX + 1)]
     assert inside == [True] * CONNECTIONS_MAX + [False]
-    assert house.comes()[0].enter(stop=True)
+    assert house.comes()[0].enter(Role.OPERATOR, stop=True)
     # who is inside stays there, whoever stands outside
     silent = [house.comes() for _ in range(2 * OUTSIDE_MAX)]
     assert sum(wire.closed for _, wire in silent) >= OUTSIDE_MAX
     assert len(house._outside) == OUTSIDE_MAX
+
+
+def test_viewers_leave_room_for_operators() -> None:
+    house = House()
+    viewers = CONNECTIONS_MAX - KEPT_FOR_OPERATORS
+    inside = [house.comes()[0].enter(Role.VIEWER, stop=False) for _ in range(viewers + 1)]
+    assert inside == [True] * viewers + [False]
+    assert house.comes()[0].enter(Role.OPERATOR, stop=False)

@@ -118,6 +118,10 @@ def test_a_viewer_who_takes_all_places_keeps_nobody_from_stopping(site: Site) ->
             if answer.status == 503:
                 break
         assert answer.status == 503
+        # an operator finds the button, too
+        assert site.get('/', 'operator').status == 200
+        assert site.websocket('viewer').status == 503
+        assert site.websocket('operator').status == 101
         assert site.do('quick_stop', 'operator', STOP).said['success'] is True
         assert site.do('disable', 'operator', STOP).said['success'] is True
         assert site.do('disable', 'viewer', STOP).status == 503

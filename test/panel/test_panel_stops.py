@@ -125,6 +125,15 @@ def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
                     'failed': text.splitlines()[:len(failing)]}
 
 
+def test_drives_that_no_bridge_tells_of_are_stopped_too() -> None:
+    from drive_can_bridge.panel.actions import Actions
+    feed = feed_of(Some(**{'cell/c': Outcome(False, 'nobody answered')}))
+    feed.snapshot = Snapshot(drives=(seen('a'),), unheard={'/cell/b': 0.0, '/cell/c': 9.0})
+    said = json.loads(asyncio.run(Actions(feed, allow_writes=False)._stop_all()).body)
+    assert said == {'success': False, 'failed': ['cell/c: nobody answered'],
+                    'text': 'cell/c: nobody answered\n2 of 3 drives stopped'}
+
+
 def feed_of(operations: Asked) -> Any:
     from drive_can_bridge.panel.feed import Feed
     return Feed(None, operations, Model(), REAL)  # type: ignore[arg-type]

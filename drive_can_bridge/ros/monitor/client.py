@@ -32,6 +32,9 @@ from drive_can_bridge.ros.client.calls import (
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain,
 )
+from drive_can_bridge.ros.recognition import (
+    bridges_among, namespace_of, sampled_among, stoppable_among,
+)
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
@@ -187,9 +190,11 @@ class MonitorClient:
         for drive in model.drives:
             if drive not in self._asked:
                 self._ask_names(drive)
-        if self._focus and now >= self._graph_at:
+        if now >= self._graph_at:
             self._graph_at = now + _GRAPH_PERIOD
-            self._find_bits()
+            self._notice()
+            if self._focus:
+                self._find_bits()
 
     def _subscribe_online(self, drive: str) -> Inbox:
         def take(message: Bool) -> None:
@@ -206,6 +211,16 @@ class MonitorClient:
                       take_response),
                 Inbox(self._node, ParameterEvent, f'{drive}/request', newest_quality(),
                       take_request))
+
+    def _notice(self) -> None:
+        """Look for drives whose bridge has not told of them: it hangs, or takes its time."""
+        services, known = self._node.services(), set(self._model.drives)
+        places = {namespace_of(bridge) for bridge in bridges_among(services)}
+        found = {node for node in stoppable_among(services)
+                 if node not in known and namespace_of(node) in places}
+        if found:
+            found &= sampled_among(self._node.topics())
+        self._model.noticed(found, self._now)
 
     def _find_bits(self) -> None:
         """Subscribe to the bits of drives: ``~/<parameter>/<bit>``."""
