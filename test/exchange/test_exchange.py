@@ -19,7 +19,9 @@ from drive_can_bridge.core.events import (
 )
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.requests import Failure, ReadValue
-from drive_can_bridge.exchange.exchange import BusExchange, LOOK_PERIOD, PASS_PERIOD, stop_all
+from drive_can_bridge.exchange.exchange import (
+    BusExchange, LOOK_PERIOD, PASS_PERIOD, PeriodicTask, stop_all,
+)
 
 ZEROS = '0000000000000000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
@@ -332,6 +334,21 @@ def test_deactivate_with_the_timer_thread(clock: JumpingClock) -> None:
     assert bench.link.stopped
     assert not clock.tasks
     assert bench.bus_notes.told == [('opened', 'main')]
+
+
+def test_a_periodic_task_keeps_its_time_where_no_drive_wants_anything(clock: JumpingClock) -> None:
+    bench, done = Bench(clock=clock), list[float]()
+    begun = clock.now()
+    bench.exchange.periodic_task = PeriodicTask(done.append)
+    bench.exchange.periodic_task.begin(PASS_PERIOD / 5, begun)
+    bench.exchange.open()
+    clock.live(PASS_PERIOD * 2.1)
+    assert done == [pytest.approx(begun + PASS_PERIOD / 5 * turn, abs=1e-3)
+                    for turn in range(1, 11)]
+    bench.exchange.periodic_task.end()
+    clock.live(PASS_PERIOD)
+    assert len(done) == 10
+    bench.exchange.close()
 
 
 def test_the_reader_makes_the_passes_as_long_as_it_is_back_in_time(clock: JumpingClock) -> None:

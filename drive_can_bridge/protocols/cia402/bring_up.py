@@ -309,7 +309,7 @@ class BringUp:
         if interval > 0.0:
             slot = yield from (self._write_watch if mapping == 'configure' else
                                self._read_watch)(interval)
-        option = (yield from self._read(states.ABORT_CONNECTION_OPTION, signed=True)) \
+        option = (yield from self._read(states.ABORT_CONNECTION_OPTION)) \
             if slot is not None else 0
         if option == 0:
             self.tell(sentences.nothing_stops())
