@@ -6,7 +6,9 @@ It stands below rclpy, in place of its C extension (:func:`pretending`): nodes, 
 parameters and what else rclpy does in Python are rclpy's own. What is here behaves as the real
 one does where a story looks at it: ``test_clocked_contract.py`` tells its stories to both.
 
-What it leaves out: discovery takes no time, messages neither, and nothing is lost.
+What it leaves out: discovery takes no time, messages neither, and nothing is lost. Events of
+quality of service happen to whoever asks for them: those of which rclpy itself writes to the log
+would cost half of the time of each wait of an executor.
 """
 
 from collections import deque
@@ -21,6 +23,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from jumping import JumpingClock, JumpingWakeEvent
 from rcl_interfaces.msg import Log
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation as real
 from rclpy.logging import LoggingSeverity
 from rclpy.qos import (
@@ -916,6 +919,14 @@ def _sublogger(graph: Graph, parent: str, child: str) -> bool:
     return False
 
 
+def _asked_for(create: Callable[..., list[Any]]) -> Callable[..., list[Any]]:
+    """Return what listens for those events only that somebody has asked for."""
+    def created(callbacks: Any, *arguments: Any) -> list[Any]:
+        callbacks.use_default_callbacks = False
+        return create(callbacks, *arguments)
+    return created
+
+
 def _unregister(guard: Any, former: Any = real.unregister_sigint_guard_condition) -> None:
     """Leave alone what was never registered: executors may outlive their story."""
     if not isinstance(guard, GuardCondition):
@@ -967,13 +978,17 @@ def pretending(clock: JumpingClock) -> Iterator[Graph]:
             'register_sigint_guard_condition', 'install_signal_handlers',
             'rclpy_logging_configure', 'rclpy_logging_fini'),
             _nothing)}
-    former = {name: getattr(real, name) for name in names}
-    for name, value in names.items():
-        setattr(real, name, value)
+    places: list[tuple[Any, str, Any]] = [
+        *((real, name, value) for name, value in names.items()),
+        *((kind, 'create_event_handlers', _asked_for(kind.create_event_handlers))
+          for kind in (PublisherEventCallbacks, SubscriptionEventCallbacks))]
+    former = [(owner, name, getattr(owner, name)) for owner, name, _ in places]
+    for owner, name, value in places:
+        setattr(owner, name, value)
     try:
         yield graph
     finally:
-        for name, value in former.items():
-            setattr(real, name, value)
+        for owner, name, value in former:
+            setattr(owner, name, value)
         for name in graph.levels:
             real_set_level(name, 0, False)
