@@ -33,7 +33,7 @@ class Looking:
         def found() -> DriveSnapshot | None:
             lift = self.look().drive('/lift')
             return lift if lift is not None and condition(lift) else None
-        lift = wait_until(found, what='the lift')
+        lift = wait_until(found, 10.0, 'the lift')
         assert isinstance(lift, DriveSnapshot)
         return lift
 
