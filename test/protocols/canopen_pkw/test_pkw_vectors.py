@@ -210,6 +210,16 @@ def test_table_of_codes() -> None:
         assert f'{code:08X}h' in refusals.describe(code)
 
 
+@pytest.mark.parametrize(('code', 'meaning'), [
+    (1, 'stack full'), (3, 'register not found'), (4, 'answer delayed'), (6, 'unknown'),
+    (7, 'not all registers found'), (8, 'read-only'), (10, 'word value too high'),
+    (11, 'word value too low'), (12, 'byte value too high'), (13, 'byte value too low'),
+    (16, 'invalid value'), (20, 'bad answer'), (0xFF, 'unknown')])
+def test_small_numbers_are_those_of_the_profibus_variant(code: int, meaning: str) -> None:
+    assert meaning in refusals.describe(code)
+    assert 'no SDO abort code' in refusals.describe(code)
+
+
 # -- registers as objects -------------------------------------------------------------------------
 
 

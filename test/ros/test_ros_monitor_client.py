@@ -1,0 +1,99 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What a monitor learns of a bridge, and what it asks for while it looks."""
+
+from collections.abc import Callable
+from typing import Any
+
+from bridges import LIFT, parameters, StartBridge
+from clients import Client, wait_until
+import pytest
+from rcl_interfaces.srv import ListParameters
+from waiting import clock
+
+from drive_can_bridge.monitor.model import Model
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Snapshot
+from drive_can_bridge.ros.monitor import client as monitor_client
+from drive_can_bridge.ros.monitor.client import MonitorClient
+
+
+class Looking:
+    """A monitor's node, and somebody who looks at what it has found."""
+
+    def __init__(self) -> None:
+        self.model = Model()
+        self.source = MonitorClient(self.model)
+
+    def look(self) -> Snapshot:
+        """Let it look once."""
+        self.source.poll(clock().now())
+        return self.model.look(clock().now(), 0.0)
+
+    def sees(self, condition: Callable[[DriveSnapshot], Any]) -> DriveSnapshot:
+        """Return the lift as soon as it is as wanted."""
+        def found() -> DriveSnapshot | None:
+            lift = self.look().drive('/lift')
+            return lift if lift is not None and condition(lift) else None
+        lift = wait_until(found, 10.0, 'the lift')
+        assert isinstance(lift, DriveSnapshot)
+        return lift
+
+
+@pytest.fixture(name='looking')
+def _looking(bridge: StartBridge) -> Any:
+    bridge(parameters(lift=LIFT)).online()
+    looking = Looking()
+    yield looking
+    looking.source.close()
+
+
+def test_where_a_drive_is_and_what_it_has(looking: Looking, client: Client,
+                                          monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(monitor_client, '_BATCH', 2)
+    names = client.call('/lift/list_parameters', ListParameters).result.names
+    assert len(names) > 4
+    lift = looking.sees(lambda lift: len(lift.parameters) >= len(names))
+    assert sorted(info.name for info in lift.parameters) == sorted(names)
+    assert lift.place == Place('main', '2', 'datamodel_extended', 0.02)
+    assert lift.online
+    assert ('INFO', 'online') in [(line.level, line.text.rpartition(': ')[2])
+                                  for line in looking.look().log]
+
+
+def test_samples_are_asked_for_while_somebody_looks(looking: Looking, client: Client) -> None:
+    def listeners() -> int:
+        return sum(client.node.count_subscribers(f'/lift/{kind}')
+                   for kind in ('request', 'response'))
+    looking.sees(lambda lift: lift.sampled and lift.setpoints and lift.values)
+    assert listeners() == 2
+    looking.source.watch(False)
+    looking.sees(lambda lift: lift.asked_for == 0.0 and listeners() == 0)
+    looking.source.watch(True)
+    looking.sees(lambda lift: lift.asked_for > 0.0 and listeners() == 2)
+
+
+def test_bits_are_those_of_the_drive_that_is_looked_at_closely(looking: Looking,
+                                                               client: Client) -> None:
+    def listeners() -> int:
+        return int(client.node.count_subscribers('/lift/status_word/fault'))
+    looking.sees(lambda lift: lift.sampled)
+    assert listeners() == 0
+    looking.source.focus('/lift')
+    lift = looking.sees(lambda lift: lift.bits.get('status_word', {}).keys() >= {'fault'})
+    assert lift.bits.keys() == {'status_word'}
+    assert lift.bits['status_word']['fault'] is False
+    looking.source.focus()
+    looking.sees(lambda _: listeners() == 0)
+
+
+def test_a_glance_takes_samples_only(looking: Looking) -> None:
+    looking.source.focus('/lift')
+    before = looking.sees(lambda lift: lift.sampled and lift.parameters)
+    told = looking.look().log
+    for _ in range(50):
+        clock().wait(clock().now() + 0.1)
+        looking.source.glance(clock().now())
+    after = looking.model.look(clock().now(), 0.0)
+    assert after.log == told
+    lift = after.drive('/lift')
+    assert lift is not None
+    assert lift.exchanges == before.exchanges   # which diagnostics tell
