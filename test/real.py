@@ -41,11 +41,11 @@ CHOSEN = {
         'drive_can panel under load',
     'test/monitor/test_monitor_attach.py::test_it_attaches_to_whatever_comes_and_says_what_went':
         'drive_can monitor finds bridges',
-    'test/system/test_system_backup.py::TestThroughTheBridge::test_one_drive_of_each_family':
-        'drive_can backup and restore, of each family',
+    'test/system/test_system_backup.py::TestThroughTheBridge::test_as_a_user_starts_them':
+        'drive_can backup, restore and compare',
     'test/system/test_system_ros2_control.py::test_trip_on_the_way':
         'a trajectory of ros2_control',
-    'test/system/test_system_parameters.py::test_both_ways_show_the_same':
+    'test/system/test_system_parameters.py::test_as_a_user_starts_them':
         'drive_can read and write, directly and through a bridge',
     # the machine
     'test/system/test_system_signals.py::test_while_active':

@@ -307,7 +307,7 @@ class World:
         self.deaf = self.mute = self.twice = self.refusing = False
         self.bus = self.active = True
         self.delay = PROMPT
-        self.coming: list[tuple[float, int, int, str]] = []
+        self.coming: list[tuple[float, int, int, Frame]] = []
         self.number = count()
         self.looked_at = -math.inf
         self.enabling = False   # a call that nobody has answered yet
@@ -343,7 +343,7 @@ class World:
             partner.motor.look()
             for answer in () if self.mute else answers * (1 + self.twice):
                 heapq.heappush(self.coming, (
-                    self.now + self.delay, next(self.number), partner.index, str(answer)))
+                    self.now + self.delay, next(self.number), partner.index, answer))
 
     def told(self, partner: Partner, event: Any) -> None:
         if isinstance(event, Noted):
@@ -365,10 +365,10 @@ class World:
             due = max(self.now, min(self.publish_at, *(
                 session.next_timer() for session in self.sessions), math.inf))
             if self.coming and self.coming[0][0] <= min(due, end):
-                at, _, index, text = heapq.heappop(self.coming)
+                at, _, index, answer = heapq.heappop(self.coming)
                 self.now = max(self.now, at)
                 if self.bus:
-                    self.sessions[index].receive_frame(frame(text), self.now)
+                    self.sessions[index].receive_frame(answer, self.now)
             elif due <= end:
                 self.now = due
                 self.publish()
@@ -528,7 +528,7 @@ class World:
                 if not self.mute and not self.deaf and self.bus:
                     heapq.heappush(self.coming, (
                         self.now + 0.001, next(self.number), partner.index,
-                        f'{0x700 + partner.device.node:03X}#00'))
+                        frame(f'{0x700 + partner.device.node:03X}#00')))
 
     def ends_unless_unseen(self) -> None:
         """Record a restart; a call that waits for its answer goes on."""

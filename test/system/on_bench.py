@@ -8,7 +8,9 @@ the script ``ros_client.py``. A second signal, which ends a process, nobody can 
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
+import io
 from pathlib import Path
 import signal
 from typing import Any
@@ -22,6 +24,7 @@ from slcan_peer import answer_to, Answers, Line
 from waiting import DEADLINE, wait_for
 from world import World
 
+from drive_can_bridge.cli.main import main
 from drive_can_bridge.cli.simulate import Console
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.frame import Frame
@@ -118,6 +121,34 @@ class BenchSimulator(Told, Witness):
         return int(bool(self.simulation.failure))
 
 
+class BenchCommand(Told):
+    """``drive_can``, run to its end by whoever starts it."""
+
+    running = False
+
+    def __init__(self, arguments: tuple[str, ...]) -> None:
+        self.name = arguments[0]
+        self._out, self._err = io.StringIO(), io.StringIO()
+        with redirect_stdout(self._out), redirect_stderr(self._err):
+            self._code = main(arguments)
+
+    @property
+    def lines(self) -> list[str]:
+        return self._out.getvalue().splitlines()
+
+    @property
+    def errors(self) -> list[str]:
+        return self._err.getvalue().splitlines()
+
+    def wait(self) -> int:
+        """Return the exit code."""
+        return self._code
+
+    def dump(self) -> str:
+        """Return both outputs."""
+        return self._err.getvalue() + self._out.getvalue()
+
+
 class BenchProcesses:
     """The "processes" of one story."""
 
@@ -135,6 +166,10 @@ class BenchProcesses:
         started.simulation.start()
         self._simulators.append(started)
         return started
+
+    def drive_can(self, *arguments: str) -> BenchCommand:
+        """Run the command ``drive_can``."""
+        return BenchCommand(arguments)
 
     def bridge(self, file: Path, namespace: str = '', *arguments: str) -> BenchBridge:
         """Start the bridge."""

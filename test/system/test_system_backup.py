@@ -73,9 +73,22 @@ def documents(process: Process) -> dict[str, dict[str, object]]:
 class TestThroughTheBridge:
 
     @pytest.mark.real
+    def test_as_a_user_starts_them(self, processes: Processes, client: Client,
+                                   namespace: str) -> None:
+        simulator = prepare(processes)
+        processes.bridge(processes.directory / 'bridge.yaml', namespace)
+        client.online(f'/{namespace}/pump')
+        file, way = str(processes.directory / 'b.yaml'), ('--namespace', namespace)
+        ask(processes, 'backup', 'pump', '-o', file, *way)
+        simulator.write(f'pump {BY_HAND["pump"]}')
+        simulator.line('pump: fault set=network_fallback')
+        restored = ask(processes, 'restore', file, '--yes', '--json', *way)
+        assert {key for key, one in documents(restored).items() if one['ok']} == {
+            'flc1_ratio', 'motor_trip_class', 'network_fallback'}
+        assert ask(processes, 'compare', 'pump', file, *way).lines == ['the same']
+
     def test_one_drive_of_each_family(self, processes: Processes, client: Client,
                                       namespace: str) -> None:
-        """All of them at once: each command looks for the bridge, and that takes its time."""
         simulator = prepare(processes)
         processes.bridge(processes.directory / 'bridge.yaml', namespace)
         way = ('--namespace', namespace)

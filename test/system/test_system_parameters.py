@@ -46,6 +46,27 @@ def documents(process: Process, code: int = 0) -> list[dict[str, Any]]:
 
 
 @pytest.mark.real
+def test_as_a_user_starts_them(processes: Processes, client: Client, namespace: str,
+                               tmp_path: Path) -> None:
+    file = bridge_file(tmp_path, drives=ALL)
+    processes.simulator(file)
+    direct, through = ('--params-file', str(file), '--nmt-start'), ('--namespace', namespace)
+    assert ended(processes.drive_can('write', 'conveyor', 'ramp_time=2.5', *direct))[1].endswith(
+        '  written')
+    bridge = processes.bridge(file, namespace)
+    client.online(f'/{namespace}/conveyor')
+    document, = documents(processes.drive_can('read', 'conveyor', 'ramp_time', '--json', *through))
+    assert document['value'] == 2.5
+    # nobody gets between
+    refused = processes.drive_can('read', 'pump', *direct)
+    written = processes.drive_can('write', 'conveyor', 'ramp_time=4', *through)
+    assert ended(written)[1].endswith('  written')
+    assert refused.wait() == 1
+    assert refused.errors == [f'bus main: drive pump is used by process {bridge.pid}; leave '
+                              f'--params-file away to go through it']
+    assert bridge.end() == 0
+
+
 def test_both_ways_show_the_same(processes: Processes, client: Client, namespace: str,
                                  tmp_path: Path) -> None:
     file = bridge_file(tmp_path, drives=ALL)
@@ -59,31 +80,19 @@ def test_both_ways_show_the_same(processes: Processes, client: Client, namespace
     bridge = processes.bridge(file, namespace)
     for drive in ALL:
         client.online(f'/{namespace}/{drive}')
-    # beside each other: each looks for the bridge first, and that takes its time
     through = ('--namespace', namespace)
-    began = [processes.drive_can('read', drive, name, '--json', *through)
-             for drive, (name, _) in WRITES.items()]
-    for process, (_, value) in zip(began, WRITES.values()):
-        document, = documents(process)
+    for drive, (name, value) in WRITES.items():
+        document, = documents(processes.drive_can('read', drive, name, '--json', *through))
         assert document['value'] == float(value)
-    began = [processes.drive_can('write', drive, f'{name}={value}', *through)
-             for drive, (name, value) in WRITES.items()]
-    for process in began:
-        assert ended(process)[1].endswith('  written')
-    began = [processes.drive_can('read', drive, *through) for drive in ALL]
-    for process, (drive, (name, _)) in zip(began, WRITES.items()):
-        mine = ended(process)
+        written, = ended(processes.drive_can('write', drive, f'{name}={value}', *through))[1:]
+        assert written.endswith('  written')
+        mine = ended(processes.drive_can('read', drive, *through))
         # the same rows: only what the motors do differs from one moment to the next
         names = {line.split()[1] for line in alone if line.split()[0] == drive}
         assert names <= {line.split()[0] for line in mine}
         row = next(line for line in mine if line.split()[0] == name)
         other = next(line for line in alone if line.split()[:2] == [drive, name])
         assert row.split() == other.split()[1:]
-    # and nobody gets between
-    refused = processes.drive_can('read', 'pump', *direct)
-    assert refused.wait() == 1
-    assert refused.errors == [f'bus main: drive pump is used by process {bridge.pid}; leave '
-                              f'--params-file away to go through it']
     assert bridge.end() == 0
 
 
