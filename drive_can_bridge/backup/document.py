@@ -39,8 +39,7 @@ from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.text import printable, TEXT_MAX
-from drive_can_bridge.core.words import describe_type, show
+from drive_can_bridge.core.text import describe_type, printable, show, TEXT_MAX
 
 
 def value_in_file(parameter: Parameter, raw: int) -> str:

@@ -20,16 +20,14 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from drive_can_bridge.backup.document import (
-    Backup, Head, in_order, is_setting, is_whole, mode_bits, ModeBits, modes_of, raw_in_file,
-)
+    Backup, Head, in_order, is_setting, is_whole, mode_bits, ModeBits, modes_of, raw_in_file)
 from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
 from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import printable, value_text
 
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
 PATIENCE = 10.0

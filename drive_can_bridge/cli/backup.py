@@ -11,13 +11,12 @@ from typing import Any
 from drive_can_bridge.backup.document import head_of, settings_of, written
 from drive_can_bridge.cli.command import complain, FAILED, output, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
-    add_words, chosen, complete_drives, opened, read_all, source_of, unread,
-)
+    add_words, chosen, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.client.drive import Drive
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.text import counted
 
 SUFFIX = '.yaml'
 

@@ -10,12 +10,10 @@ from pathlib import Path
 import re
 
 from drive_can_bridge.backup.document import (
-    Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, read_backup, settings_of,
-)
+    Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, read_backup, settings_of)
 from drive_can_bridge.cli.command import complain, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
-)
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
@@ -23,8 +21,7 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.core.errors import ConfigurationError, DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import printable, value_text
 
 #: of values of which no profile says how fine they are
 _RELATIVE_TOLERANCE = 1e-9

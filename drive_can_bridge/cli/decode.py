@@ -13,13 +13,12 @@ from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.frame import Record
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.resources import command_that_brings
 from drive_can_bridge.trace.files import (
-    check_readable, open_text, read_records, READABLE, UnknownFormat,
-)
+    check_readable, open_text, read_records, READABLE, UnknownFormat)
 from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 

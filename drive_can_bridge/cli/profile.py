@@ -11,16 +11,14 @@ import re
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    agreed, complain, FAILED, output_path, print_json, say, WrongUsage,
-)
+    agreed, complain, FAILED, output_path, print_json, say, WrongUsage)
 from drive_can_bridge.cli.output import differs, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.profiles.build import build_profile, Built, ImportFailed
 from drive_can_bridge.profiles.catalogue import (
-    available, check, Checked, description, find, VERIFIED_WORDS,
-)
+    available, build_profile, Built, check, Checked, description, find, ImportFailed,
+    VERIFIED_WORDS)
 from drive_can_bridge.profiles.csv_import import COLUMNS, read_table, WrongColumns
 from drive_can_bridge.profiles.eds_import import read_eds
 from drive_can_bridge.protocols.families import FAMILIES

@@ -10,12 +10,11 @@ from rich.live import Live
 
 from drive_can_bridge.cli.command import above_zero, FAILED, print_json
 from drive_can_bridge.cli.drives import (
-    add_words, complete_words, opened, read_all, source_of, split_words,
-)
+    add_words, complete_words, opened, read_all, source_of, split_words)
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
              'why not')

@@ -10,17 +10,14 @@ import sys
 from typing import Any, TextIO
 
 from drive_can_bridge.cli.command import (
-    above_zero, add_params_file, add_seconds, complain, output_path, print_json, WrongUsage,
-)
+    above_zero, add_params_file, add_seconds, complain, output_path, print_json, WrongUsage)
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
-from drive_can_bridge.core.frame import bits_on_bus, STUFFING
-from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.frame import bits_on_bus, Record, RecordKind, STUFFING
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.trace.files import (
-    check_writable, labels, LOSSES, TraceWriter, UnknownFormat, WRITABLE,
-)
+    check_writable, labels, LOSSES, TraceWriter, UnknownFormat, WRITABLE)
 from drive_can_bridge.transport.tap import QUEUE_MAX, Tap
 
 #: s between two looks at the clock while nothing arrives

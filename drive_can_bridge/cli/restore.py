@@ -7,22 +7,18 @@ from pathlib import Path
 
 from drive_can_bridge.backup.document import Backup, is_setting, read_backup
 from drive_can_bridge.backup.restore import (
-    LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in,
-    RestorePlan, Restorer, RestoreResult, says_nothing, strangers, why_left_alone,
-)
+    LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in, RestorePlan,
+    Restorer, RestoreResult, says_nothing, strangers, why_left_alone)
 from drive_can_bridge.cli.command import (
-    agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage,
-)
+    agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage)
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread,
-)
+    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import tells_nothing
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import counted, value_text
+from drive_can_bridge.core.text import counted, printable, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
 
 #: s that a drive's identity is waited for

@@ -24,9 +24,8 @@ from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfigur
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.simulation.faults import Fault, parse_fault, usage_lines
-from drive_can_bridge.simulation.player import Say, ShowFrame
 from drive_can_bridge.simulation.registers import Mechanics
-from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
+from drive_can_bridge.simulation.simulation import PlayedDrive, Say, ShowFrame, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
 _CHUNK = 4096

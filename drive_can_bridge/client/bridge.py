@@ -10,22 +10,18 @@ from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescripto
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome,
-)
+    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import NoBridge
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind,
-)
+    Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.value_names import taken_apart
+from drive_can_bridge.core.text import printable, taken_apart
 from drive_can_bridge.ros.client.search import find_bridge, Graph
 from drive_can_bridge.ros.messages import (
-    drive_value, facts_of, limits_of, parameter_message, plain,
-)
+    drive_value, facts_of, limits_of, parameter_message, plain)
 
 _TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
 

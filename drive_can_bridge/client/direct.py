@@ -16,13 +16,11 @@ import sys
 import threading
 
 from drive_can_bridge.client.drive import (
-    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome,
-)
+    Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import (
-    BridgeConfiguration, BusConfiguration, DriveConfiguration,
-)
+    BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
 from drive_can_bridge.core.events import Event, RequestCompleted
@@ -30,12 +28,11 @@ from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     ABSENT, Failure, is_answer, Outcome, ReadRequest, ReadValue, Request, SILENT, WriteRequest,
-    Written,
-)
+    Written)
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.sentences import no_answer_offline, no_result, Sentence
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.exchange.one_master import Ownership

@@ -17,15 +17,12 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
 from drive_can_bridge.core.complaints import hint, says, suggestion
 from drive_can_bridge.core.configuration import (
-    BusConfiguration, DriveConfiguration, JointConfiguration,
-)
+    BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
+    JointConfiguration, Quantity, si_factor)
 from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.units import (
-    convertible_units, ELECTRICAL_FREQUENCY, Quantity, si_factor,
-)
-from drive_can_bridge.core.words import nearest, seems_limit, show
+from drive_can_bridge.core.text import nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 

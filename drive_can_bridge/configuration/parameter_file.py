@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.yaml_nodes import (
-    BrokenYaml, Kind, Node, read_documents, Rules, TreeReader,
-)
+    BrokenYaml, Kind, Node, read_documents, Rules, TreeReader)
 from drive_can_bridge.core.complaints import says, suggestion
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.core.words import nearest
+from drive_can_bridge.core.text import nearest
 
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes

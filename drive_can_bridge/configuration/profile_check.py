@@ -17,13 +17,11 @@ from drive_can_bridge.configuration.schema import check_schema, profile_schema
 from drive_can_bridge.core.complaints import says, suggestion
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind,
-)
+    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import (
-    ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern,
-)
+    ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern)
 from drive_can_bridge.core.sentences import NOTHING
-from drive_can_bridge.core.words import show
+from drive_can_bridge.core.text import show
 
 #: names that a drive's node uses itself
 RESERVED = frozenset((

@@ -27,7 +27,7 @@ from jsonschema.validators import extend
 from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.core.complaints import hint, says, suggestion
 from drive_can_bridge.core.sentences import NOTHING, Sentence, uncoded
-from drive_can_bridge.core.words import describe_type, value_text
+from drive_can_bridge.core.text import describe_type, value_text
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 

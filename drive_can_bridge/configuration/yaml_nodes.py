@@ -26,7 +26,7 @@ import yaml
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.words import describe_type
+from drive_can_bridge.core.text import describe_type
 
 Scalar = Union[bool, int, float, str]
 

@@ -13,8 +13,7 @@ from typing import Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.sentences import Sentence

@@ -11,7 +11,7 @@ import string
 from typing import Any
 
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.core.words import nearest, show
+from drive_can_bridge.core.text import nearest, show
 
 _WORDS_MAX = 30
 

@@ -2,10 +2,13 @@
 """
 The checked configuration, as the rest of the program receives it.
 
-Times are seconds. Everything in here has passed every check: nobody downstream checks again.
+Times are seconds. Everything in here has passed every check: nobody downstream checks again. A
+joint has SI units: angles in rad, speeds in rad/s; effort stays in the profile's unit.
 """
 
 from dataclasses import dataclass, field
+from enum import Enum
+import math
 from typing import Any
 
 from drive_can_bridge.core.parameters import Parameter
@@ -109,3 +112,54 @@ class BridgeConfiguration:
     drives: dict[str, DriveConfiguration] = field(default_factory=dict)
     profile_directories: tuple[str, ...] = ('',)
     warnings: tuple[str, ...] = ()
+
+
+class Quantity(Enum):
+    """A quantity of a joint."""
+
+    POSITION = 'position'
+    VELOCITY = 'velocity'
+    EFFORT = 'effort'
+
+
+#: an electrical frequency; divided by the pole pairs it is a speed of the shaft
+ELECTRICAL_FREQUENCY = 'Hz'
+
+_FACTORS: dict[Quantity, dict[str, float]] = {
+    Quantity.POSITION: {
+        'rad': 1.0,
+        'deg': math.pi / 180.0,
+        'rev': 2.0 * math.pi,
+    },
+    Quantity.VELOCITY: {
+        'rad/s': 1.0,
+        'deg/s': math.pi / 180.0,
+        'rpm': 2.0 * math.pi / 60.0,
+        ELECTRICAL_FREQUENCY: 2.0 * math.pi,
+    },
+}
+
+
+def convertible_units(quantity: Quantity) -> tuple[str, ...]:
+    """Return the units that convert; empty for effort, where every unit passes as it is."""
+    return tuple(_FACTORS.get(quantity, ()))
+
+
+def si_factor(quantity: Quantity, unit: str, *, gear_ratio: float = 1.0,
+              pole_pairs: int = 1) -> float | None:
+    """
+    Return the factor from a motor's value in ``unit`` to the joint's SI value.
+
+    :param unit: unit as written in the profile.
+    :param gear_ratio: motor turns per turn of the joint; not zero, negative reverses.
+    :param pole_pairs: of the motor; only an electrical frequency is divided by them.
+    :return: the factor, or None where the unit does not convert.
+    """
+    if quantity is Quantity.EFFORT:
+        return 1.0
+    factor = _FACTORS[quantity].get(unit)
+    if factor is None:
+        return None
+    if unit == ELECTRICAL_FREQUENCY:
+        factor /= pole_pairs
+    return factor / gear_ratio

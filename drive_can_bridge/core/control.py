@@ -2,9 +2,12 @@
 """
 What can be asked of a drive beyond parameters: ``~/enable``, ``~/reset_fault``, ``~/quick_stop``.
 
-What a request does, step by step, is a table, :data:`.control_steps.STEPS`: which control word
-is sent, what the status has to say, and what follows then. Which of two requests gives way is
-another, :data:`.control_steps.MEETINGS`. Here stands why they are as they are.
+What a request does, step by step, is a table, :data:`STEPS`: which control word is sent, what the
+status has to say, and what follows then. Which of two requests gives way is another,
+:data:`MEETINGS`. :class:`.ControlMachine` goes by them; here stands why they are as they are.
+
+Which word serves an action, the profile's table says. Where the next word depends on what the
+drive reports (CiA 402: 0007h before 000Fh), a family hands in rules of its own.
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
 ``disable``; but a drive that says that it still brakes when the time is over keeps its quick
@@ -58,8 +61,10 @@ a word that stops it for longer than a request may take is told of
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.profile import ControlTable
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 
 class ControlAction(Enum):
@@ -91,3 +96,150 @@ class ControlCompleted:
     request: ControlRequest
     success: bool
     message: Sentence
+
+
+_ENABLE, _DISABLE = ControlAction.ENABLE, ControlAction.DISABLE
+_QUICK_STOP, _RESET = ControlAction.QUICK_STOP, ControlAction.RESET_FAULT
+
+
+class Seen(Enum):
+    """
+    What a step waits for.
+
+    What the status has to say counts from drives that know the current word; where the profile
+    has no condition for it, that the word has left is all there is.
+    """
+
+    NO_FAULT = 'no fault'
+    READY = 'ready'
+    ENABLED = 'enabled'
+    OFF = 'it does not run'
+    RESETTABLE = 'a fault that can be reset, and no pulse before'
+    PULSED = 'the pulse has left as often as it has to'
+    REPORTS = 'the profile says how it reports that it runs'
+
+
+class Then(Enum):
+    """What follows."""
+
+    SEND_ENABLE = 'enable becomes the word'
+    SEND_RESET = 'the pulse becomes the word'
+    SEND_DISABLE = 'disable becomes the word, and the request goes on'
+    SUCCEED = 'success, disable becomes the word'
+    SUCCEED_AND_STAY = 'success, the word stays'
+    ANSWER = 'success, and the word stays until the time is over'
+
+
+class Step(NamedTuple):
+    """
+    One step of a request.
+
+    A quick stop of a drive that runs begins with its own word, an enable with the word that is
+    there, and everything else with ``disable``.
+
+    :ivar request: what is under way.
+    :ivar word: what the current control word is for.
+    :ivar when: all of it has to be seen.
+    """
+
+    request: ControlAction
+    word: ControlAction
+    when: tuple[Seen, ...]
+    then: Then
+
+
+#: the first one that fits is taken; every other end of a request is a failure, and ``disable``
+STEPS: tuple[Step, ...] = (
+    Step(_ENABLE, _DISABLE, (Seen.NO_FAULT, Seen.OFF, Seen.READY), Then.SEND_ENABLE),
+    Step(_ENABLE, _ENABLE, (Seen.ENABLED,), Then.SUCCEED_AND_STAY),
+    Step(_DISABLE, _DISABLE, (Seen.OFF,), Then.SUCCEED),
+    Step(_QUICK_STOP, _DISABLE, (Seen.OFF,), Then.SUCCEED),     # of a drive that does not run
+    Step(_QUICK_STOP, _QUICK_STOP, (Seen.OFF, Seen.REPORTS), Then.SUCCEED),
+    Step(_QUICK_STOP, _QUICK_STOP, (Seen.OFF,), Then.ANSWER),   # disable would end the braking
+    Step(_RESET, _DISABLE, (Seen.RESETTABLE,), Then.SEND_RESET),
+    Step(_RESET, _DISABLE, (Seen.NO_FAULT,), Then.SUCCEED),
+    Step(_RESET, _RESET, (Seen.PULSED,), Then.SEND_DISABLE),
+)
+
+
+class Meeting(Enum):
+    """What becomes of a request while another is under way."""
+
+    JOINS = 'both are answered together'
+    REPLACES = 'the one under way fails'
+    REFUSED = 'no start cuts a stop short'
+
+
+_JOINS, _REPLACES, _REFUSED = Meeting.JOINS, Meeting.REPLACES, Meeting.REFUSED
+
+#: (request, the one under way) -> what becomes of it
+MEETINGS: dict[tuple[ControlAction, ControlAction], Meeting] = {
+    (request, under_way): meeting
+    for request, row in {
+        #              enable     disable    quick stop  reset
+        _ENABLE:     (_JOINS,    _REFUSED,  _REFUSED,   _REPLACES),
+        _DISABLE:    (_REPLACES, _JOINS,    _REPLACES,  _REPLACES),
+        _QUICK_STOP: (_REPLACES, _REPLACES, _JOINS,     _REPLACES),
+        _RESET:      (_REPLACES, _REFUSED,  _REFUSED,   _JOINS),
+    }.items()
+    for under_way, meeting in zip((_ENABLE, _DISABLE, _QUICK_STOP, _RESET), row)
+}
+
+
+class TableRules:
+    """
+    One word for each action, as the table has them.
+
+    :ivar known: the actions that there is a word for.
+    """
+
+    def __init__(self, table: ControlTable) -> None:
+        self._words: dict[ControlAction, int] = {
+            action: word for action in ControlAction
+            if (word := getattr(table, action.value, None)) is not None}
+        self.known = frozenset(self._words)
+
+    def word(self, sending: ControlAction, *, enabling: bool) -> int:
+        """
+        Return the word to be sent now.
+
+        :param sending: what it is for.
+        :param enabling: ``disable`` is sent on the way to ``enable``.
+        """
+        return self._words[sending]
+
+    def rests(self, word: int) -> bool:
+        """Tell whether a word tells the drive to stand still."""
+        return word == self._words[ControlAction.DISABLE]
+
+    def left(self, word: int) -> None:
+        """Record a word that has left."""
+
+    def reported(self, raw: int, *, behind: bool) -> None:
+        """
+        Take a status word.
+
+        :param behind: it arrived after the current word had left.
+        """
+
+    def forget(self) -> None:
+        """Record that nothing is known of the drive."""
+
+    @property
+    def holds(self) -> Sentence:
+        """What is answered to a quick stop in which the drive stays; '' if it does not."""
+        return NOTHING
+
+    @property
+    def lacking(self) -> Sentence:
+        """What a drive that reports enabled lacks to be driven; '' if nothing."""
+        return NOTHING
+
+    def remark(self, sending: ControlAction) -> Sentence:
+        """Say what else is known of why a drive does not do what is wanted; '' for nothing."""
+        return NOTHING
+
+    @property
+    def loose(self) -> bool:
+        """Nothing holds the axis in its place although the drive is enabled."""
+        return False

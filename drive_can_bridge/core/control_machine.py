@@ -12,15 +12,13 @@ from dataclasses import dataclass, field
 import math
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.control_rules import TableRules
-from drive_can_bridge.core.control_steps import Meeting, MEETINGS, Seen, STEPS, Then
+from drive_can_bridge.core.control import (
+    ControlAction, ControlCompleted, ControlRequest, Meeting, MEETINGS, Seen, STEPS, TableRules,
+    Then)
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.status_reports import (
-    disregard_text, state_text, StatusReports, stuck_text, success_text, Wording,
-)
-
+    disregard_text, state_text, StatusReports, stuck_text, success_text, Wording)
 
 #: s that a drive may go on running under ``disable`` at least until that is told
 RUNNING_ON_MAX = 1.0

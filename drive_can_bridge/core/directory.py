@@ -11,13 +11,9 @@ from dataclasses import replace
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType, Storage, ValueKind,
-)
+from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, ValueKind
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import nearest
-
+from drive_can_bridge.core.text import nearest, printable
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
 _ACCESS = (Access.READ_ONLY, Access.WRITE_ONLY, Access.READ_WRITE)

@@ -12,8 +12,7 @@ from typing import Protocol
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.events import DriveState, RequestCompleted
 from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.parameters import Parameter, Value

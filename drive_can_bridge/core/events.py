@@ -1,7 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What a session tells the outside. Times are ``now`` of the call that caused the event."""
+"""
+What a session tells the outside: events, and the state of its drive in one word.
+
+Times are ``now`` of the call that caused the event.
+"""
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple, Union
 
 from drive_can_bridge.core.control import ControlCompleted
@@ -110,3 +115,14 @@ class Noted:
 Event = Union[ProcessDataReceived, StationFound, StationLost, DriveFailed, MappingDiffered,
               MappingWritten, SetpointsExpired, RequestCompleted, ControlCompleted, FrameRejected,
               AnswerLate, ForeignMasterSeen, Noted]
+
+
+class DriveState(Enum):
+    """The state of a drive in one word, as diagnostics shows it."""
+
+    OFFLINE = 'offline'
+    MAPPING_DIFFERS = 'mapping differs'
+    DISABLED = 'disabled'
+    NOT_ARMED = 'not armed'
+    ONLINE = 'online'
+    FAULT = 'fault'

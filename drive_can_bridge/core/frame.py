@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The classical CAN data frame, as the protocols see it."""
+"""The CAN data frame, as the protocols see it; a record of a trace, as anything may be seen."""
 
-from typing import NamedTuple
+from enum import Enum
+from typing import NamedTuple, Union
 
 STANDARD_IDENTIFIER_MAX = 0x7FF
 EXTENDED_IDENTIFIER_MAX = 0x1FFFFFFF
@@ -58,3 +59,37 @@ def worst_bits(length: int, *, extended: bool) -> int:
     """Return the longest that a frame can get by bit stuffing, interframe space included."""
     stuffed = (54 if extended else 34) + 8 * length
     return bits_on_bus(length, extended) + (stuffed - 1) // 4
+
+
+class RecordKind(Enum):
+    """What was seen."""
+
+    DATA = 'data'
+    REMOTE = 'remote'
+    ERROR = 'error'
+    FD = 'fd'
+
+
+class Record(NamedTuple):
+    """
+    One entry of a trace.
+
+    Unlike a ``Frame`` it may be anything that adapters report: no protocol here has remote or CAN
+    FD frames, but who looks for the reason of a failure wants to see them.
+
+    :param time: s, since 1970 or since the start of the trace.
+    :param channel: what the trace calls the bus: a name, a number, or '' where it has none.
+    :param identifier: of an error frame: the classes of errors, as in linux/can/error.h.
+    :param sent: by the machine that recorded it; None: the trace does not say.
+    """
+
+    time: float
+    channel: Union[str, int]
+    identifier: int
+    data: bytes
+    extended: bool
+    kind: RecordKind = RecordKind.DATA
+    sent: bool | None = None
+
+
+DATA = RecordKind.DATA

@@ -25,8 +25,8 @@ is measured is not limited by ``minimum..maximum``: an axis outside of them stay
 A :class:`Limit` travels with the setpoints, but moves nothing.
 """
 
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
+from drive_can_bridge.core.process_image import LastSent
 
 #: relative error of a difference of two values, far below anything that matters
 _ROUNDING = 1e-9

@@ -19,7 +19,7 @@ from typing import Union
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import value_text
 
 Value = Union[float, int, bool]
 

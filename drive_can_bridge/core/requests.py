@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Acyclic requests of users, and what became of each parameter in them.
+Acyclic requests of users, what became of each parameter in them, and how often a drive is asked.
 
 A request holds the parameters of one service call. It is answered exactly once, by a
 :class:`~drive_can_bridge.core.events.RequestCompleted` event with one outcome per parameter in
 the order asked.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Union
 
@@ -94,3 +95,29 @@ class WriteRequest:
 
 
 Request = Union[ReadRequest, WriteRequest]
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(slots=True)
+class RetryPolicy:
+    """
+    What everybody who asks a drive has to know; one for each drive, whose time-out may change.
+
+    :param timeout: s to wait for an answer.
+    :param attempts: how often a read is sent before it counts as unanswered.
+    :param offline: tells whether nobody is there; then one unanswered frame ends a request.
+    """
+
+    timeout: float
+    attempts: int
+    offline: Callable[[], bool] = _never
+
+    def unanswered(self, attempts: int | None = None) -> Failure:
+        """Say that nobody answered; ``attempts`` None: as many as configured."""
+        if self.offline():
+            return Failure(sentences.no_answer_offline())
+        return Failure(sentences.no_answer(
+            self.timeout, self.attempts if attempts is None else attempts))

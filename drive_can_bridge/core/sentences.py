@@ -20,7 +20,7 @@ from functools import wraps
 import inspect
 from typing import Any, ParamSpec
 
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.text import counted
 
 P = ParamSpec('P')
 

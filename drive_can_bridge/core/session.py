@@ -37,17 +37,14 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Event
+from drive_can_bridge.core.events import DriveState, Event
 from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
-from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.process_image import LastSent, ProcessImage
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import Outcomes, Request
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import Outcomes, Request, RetryPolicy
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import Setpoints

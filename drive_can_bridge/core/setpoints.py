@@ -15,11 +15,10 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core.holding import HeldSetpoint, Limit, make_setpoint, Setpoint
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.sentences import (
-    NOTHING, position_not_told, Sentence, together, would_jump,
-)
+    NOTHING, position_not_told, Sentence, together, would_jump)
 
 
 class CommandOutcome(Enum):

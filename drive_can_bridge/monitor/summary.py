@@ -13,8 +13,8 @@ import math
 import re
 from typing import Any
 
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.events import DriveState
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Times, UNKNOWN
 
 #: drives that one page shows in the order of their configuration, and in full; more are sorted

@@ -7,8 +7,7 @@ import math
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.value_names import taken_apart
+from drive_can_bridge.core.text import printable, taken_apart
 
 _DECIMALS_MAX = 6
 #: columns for a value of which nothing is known

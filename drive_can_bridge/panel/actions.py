@@ -25,8 +25,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.text import counted, printable
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Outcome, Stop
 from drive_can_bridge.panel.access import ROLE, Role
 from drive_can_bridge.panel.feed import Feed

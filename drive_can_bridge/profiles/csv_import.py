@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut
+from drive_can_bridge.profiles.catalogue import Draft, Found, ImportFailed, LeftOut
 from drive_can_bridge.profiles.names import (
     decimal_sign, factor, integer, interval, is_hexadecimal_only, known_unit, Measure, measure,
-    name_of, one_line, plain_words, rounded, split_unit, unit, Unusable,
-)
+    name_of, one_line, plain_words, rounded, split_unit, unit, Unusable)
 
 #: ends the search for headings
 _HEAD_ROWS = 60

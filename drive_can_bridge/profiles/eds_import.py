@@ -19,8 +19,7 @@ import re
 from types import ModuleType
 from typing import Any
 
-from drive_can_bridge.profiles.build import Draft, Found, ImportFailed, LeftOut
-from drive_can_bridge.profiles.catalogue import check, Checked
+from drive_can_bridge.profiles.catalogue import check, Checked, Draft, Found, ImportFailed, LeftOut
 from drive_can_bridge.profiles.csv_import import access_of
 from drive_can_bridge.profiles.names import one_line, rounded, unit, Unusable
 from drive_can_bridge.resources import command_that_brings, profiles_directory

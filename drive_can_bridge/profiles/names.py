@@ -2,9 +2,9 @@
 """
 Names for parameters, made from free text by the rules of docs/profiles.md.
 
-Units that a joint converts get the spelling of :mod:`drive_can_bridge.core.units`, a few others
-the usual one; every other unit stays as it was written. What is written is read alike by rcl and
-by any YAML parser, and the same table always gives the same text.
+Units that a joint converts get the spelling of :mod:`drive_can_bridge.core.configuration`, a few
+others the usual one; every other unit stays as it was written. What is written is read alike by
+rcl and by any YAML parser, and the same table always gives the same text.
 
 Numbers as manuals write them: decimal commas, grouped thousands, hexadecimal. ``1.000`` is one or
 a thousand. The rest of the same table settles that: a single ``0,5`` makes the comma the decimal

@@ -23,7 +23,7 @@ import math
 from typing import NamedTuple, Protocol
 
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.protocols.polling import TOLERANCE
+from drive_can_bridge.protocols.polled_exchange import TOLERANCE
 
 #: s until a word that the drive takes no notice of is written again: at first, and at most
 REPEAT_FIRST = 0.2

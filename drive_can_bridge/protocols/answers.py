@@ -12,8 +12,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
-from drive_can_bridge.protocols.exchange_book import ExchangeBook
+from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook
 
 
 class Answers:

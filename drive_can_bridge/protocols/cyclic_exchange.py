@@ -24,7 +24,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.stop_duty import CYCLE, Happened
 from drive_can_bridge.protocols.answers import Answers
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
+from drive_can_bridge.protocols.exchange_book import CycleTimer
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
 STOP_CYCLES = 3

@@ -8,8 +8,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.family import Cannord
 from drive_can_bridge.protocols.canopen_pkw.family import CanopenPkw
 from drive_can_bridge.protocols.cia402.family import Cia402
-from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
-from drive_can_bridge.protocols.datamodel.standard_family import DataModelStandard
+from drive_can_bridge.protocols.datamodel.family import DataModelExtended, DataModelStandard
 from drive_can_bridge.protocols.family import Family
 
 FAMILIES: dict[str, Family] = {family.name: family for family in (

@@ -4,13 +4,17 @@ What the rest of the program asks of a protocol family.
 
 Configuration checks, the exchange and the ROS side know families only through this interface and
 through the row in :mod:`drive_can_bridge.protocols.families`.
+
+The keys that only one family has are a frozen dataclass: the one place that knows type, default,
+limits and meaning of a key. JSON Schema and the parameters of the node are made from it.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, Field, field, fields
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, get_args, get_origin, Literal, NamedTuple
 
 from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -19,9 +23,60 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.options import FamilyOptions, make_options, options_schema
-from drive_can_bridge.protocols.scanner import Prober
-from drive_can_bridge.protocols.scanner import Scanner
+from drive_can_bridge.protocols.scanner import Prober, Scanner
+
+_TYPES = {bool: 'boolean', int: 'integer', float: 'number'}
+#: several of them, in order
+IntegerList = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyOptions:
+    """What stands there for a family that has no keys of its own."""
+
+
+def option(default: Any, description: str, *, minimum: float | None = None,
+           maximum: float | None = None) -> Any:
+    """
+    Describe a key; the annotation of the field gives its type.
+
+    :param default: None where it depends on the station, see ``Family.make_options``.
+    """
+    limits = {'minimum': minimum, 'maximum': maximum}
+    return field(default=default, metadata={
+        'description': description,
+        **{key: limit for key, limit in limits.items() if limit is not None}})
+
+
+def options_schema(options: type[Any]) -> dict[str, Any]:
+    """Return the JSON Schema properties of the keys, the family's own before shared ones."""
+    ordered = sorted(fields(options), key=lambda entry: entry.name not in options.__annotations__)
+    return {entry.name: _schema(entry) for entry in ordered}
+
+
+def _schema(entry: 'Field[Any]') -> dict[str, Any]:
+    description, *limits = entry.metadata.items()
+    schema: dict[str, Any] = dict([description])
+    if get_origin(entry.type) is Literal:
+        schema['enum'] = list(get_args(entry.type))
+        schema.update(limits)
+    elif entry.type == IntegerList:
+        schema.update(type='array', items={'type': 'integer', **dict(limits)})
+    else:
+        schema['type'] = _TYPES[entry.type]  # type: ignore[index]
+        schema.update(limits)
+    if entry.default is not None:
+        default = entry.default
+        schema['default'] = list(default) if isinstance(default, tuple) else default
+    return schema
+
+
+def make_options(options: type[Any], given: Mapping[str, Any]) -> Any:
+    """Make the options from values that fit the schema; an integer is accepted for a number."""
+    makers = {entry.name: float if entry.type is float else tuple for entry in fields(options)
+              if entry.type in (float, IntegerList)}
+    return options(**{key: makers[key](value) if key in makers else value
+                      for key, value in given.items()})
 
 
 class Complaint(NamedTuple):

@@ -2,14 +2,16 @@
 """
 The exchange of protocols without a cyclic service: rounds of reads, one a period, as samples.
 
-How a round is read, the family says. A complete one is a sample, and finds a drive that was
-offline; one with a read that nobody answered is missed. One with a read that the drive refused is
-neither: there is no complete sample.
+Families whose drives answer single requests only (``datamodel_standard``, ``canopen_pkw``) read
+everything in ``cyclic_response`` once a period, in as few reads as possible. Which reads those are
+is decided here; how one is made, the family says. A complete round is a sample, and finds a drive
+that was offline; one with a read that nobody answered is missed. One with a read that the drive
+refused is neither: there is no complete sample. What is written: :mod:`.acyclic_output`.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Container, Generator, Iterable, Sequence
 import math
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
@@ -17,6 +19,71 @@ from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
+
+#: s by which sums of times are wrong
+TOLERANCE = 1e-6
+#: s that a drive is given for each request of a round, beside the time of the frames
+REQUEST_TIME = 0.001
+
+
+class Chunk(NamedTuple):
+    """
+    What a parameter takes, and what one read asks for.
+
+    :param address: number of the first word.
+    :param size: consecutive words; of a parameter: 1, or 2 for 32 bits.
+    """
+
+    address: int
+    size: int = 1
+
+    @property
+    def addresses(self) -> range:
+        """The number of each word."""
+        return range(self.address, self.address + self.size)
+
+
+def plan_reads(wanted: Iterable[Chunk], size: int, *, known: Container[int] = ()) -> list[Chunk]:
+    """
+    Cover parameters by as few reads as possible.
+
+    Each read begins where the first uncovered parameter begins and reaches as far as it can: no
+    other choice of intervals of a fixed length needs fewer.
+
+    :param size: words that a read can bring.
+    :param known: addresses that may be read although nobody wants them, in order to bridge a gap.
+        An address that the drive does not know would cost the whole read.
+
+    >>> plan_reads([Chunk(212), Chunk(209), Chunk(210)], 4, known={211})
+    [Chunk(address=209, size=4)]
+    >>> plan_reads([Chunk(212), Chunk(209), Chunk(210)], 4)
+    [Chunk(address=209, size=2), Chunk(address=212, size=1)]
+    """
+    chunks: list[Chunk] = []
+    for chunk in sorted(set(wanted)):
+        end = chunk.address + chunk.size
+        if chunks:
+            address, length = chunks[-1]
+            reached = address + length
+            if end <= reached:
+                continue
+            if end - address <= size and all(
+                    gap in known for gap in range(reached, chunk.address)):
+                chunks[-1] = Chunk(address, end - address)
+                continue
+        chunks.append(chunk)
+    return chunks
+
+
+def round_time(frame_bits: Iterable[int], requests: int, bitrate: int) -> float:
+    """
+    Return how long a round takes at worst, in s.
+
+    :param frame_bits: length of every frame of the round with maximal stuffing.
+    :param requests: reads and writes.
+    """
+    return sum(frame_bits) / bitrate + requests * REQUEST_TIME
+
 
 #: of a round, in the order of samples; None: of what was refused
 Raws = Sequence[int | None]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable
 import math
 from typing import Any, Generic, TypeVar
 
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 
 #: what an answer that does not say what it answers can be mistaken for
 ANYTHING: Hashable = 'anything'

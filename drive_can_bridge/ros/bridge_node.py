@@ -39,8 +39,7 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import (
-    check_dynamic, configuration_from_overrides, declared_parameters,
-)
+    check_dynamic, configuration_from_overrides, declared_parameters)
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -55,7 +54,7 @@ from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
+from drive_can_bridge.ros.messages import BRIDGES, bridges_among
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 from drive_can_bridge.transport import adapters

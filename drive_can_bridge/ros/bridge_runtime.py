@@ -21,13 +21,11 @@ from std_srvs.srv import Trigger as TriggerService
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import identity_name
 from drive_can_bridge.core.configuration import (
-    BridgeConfiguration, BusConfiguration, DriveConfiguration,
-)
-from drive_can_bridge.core.drive_state import DriveState
+    BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.events import Event, MappingDiffered, StationLost
+from drive_can_bridge.core.events import DriveState, Event, MappingDiffered, StationLost
 from drive_can_bridge.core.sentences import nothing_recorded
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.exchange.exchange import BusExchange, stop_all
 from drive_can_bridge.exchange.one_master import InUse, Ownership
 from drive_can_bridge.process.locks import BRIDGE, Presence

@@ -23,7 +23,7 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.sentences import joint_not_named, joint_quantity_ignored
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import value_text
 from drive_can_bridge.ros.joint_reader import JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.values import TOPIC_TYPES

@@ -17,13 +17,12 @@ from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.sentences import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.commands import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import DriveNode

@@ -21,14 +21,12 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.events import (
     AnswerLate, DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered,
     MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
-    StationLost,
-)
+    StationLost)
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
 from drive_can_bridge.core.sentences import answer_late, bridge_inactive, NOTHING, Sentence
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.words import value_text
+from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
@@ -40,8 +38,7 @@ from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import (
-    control_services, CoroutineServices, ExecutorThread, Question, ServiceThread,
-)
+    control_services, CoroutineServices, ExecutorThread, Question, ServiceThread)
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]

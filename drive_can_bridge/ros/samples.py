@@ -18,11 +18,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.ros.middleware import (
-    Audience, COUNT_PERIOD, latched_quality, publisher, state_quality,
-)
+    Audience, COUNT_PERIOD, latched_quality, publisher, state_quality)
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
 from drive_can_bridge.ros.stamps import Stamp, Stamps
 from drive_can_bridge.ros.values import parameter_value, TOPIC_TYPES, VALUE_FIELDS

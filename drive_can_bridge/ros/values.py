@@ -11,8 +11,7 @@ from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.core.value_names import joined
+from drive_can_bridge.core.text import joined, printable
 
 TOPIC_TYPES: dict[ValueKind, Any] = {
     ValueKind.DOUBLE: Float64, ValueKind.INTEGER: Int64, ValueKind.BOOL: Bool,

@@ -20,22 +20,20 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
-from drive_can_bridge.protocols.canopen_pkw.object_map import BLOCKS, object_of, register_of
+from drive_can_bridge.protocols.canopen_pkw import pkw
+from drive_can_bridge.protocols.canopen_pkw.addresses import BLOCKS, object_of, register_of
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import (
-    FAULTS, Machine, Operation, Report, Rule, State, StatusWord,
-)
+    FAULTS, Machine, Operation, Report, Rule, State, StatusWord)
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.quantities import clamp, plausible
 from drive_can_bridge.simulation.registers import (
-    Mechanics, Plant, PlantFactory, Refusal, Refused, Registers,
-)
+    Mechanics, Plant, PlantFactory, Refusal, Refused, Registers)
 
 #: bits of control register 1
 RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
@@ -214,7 +212,7 @@ class RegisterTable:
         cells = self._find(address, count)
         for cell in cells:
             if not cell.parameter.readable:
-                raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+                raise Refused(sdo.READ_OF_WRITE_ONLY)
         return tuple([self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells])
 
     def write(self, address: Address, words: tuple[int, ...]) -> None:
@@ -269,8 +267,8 @@ class RegisterTable:
                 # no such number or index, or no such sub-index
                 known = (any(block.index == each.word for block in BLOCKS)
                          or self.highest_subindex(each.word) is not None)
-                raise Refused(abort_codes.NO_SUCH_SUBINDEX if each.by_object and known
-                              else abort_codes.NO_SUCH_OBJECT)
+                raise Refused(sdo.NO_SUCH_SUBINDEX if each.by_object and known
+                              else sdo.NO_SUCH_OBJECT)
         return [self._cells[each] for each in addresses]
 
     def _value(self, parameter: Parameter) -> int:
@@ -442,14 +440,14 @@ class SimulatedPkwDrive(SimulatedDrive):
             return pkw.response(request)
         try:
             if meaning is None:
-                raise Refused(abort_codes.UNKNOWN_COMMAND)
+                raise Refused(sdo.UNKNOWN_COMMAND)
             if meaning.writes:
                 self.table.write(request.address, request.words[:meaning.count])
                 return pkw.response(request)
             first, second = (*self.table.read(request.address, meaning.count), 0)[:2]
             return pkw.response(request, (first, second))
         except Refused as error:
-            return pkw.error_response(request, refusals.words_from_code(
+            return pkw.error_response(request, pkw.words_from_code(
                 error.code, self._abort_code_order))
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:

@@ -15,7 +15,7 @@ import math
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
@@ -50,7 +50,7 @@ class HeartbeatConsumer:
 
     def read(self, subindex: int) -> bytes:
         if subindex > CONSUMERS:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+            raise Refused(sdo.NO_SUCH_SUBINDEX)
         if subindex == 0:
             return bytes((CONSUMERS,))
         return self.watched[subindex - 1].to_bytes(4, 'little')
@@ -58,7 +58,7 @@ class HeartbeatConsumer:
     def write(self, subindex: int, data: bytes) -> None:
         self.read(subindex)     # it exists
         if subindex == 0:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+            raise Refused(sdo.WRITE_OF_READ_ONLY)
         self.watched[subindex - 1] = int.from_bytes(checked_length(data, 4), 'little')
         self._heard[subindex - 1] = math.inf
 
@@ -269,8 +269,8 @@ class SimulatedServoDrive(SimulatedDrive):
             self.pdos.store()
             self._consumer.stored = tuple(self._consumer.watched)
         elif index == STORE:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX if subindex else
-                          abort_codes.WRITE_OF_READ_ONLY)
+            raise Refused(sdo.NO_SUCH_SUBINDEX if subindex else
+                          sdo.WRITE_OF_READ_ONLY)
         else:
             self.table.write_object(index, subindex, data)
 

@@ -16,7 +16,7 @@ from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
-from drive_can_bridge.protocols.datamodel.mapping import effective, padded
+from drive_can_bridge.protocols.datamodel.options import effective, padded
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.registers import Registers
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.words import nearest
+from drive_can_bridge.core.text import nearest
 
 
 def _number(kind: type[Any], low: float, high: float) -> Callable[[str], Any]:

@@ -31,8 +31,8 @@ from typing import Any, TextIO, TypeVar
 import can
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.core.record import DATA, Record, RecordKind
+from drive_can_bridge.core.frame import (
+    DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
 from drive_can_bridge.transport.tap import message_of, record_of
 
 

@@ -27,8 +27,7 @@ import time
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.record import DATA, Record, RecordKind
+from drive_can_bridge.core.frame import DATA, Frame, Record, RecordKind
 from drive_can_bridge.trace.files import format_record, labels
 
 #: most that a ring may take

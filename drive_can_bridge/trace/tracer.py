@@ -11,14 +11,12 @@ import math
 from typing import Any
 
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
-from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
-from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.frame import bits_on_bus, Frame, Record, RecordKind, STUFFING
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import column_lines, printable
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Handler, Kind, Observed, Telegram, Verdict,
-)
+    DriveObserver, Handler, Kind, Observed, Telegram, Verdict)
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.trace.files import Channels
 from drive_can_bridge.transport.error_frames import decode_error_frame

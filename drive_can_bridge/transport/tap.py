@@ -13,7 +13,7 @@ import can
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.transport.bus_identity import adapter_of, is_absent
 from drive_can_bridge.transport.failures import gone, in_words, with_outlook
 from drive_can_bridge.transport.port import open_port, Port

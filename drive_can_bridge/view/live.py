@@ -30,14 +30,13 @@ from rich.table import Table
 from rich.text import Text
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.words import counted
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, Source, Times
 from drive_can_bridge.monitor.summary import in_order, silence, tone_of
 from drive_can_bridge.view.parts import (
     advice_lines, bus_lines, clock, DIM, drives_table, flow, lamps, Lines, log_lines, milliseconds,
-    section, state, TONE_STYLES, ValueColumns, wrapped,
-)
+    section, state, TONE_STYLES, ValueColumns, wrapped)
 
 
 class Page(Enum):

@@ -11,10 +11,8 @@ from saying import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
-from drive_can_bridge.protocols.datamodel.extended import (
-    encode_read_request, encode_write,
-)
-from drive_can_bridge.protocols.datamodel.extended_family import DataModelExtended
+from drive_can_bridge.protocols.datamodel.extended import encode_read_request, encode_write
+from drive_can_bridge.protocols.datamodel.family import DataModelExtended
 
 FAMILY = DataModelExtended()
 

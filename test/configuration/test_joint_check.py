@@ -8,7 +8,7 @@ from configuration_builders import at, changed, FILE, load, local, problems, war
 import pytest
 from saying import says
 
-from drive_can_bridge.core.units import convertible_units, Quantity, si_factor
+from drive_can_bridge.core.configuration import convertible_units, Quantity, si_factor
 
 CASES = [
     ('rearm: neutral', 'joint: {velocity: actual}',

@@ -13,7 +13,7 @@ from drive_can_bridge.configuration.checks import bus_shares
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType
-from drive_can_bridge.protocols.datamodel.standard_family import DataModelStandard
+from drive_can_bridge.protocols.datamodel.family import DataModelStandard
 
 FAMILY = DataModelStandard()
 TABLE = changed(PROFILE, 'protocols: [datamodel_extended]',

@@ -10,9 +10,9 @@ from test_control import (
 )
 
 from drive_can_bridge.core import control_machine
-from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.control import (
+    ControlAction, ControlRequest, Meeting, MEETINGS, Step, STEPS, Then)
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.control_steps import Meeting, MEETINGS, Step, STEPS, Then
 from drive_can_bridge.core.profile import ControlTable
 
 #: states of a drive, and the cycle in which the first request comes then

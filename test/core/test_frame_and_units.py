@@ -5,11 +5,10 @@ import math
 
 import pytest
 
+from drive_can_bridge.core.configuration import convertible_units, Quantity, si_factor
 from drive_can_bridge.core.errors import (
-    BusUnavailable, ConfigurationError, DriveCanError, LocalProtocolError, RemoteProtocolError,
-)
+    BusUnavailable, ConfigurationError, DriveCanError, LocalProtocolError, RemoteProtocolError)
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.units import convertible_units, Quantity, si_factor
 
 
 def test_frames_read_as_candump_writes_them() -> None:

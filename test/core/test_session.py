@@ -11,9 +11,8 @@ from saying import says
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import RequestCompleted, StationLost
+from drive_can_bridge.core.events import DriveState, RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
 from drive_can_bridge.core.session import Session

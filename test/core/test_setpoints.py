@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.last_sent import LastSent
+from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 
 

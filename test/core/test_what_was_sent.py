@@ -4,8 +4,8 @@
 from builders import INT16, INT32, parameter, UINT16
 from hypothesis import given, strategies as st
 
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.process_image import LastSent
 
 KINDS = (INT16, UINT16, INT32, ParameterType.UINT32, ParameterType.BOOL)
 

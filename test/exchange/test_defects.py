@@ -18,8 +18,7 @@ import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import DriveFailed, Noted, StationFound
+from drive_can_bridge.core.events import DriveFailed, DriveState, Noted, StationFound
 from drive_can_bridge.core.frame import Frame
 
 DELAY = 0.001

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from drive_can_bridge.cli.profile import columns_from_option, import_file
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.profiles.build import Built
-from drive_can_bridge.profiles.catalogue import check
+from drive_can_bridge.profiles.catalogue import Built, check
 
 
 class Outcome(NamedTuple):

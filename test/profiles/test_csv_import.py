@@ -9,8 +9,8 @@ import pytest
 from transcripts import stories
 
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
-from drive_can_bridge.profiles import build
-from drive_can_bridge.profiles.build import ImportFailed
+from drive_can_bridge.profiles import catalogue
+from drive_can_bridge.profiles.catalogue import ImportFailed
 from drive_can_bridge.profiles.csv_import import WrongColumns
 
 TOLD = stories(__file__, 'imports.yaml')
@@ -186,7 +186,7 @@ def test_a_table_that_no_bridge_would_read(tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     def check(tree: object) -> None:
         raise AssertionError('that takes long, and is in vain')
-    monkeypatch.setattr(build, 'profile_from_tree', check)
+    monkeypatch.setattr(catalogue, 'profile_from_tree', check)
     rows = ''.join(f'{number};parameter {number};{"x" * 800}\n' for number in range(6_000))
     with pytest.raises(ImportFailed, match='table.csv: the profile of its 6000 entries would be '
                                            'larger than 4 MiB, which no bridge reads'):

@@ -10,7 +10,7 @@ import pytest
 from transcripts import stories
 
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
-from drive_can_bridge.profiles.build import ImportFailed
+from drive_can_bridge.profiles.catalogue import ImportFailed
 
 TOLD = stories(__file__, 'imports.yaml')
 EDS = """\

@@ -10,7 +10,7 @@ import yaml
 
 from drive_can_bridge.core.profile import RestoreStep
 from drive_can_bridge.profiles.catalogue import check
-from drive_can_bridge.protocols.canopen_pkw.object_map import object_of
+from drive_can_bridge.protocols.canopen_pkw.addresses import object_of
 from drive_can_bridge.resources import profiles_directory, share_directory
 
 PROFILES = sorted(profiles_directory().glob('*.yaml'))

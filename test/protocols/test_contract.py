@@ -22,12 +22,10 @@ from saying import may_run, says
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
-    FrameRejected, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
-    StationLost,
-)
+    DriveState, FrameRejected, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired,
+    StationFound, StationLost)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome

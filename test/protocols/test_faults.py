@@ -10,8 +10,7 @@ from saying import says
 from test_contract import Partner, PARTNERS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.profile import FaultTable
 

@@ -6,8 +6,8 @@ import pytest
 from test_contract import Partner, PARTNERS
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.protocols.families import make_sessions
 
 

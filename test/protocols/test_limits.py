@@ -9,9 +9,8 @@ from builders import CONTROL, LIMIT, SPEED
 import pytest
 from test_contract import Partner, PARTNERS, run, warnings
 
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import SetpointsExpired, StationLost
+from drive_can_bridge.core.events import DriveState, SetpointsExpired, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 TORQUE = replace(LIMIT, neutral=100.0, limit=True)

@@ -6,9 +6,7 @@ from typing import Literal
 
 import pytest
 
-from drive_can_bridge.protocols.options import (
-    FamilyOptions, make_options, option, options_schema,
-)
+from drive_can_bridge.protocols.family import FamilyOptions, make_options, option, options_schema
 
 
 @dataclass(frozen=True, slots=True)

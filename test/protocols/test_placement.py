@@ -4,13 +4,13 @@
 from builders import ACTUAL, drive, KEY, LIMIT, parameter, SPEED
 import pytest
 
-from drive_can_bridge.core.last_sent import LastSent
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.process_image import LastSent
+from drive_can_bridge.protocols.access import OneByOne, SentWrites
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.datamodel.numbers import Numbers
-from drive_can_bridge.protocols.placement import OneByOne, SentWrites
-from drive_can_bridge.protocols.polling import Chunk
+from drive_can_bridge.protocols.datamodel.procedures import Numbers
+from drive_can_bridge.protocols.polled_exchange import Chunk
 
 WIDE = parameter('wide', 500, type=ParameterType.INT32)
 NARROW = parameter('narrow', 502)

@@ -7,8 +7,8 @@ import math
 from hypothesis import given, strategies as st
 import pytest
 
-from drive_can_bridge.protocols.cycle_timer import CycleTimer
-from drive_can_bridge.protocols.polling import Chunk, plan_reads, round_time
+from drive_can_bridge.protocols.exchange_book import CycleTimer
+from drive_can_bridge.protocols.polled_exchange import Chunk, plan_reads, round_time
 
 
 def plan(*numbers: int, size: int = 4, known: set[int] | None = None) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from saying import says
 from test_contract import Partner, PARTNERS, run
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 TORQUE = replace(LIMIT, neutral=100.0, limit=True)

@@ -28,7 +28,7 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.datamodel import extended, standard
-from drive_can_bridge.protocols.datamodel.mapping import effective
+from drive_can_bridge.protocols.datamodel.options import effective
 from drive_can_bridge.protocols.telegrams import Direction
 
 REQUEST, RESPONSE = Direction.REQUEST, Direction.RESPONSE

@@ -13,7 +13,7 @@ from waiting import clock
 pytest.importorskip('rclpy')
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.drive_state import DriveState
+from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.ros.diagnostics import absence, Attendance
 
 

@@ -13,8 +13,8 @@ from std_srvs.srv import Trigger
 
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Event, MappingDiffered, Noted, StationFound, StationLost
+from drive_can_bridge.core.events import (
+    DriveState, Event, MappingDiffered, Noted, StationFound, StationLost)
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.ros.bridge_runtime import Occasions

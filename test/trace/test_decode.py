@@ -10,8 +10,8 @@ from trace_builders import Witness
 from transcripts import replayed, stories
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.core.parameters import ParameterType, Storage
-from drive_can_bridge.core.record import Record, RecordKind
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.protocols.observer import Verdict
 from drive_can_bridge.trace.sinks import Only

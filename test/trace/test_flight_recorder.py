@@ -12,7 +12,7 @@ from waiting import clock, pause, wait_for
 from world import World
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.trace import flight
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.flight import BLOCK, FlightRecorder, Ring

@@ -21,7 +21,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.events import Event, RequestCompleted
-from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.frame import Record
 from drive_can_bridge.core.requests import ReadRequest
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions

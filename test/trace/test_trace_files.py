@@ -12,11 +12,10 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.record import Record, RecordKind
+from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.trace.files import (
     Channels, check_writable, format_record, labels, parse_line, read_records, TraceWriter,
-    UnknownFormat, WRITABLE,
-)
+    UnknownFormat, WRITABLE)
 
 DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
 

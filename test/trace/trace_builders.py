@@ -4,9 +4,8 @@
 from builders import frame
 
 from drive_can_bridge.core.configuration import (
-    BridgeConfiguration, BusConfiguration, DriveConfiguration,
-)
-from drive_can_bridge.core.record import Record
+    BridgeConfiguration, BusConfiguration, DriveConfiguration)
+from drive_can_bridge.core.frame import Record
 from drive_can_bridge.protocols.observer import Observed, Telegram
 from drive_can_bridge.trace.sinks import LineWriter, Only, Selection
 from drive_can_bridge.trace.tracer import Tracer

@@ -12,7 +12,7 @@ from world import World
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
-from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.frame import Record
 from drive_can_bridge.transport import tap as module
 from drive_can_bridge.transport.tap import Tap
 

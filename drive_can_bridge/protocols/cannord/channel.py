@@ -20,10 +20,9 @@ from typing import NamedTuple
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ParameterFrame, ParameterLayout, Response, Task,
-)
+    ParameterFrame, ParameterLayout, Response, Task)
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.transactor import Transactor
 

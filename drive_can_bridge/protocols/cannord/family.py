@@ -11,20 +11,15 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier, groups
 from drive_can_bridge.protocols.cannord.identifiers import (
-    ADDRESS_MAX, broadcasts, identifier, MessageObject, route,
-)
+    ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject, route)
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
-    EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES,
-)
+    EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES)
 from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_WORD
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, out_of_range, Talk
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, option, out_of_range, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.options import option
-
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
 ANSWER_TIME = 0.003

@@ -28,12 +28,10 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.answers import Answers
-from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
 from drive_can_bridge.protocols.cannord.control import make_control
+from drive_can_bridge.protocols.cannord.identifiers import broadcast_identifier
 from drive_can_bridge.protocols.cannord.process_data import (
-    encode_extra, encode_main, main_length, MAIN_VALUES, values_needed,
-)
-from drive_can_bridge.protocols.cannord.samples import Samples
+    encode_extra, encode_main, main_length, MAIN_VALUES, Samples, values_needed)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, STOP_CYCLES
 
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)

@@ -16,11 +16,14 @@ process data, broadcast to 32    master to inverters  1024 + A div 32
 process data, broadcast to all   master to inverters  1032
 ================================ ==================== ==================
 
-The 29-bit form is the 11-bit identifier followed by 18 zero bits.
+The 29-bit form is the 11-bit identifier followed by 18 zero bits. Which drives of a bus form a
+broadcast group is a matter of their configuration.
 """
 
+from collections.abc import Sequence
 from enum import Enum
 
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Route, STANDARD_IDENTIFIER_MAX
 
@@ -89,3 +92,25 @@ def _formed(short: int, extended: bool) -> int:
 def _check_address(address: int) -> None:
     if not 0 <= address <= ADDRESS_MAX:
         raise LocalProtocolError(f'address {address} is out of range: 0 to {ADDRESS_MAX}')
+
+
+def broadcast_identifier(drive: DriveConfiguration) -> int | None:
+    """Return the broadcast identifier that a drive listens to; None: it has none."""
+    kind = drive.options.broadcast
+    extended = drive.options.extended_identifiers
+    if kind == 'all':
+        return all_identifier(extended=extended)
+    if kind == 'group':
+        return group_identifier(drive.station, extended=extended)
+    return None
+
+
+def groups(drives: Sequence[DriveConfiguration]) -> list[list[DriveConfiguration]]:
+    """Return the broadcast groups among the drives of a bus, the leader of each first."""
+    found: dict[tuple[int, bool], list[DriveConfiguration]] = {}
+    for drive in drives:
+        shared = broadcast_identifier(drive)
+        if shared is not None:
+            key = shared, drive.options.extended_identifiers
+            found.setdefault(key, []).append(drive)
+    return [sorted(together, key=lambda drive: drive.station) for together in found.values()]

@@ -12,20 +12,16 @@ from typing import TypeVar
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.cannord.broadcast import broadcast_identifier
-from drive_can_bridge.protocols.cannord.identifiers import identifier, MessageObject
+from drive_can_bridge.protocols.cannord.identifiers import (
+    broadcast_identifier, identifier, MessageObject)
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, ParameterLayout, Response, Task,
-)
+    error_text, ParameterFrame, ParameterLayout, Response, Task)
 from drive_can_bridge.protocols.cannord.process_data import (
-    decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES,
-)
+    decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES)
 from drive_can_bridge.protocols.cannord.states import (
-    CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER,
-)
+    CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
-)
+    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
 from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 

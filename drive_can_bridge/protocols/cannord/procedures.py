@@ -10,18 +10,14 @@ from collections.abc import Generator, Iterable, Sequence
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, Outcomes, ReadValue, Written,
-)
-from drive_can_bridge.core.retry import RetryPolicy
+    Failure, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.sentences import NOTHING, Sentence
-from drive_can_bridge.protocols.access import Access, Found, Item, read_back
+from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, Response, Task, WRITE_TASKS,
-)
-from drive_can_bridge.protocols.cannord.samples import Samples
-from drive_can_bridge.protocols.placement import OneByOne
+    error_text, ParameterFrame, Response, Task, WRITE_TASKS)
+from drive_can_bridge.protocols.cannord.process_data import Samples
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = sentences.process_data_only()

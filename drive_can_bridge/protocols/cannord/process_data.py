@@ -18,15 +18,21 @@ length bytes 0 and 1       2 and 3                     4 to 7
 ====== =================== =========================== ===========================
 
 Values are setpoints on the way to the inverter and actual values on the way back. Here they are
-unsigned words; 4000h is 100 % and C000h is -100 % of what the value means.
+unsigned words; 4000h is 100 % and C000h is -100 % of what the value means. The sample of an
+exchange waits for the additional frame where there is one, and goes out without when it does not
+come.
 """
 
 from collections.abc import Sequence
 import struct
 from typing import NamedTuple
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.events import ProcessDataReceived
+from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.session import Session
 
 #: values in the longest main frame
 MAIN_VALUES = 3
@@ -134,3 +140,85 @@ def _packed(layout: struct.Struct, words: Sequence[int]) -> bytes:
 def values_needed(drive: DriveConfiguration) -> int:
     """Return how many values travel: the longer of both lists decides."""
     return max(len(drive.cyclic_request), len(drive.cyclic_response))
+
+
+class Samples:
+    """
+    The samples of one inverter.
+
+    :ivar awaiting: the additional frame of this exchange is yet to come.
+    :ivar warning: what does not arrive, and why; '' if nothing.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.awaiting = False
+        self.warning = NOTHING
+        self._session = session
+        response = session.configuration.cyclic_response
+        self._main, self._extra = response[:MAIN_VALUES], response[MAIN_VALUES:]
+        self._held: ProcessDataReceived | None = None   # until values 4 and 5 arrive
+        self._last: tuple[int, ...] = ()
+
+    def settle(self) -> None:
+        """End an exchange: what has not come does not belong to it any more."""
+        self.awaiting = False
+        if self._held is not None:
+            self.warning = sentences.extra_values_missing()
+            self._publish(self._held)
+            self._held = None
+
+    def expect_nothing(self) -> int:
+        """Forget the exchange under way; return how many additional frames may come of it."""
+        awaiting, self.awaiting, self._held = self.awaiting, False, None
+        return int(awaiting)
+
+    def forget(self) -> None:
+        """Record that the inverter is offline."""
+        self._held = None
+        self._last = ()
+        self.warning = NOTHING
+
+    def take(self, word: int, values: tuple[int, ...], received_at: float, *,
+             asked: bool) -> bool:
+        """
+        Take a main frame; tell whether it has all the values that are wanted of it.
+
+        :param asked: it answers the exchange under way.
+        """
+        raws = (word, *(parameter.raw_from_word(value)
+                        for parameter, value in zip(self._main, values)))
+        complete = len(values) >= len(self._main)
+        if not complete:
+            self._session.report.reject(
+                sentences.short_process_data(len(values), len(self._main)))
+        if self._held is not None:      # its values 4 and 5 would come after these
+            self._publish(self._held)
+            self._held = None
+        sample = ProcessDataReceived(raws, received_at)
+        if asked and complete and self.awaiting and self._extra:
+            self._held = sample
+        else:
+            self._publish(sample)
+        return complete
+
+    def take_extra(self, data: bytes) -> None:
+        """Take the additional frame of the exchange under way."""
+        self.awaiting = False
+        held, self._held = self._held, None
+        if held is not None:    # else: nobody wants them, or what they belong to did not come
+            self.warning = NOTHING
+            values = (parameter.raw_from_word(value)
+                      for parameter, value in zip(self._extra, decode_extra(data)))
+            self._publish(ProcessDataReceived((*held.raws, *values), held.received_at))
+
+    def last(self, name: str) -> int | None:
+        """Return the raw integer of a parameter that was received last."""
+        for parameter, raw in zip(self._session.sample_parameters, self._last):
+            if parameter.name == name:
+                return raw
+        return None
+
+    def _publish(self, sample: ProcessDataReceived) -> None:
+        self._last = (*sample.raws, *self._last[len(sample.raws):])
+        self._session.interlock.measured(sample.raws)
+        self._session.report.note(sample)

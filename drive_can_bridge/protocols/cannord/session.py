@@ -41,12 +41,9 @@ from drive_can_bridge.protocols.cannord.group import Group, Member
 from drive_can_bridge.protocols.cannord.identifiers import broadcasts, identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
-from drive_can_bridge.protocols.cannord.process_data import decode_main, EXTRA_LENGTH
-from drive_can_bridge.protocols.cannord.samples import Samples
+from drive_can_bridge.protocols.cannord.process_data import decode_main, EXTRA_LENGTH, Samples
 from drive_can_bridge.protocols.cannord.states import (
-    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER,
-)
-
+    CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER)
 
 _SILENCE = 'no answer to process data'
 _ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'

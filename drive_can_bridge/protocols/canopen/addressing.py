@@ -8,8 +8,7 @@ import re
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.family import Claim, Complaint, out_of_range
-from drive_can_bridge.protocols.options import option
+from drive_can_bridge.protocols.family import Claim, Complaint, option, out_of_range
 
 _RAW_OBJECT = re.compile(r'x([0-9a-fA-F]{1,4})\.([0-9a-fA-F]{1,2})', re.ASCII)
 

@@ -1,5 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Where the parameters of a profile stand in the device, and which requests fetch them."""
+"""
+Where the parameters of a profile stand in the device, and which requests fetch them.
+
+Where registers stand in the object dictionary of a TeSys T LTMR: the register overview of the LTMR
+CANopen guide prints the first and last address of each group (statistics 2001h.01h, monitoring
+2004h.01h = register 450, command 2008h.01h to .64h = 700 to 799, …). Inside a group, sub-index 1
+is the first register. That 2000h and 2003h begin at 0 and 300 follows from their last registers
+(96 and 429), which another overview of the vendor names. The two other rows are *interpolated*:
+they follow from their neighbours.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,11 +21,62 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.protocols.access import ParameterPlacement
 from drive_can_bridge.protocols.canopen.addressing import object_of_name
-from drive_can_bridge.protocols.canopen_pkw import object_map, pkw
+from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
-from drive_can_bridge.protocols.placement import ParameterPlacement
-from drive_can_bridge.protocols.polling import Chunk, plan_reads
+from drive_can_bridge.protocols.polled_exchange import Chunk, plan_reads
+
+
+@dataclass(frozen=True)
+class Block:
+    """
+    The registers of one index: ``first`` has sub-index 1.
+
+    :param certain: printed by the vendor, or follows from what is; False: interpolated.
+    """
+
+    index: int
+    first: int
+    last: int
+    certain: bool
+
+
+BLOCKS = (
+    Block(0x2000, 0, 99, True),        # identification
+    Block(0x2001, 100, 199, True),     # statistics
+    Block(0x2002, 200, 299, False),
+    Block(0x2003, 300, 449, True),
+    Block(0x2004, 450, 539, True),     # monitoring
+    Block(0x2005, 540, 599, True),     # configuration
+    Block(0x2006, 600, 649, False),
+    Block(0x2007, 650, 699, True),
+    Block(0x2008, 700, 799, True),     # command
+    Block(0x200C, 1200, 1299, True),   # custom logic
+    Block(0x200D, 1300, 1399, True),
+)
+
+
+def object_of(register: int) -> tuple[int, int] | None:
+    """
+    Return index and sub-index of a register; None: it has none.
+
+    >>> '%04X.%02X' % object_of(465)
+    '2004.10'
+    """
+    for block in BLOCKS:
+        if block.first <= register <= block.last:
+            return block.index, register - block.first + 1
+    return None
+
+
+def register_of(index: int, subindex: int) -> int | None:
+    """Return the register at an index and sub-index; None: there is none."""
+    for block in BLOCKS:
+        if block.index == index and 1 <= subindex <= block.last - block.first + 1:
+            return block.first + subindex - 1
+    return None
+
 
 #: registers that one request can read or write
 REGISTERS_MAX = 2
@@ -192,10 +252,10 @@ def keys(parameter: Parameter) -> frozenset[Key]:
         for entry in Span(address, parameter.type.bits // 16).addresses:
             if entry.subindex is None:
                 found.add(entry.word)
-                other: Key | None = object_map.object_of(entry.word)
+                other: Key | None = object_of(entry.word)
             else:
                 found.add((entry.word, entry.subindex))
-                other = object_map.register_of(entry.word, entry.subindex)
+                other = register_of(entry.word, entry.subindex)
             if other is not None and len(addresses) == 1:
                 found.add(other)
     return frozenset(found)

@@ -12,15 +12,12 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.addressing import (
-    node_claims, NodeOptions, predefined_set, reserved_claims, station_complaints,
-)
+    node_claims, NodeOptions, predefined_set, reserved_claims, station_complaints)
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, option, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.options import option
-from drive_can_bridge.protocols.polling import round_time
-
+from drive_can_bridge.protocols.polled_exchange import round_time
 
 #: of every frame of the mailbox
 FRAME_BITS = worst_bits(pkw.PAYLOAD, extended=False)

@@ -30,13 +30,13 @@ from typing import Any, NamedTuple, Union
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.protocols.canopen_pkw import pkw, refusals
+from drive_can_bridge.protocols.access import SentWrites
+from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.transactor import Transactor
 
 #: s that an answer to function 00h is waited for at most
@@ -103,7 +103,7 @@ class Refused(NamedTuple):
     @property
     def text(self) -> Sentence:
         """The refusal in words."""
-        return sentences.refused_by_drive(self.code, refusals.describe(self.code))
+        return sentences.refused_by_drive(self.code, pkw.describe(self.code))
 
 
 class Silence(NamedTuple):
@@ -187,7 +187,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._synchronised = True
         self.finish()
         if answer.code == Function.ERROR:
-            return Refused(refusals.code_from_words(answer.words, self._order))
+            return Refused(pkw.code_from_words(answer.words, self._order))
         return Answered(answer.words)
 
     def handle_timer(self, now: float) -> Reply | bool:

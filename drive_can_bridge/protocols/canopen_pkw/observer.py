@@ -13,12 +13,11 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import hear_node
-from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, refusals
+from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict,
-)
+    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
 from drive_can_bridge.protocols.pairing import Asked, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
@@ -97,7 +96,7 @@ class PkwObserver(DriveObserver):
         return Asked(Span(message.address, meaning.count), meaning.writes)
 
     def _refusal(self, message: Message) -> str:
-        return refusals.describe(refusals.code_from_words(message.words, self._abort_order))
+        return pkw.describe(pkw.code_from_words(message.words, self._abort_order))
 
     def _content(self, span: Span, words: Sequence[int] | None,
                  ) -> tuple[list[Parameter], list[int]]:

@@ -46,6 +46,11 @@ layout            bytes 0 to 7 (f: toggle and function, s: sub-index)
 ``dword_swapped`` s, f, 1 low, 1 high, 4 low, 4 high, 3 low, 3 high
 ``word_be``       1 high, 1 low, f, s, 3 high, 3 low, 4 high, 4 low
 ================= ===============================================================
+
+What words 3 and 4 of a refusal hold are the SDO abort codes of CiA 301. Which word holds the high
+half is not documented. No two halves of a listed code are another listed code when they change
+places, so that ``auto`` finds out by itself. The PROFIBUS variants of the same devices refuse with
+small numbers instead; should one of them turn up here, its meaning is named as a hint.
 """
 
 from dataclasses import dataclass
@@ -54,6 +59,8 @@ import struct
 from typing import Any, NamedTuple
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.protocols.canopen import sdo
+from drive_can_bridge.protocols.canopen.sdo import TEXTS
 
 PAYLOAD = 8
 TOGGLE = 0x80
@@ -228,7 +235,7 @@ def error_response(request: Message, words: Words) -> Message:
     """
     Make the response with which the device refuses a request.
 
-    :param words: the abort code, see :func:`.refusals.words_from_code`.
+    :param words: the abort code, see :func:`words_from_code`.
     """
     return request._replace(code=int(Function.ERROR), words=words)
 
@@ -298,3 +305,59 @@ def words_from_value(value: int, high_first: bool) -> Words:
     """Return the two registers of an unsigned 32-bit value, that of the lower number first."""
     high, low = value >> 16 & WORD_MAX, value & WORD_MAX
     return (high, low) if high_first else (low, high)
+
+
+#: the PROFIBUS variants' own numbers
+SMALL_TEXTS = {
+    1: 'stack full',
+    3: 'register not found',
+    4: 'answer delayed',
+    7: 'not all registers found',
+    8: 'register is read-only',
+    10: 'word value too high',
+    11: 'word value too low',
+    12: 'byte value too high',
+    13: 'byte value too low',
+    16: 'invalid value',
+    20: 'bad answer',
+}
+SMALL_MAX = 0xFF
+
+_HIGH_HALVES = {code >> 16 for code in TEXTS}
+
+
+def code_from_words(words: Words, order: str) -> int:
+    """
+    Return the abort code of a refusal.
+
+    :param words: words 3 and 4.
+    :param order: ``low_first`` (word 3 is the low half), ``high_first``, or ``auto``: the order
+        that gives a code of the table, else one of its groups, else a small number, else low half
+        first, as CANopen sends integers.
+    """
+    low_first, high_first = value_from_words(words, False), value_from_words(words, True)
+    if order == 'low_first':
+        return low_first
+    if order == 'high_first':
+        return high_first
+    for plausible in (
+            lambda code: code in TEXTS,
+            lambda code: code >> 16 in _HIGH_HALVES,
+            lambda code: code <= SMALL_MAX):
+        for code in (low_first, high_first):
+            if plausible(code):
+                return code
+    return low_first
+
+
+def words_from_code(code: int, order: str = 'low_first') -> Words:
+    """Return words 3 and 4 of a refusal (the device's side); ``auto`` is ``low_first``."""
+    return words_from_value(code, order == 'high_first')
+
+
+def describe(code: int) -> str:
+    """Return code and meaning for a user."""
+    if code > SMALL_MAX:
+        return sdo.describe(code)
+    hint = SMALL_TEXTS.get(code, 'unknown there, too')
+    return f'{code:08X}h (no SDO abort code; as a PROFIBUS device would mean it: {hint})'

@@ -21,15 +21,12 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import network, sdo
-from drive_can_bridge.protocols.canopen.abort_codes import TEXTS
+from drive_can_bridge.protocols.canopen.sdo import TEXTS
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
-from drive_can_bridge.protocols.canopen_pkw.refusals import describe
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, Layout, Message
 from drive_can_bridge.protocols.scanner import (
-    Certainty, conclude, Conversation, Finding, Prober, Question, Scanner, spaced,
-)
-
+    Certainty, conclude, Conversation, Finding, Prober, Question, Scanner, spaced)
 
 #: the object of the mailbox, in the upper half of a mapping entry
 _MAILBOX = 0x3000

@@ -23,10 +23,11 @@ a boot-up frame, when a heartbeat says that the node is not operational, and onc
 more than ten times a second, however often the node asks for it: then it is put off, not left out.
 
 Setpoints and the control word are written while the drive is online: when they change, and
-setpoints again after ``refresh_interval``.
+setpoints again after ``refresh_interval``. The status word counts from the moment it was read,
+before its round is complete.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Generator, Sequence
 import math
 
 from drive_can_bridge.core import sentences
@@ -38,24 +39,125 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
+from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
+from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
+from drive_can_bridge.protocols.canopen_pkw.addresses import (
+    instead_of, Placement, round_plan, round_spans, Span)
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxTransactor, Procedure,
-)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Layout, Message
-from drive_can_bridge.protocols.canopen_pkw.round import Rounds
+    MailboxChannel, MailboxTransactor, Procedure, Read, Refused, Reply, Silence, Step)
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
-from drive_can_bridge.protocols.placement import SentWrites
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+
+
+class Rounds:
+    """
+    The rounds of one drive.
+
+    :param writers: write setpoints between two reads: commands do not wait for slow rounds.
+    :ivar blank: there is no status to be read.
+    :ivar gap: what the last one asked for in vain, though others were answered, in words.
+    :ivar refusals: the names of what the drive refuses, and why, by what was read.
+    """
+
+    def __init__(self, session: Session, channel: MailboxChannel,
+                 writers: Writers) -> None:
+        drive = self._drive = session.configuration
+        self._session = session
+        self._channel = channel
+        self._writers = writers
+        self._placement = Placement.of(drive)
+        self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
+        status = status_word(drive)
+        self._status = None if status is None else (status, self._placement.span(status))
+        self.blank = status is None
+        self.gap = NOTHING
+        self.refusals: dict[Span, Sentence] = {}
+        self._words: dict[Address, int] = {}    # those of refused registers are missing
+        self._plan: list[Span] = []
+        self.start_over()
+
+    def start_over(self) -> None:
+        """Forget what was refused."""
+        self.gap = NOTHING
+        self.refusals.clear()
+        self._plan = round_plan(self._drive)
+
+    def read(self) -> Generator[Step, Reply, Raws | None]:
+        """Read everything once, each in one attempt; return None if something went unanswered."""
+        self._words = {}
+        pending = list(self._plan)
+        while pending:
+            span = pending.pop(0)
+            if self._words and self._session.online:
+                self._writers.write_setpoints(self._channel.now)
+            reply = yield Read(span.address, span.count, attempts=1)
+            if isinstance(reply, Silence):
+                self.gap = NOTHING if not self._words else sentences.one_read_unanswered(
+                    self._names(span))
+                return None
+            if isinstance(reply, Refused):
+                pending[:0] = self._instead(span, reply)
+                continue
+            self.refusals.pop(span, None)
+            found = dict(zip(span.addresses, reply.words))
+            self._words.update(found)
+            if self._session.online:
+                self._take_status(found)
+        return [self._placement.raw_among(parameter, span, self._words)
+                for parameter, span in zip(self._drive.cyclic_response, self._spans)]
+
+    def ended(self, now: float, *, found: bool) -> None:
+        """Take the status of a drive that was found by this round."""
+        if found:
+            self._take_status(self._words)
+        elif self._status is not None and self._status_among(self._words) is None:
+            self._session.interlock.status(None, now)
+            self._session.control_changed(now)
+
+    def _take_status(self, words: dict[Address, int]) -> None:
+        now, interlock = self._channel.now, self._session.interlock
+        raw = self._status_among(words)
+        if raw is not None:
+            interlock.status(raw, now)
+        interlock.follow()
+        self._writers.write_control(now, known=self.blank or raw is not None)
+
+    def _status_among(self, words: dict[Address, int]) -> int | None:
+        return None if self._status is None else self._placement.raw_among(*self._status, words)
+
+    def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
+        """Take a refusal: two parameters that share a read are read alone from now on."""
+        parts = instead_of(span, round_spans(self._drive))
+        if parts:
+            place = self._plan.index(span)
+            self._plan[place:place + 1] = parts
+            return parts
+        names = self._names(span)
+        if span not in self.refusals:
+            self._session.report.warn(sentences.read_refused(names, refused.text))
+        self.refusals[span] = sentences.write_refused(names, refused.text)
+        return parts
+
+    def _names(self, span: Span) -> str:
+        """Name what a read is for."""
+        return ', '.join(parameter.name for parameter, own in zip(
+            self._drive.cyclic_response, self._spans)
+            if set(own.addresses) <= set(span.addresses)) or str(span.address)
+
+    def warnings(self) -> list[Sentence]:
+        """Say what the drive refuses, and what to do."""
+        return [sentences.poll_refused(text) for text in self.refusals.values()]
 
 
 class PkwSession(Session):

@@ -32,13 +32,11 @@ from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write,
-)
+    Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write)
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
-from drive_can_bridge.protocols.polling import TOLERANCE
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS
-from drive_can_bridge.protocols.stop_again import StopAgain
+from drive_can_bridge.protocols.polled_exchange import TOLERANCE
+from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain
 
 #: s that a stop may take all together: of a drive that answers, and of one that has fallen silent
 STOP_TIME = 3.0

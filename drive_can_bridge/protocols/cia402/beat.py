@@ -14,8 +14,8 @@ from typing import Protocol
 
 from drive_can_bridge.core.outbox import Left, Outbox
 from drive_can_bridge.protocols.canopen import network
-from drive_can_bridge.protocols.cycle_timer import CYCLE_SPACING_MIN, CycleTimer
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.exchange_book import CYCLE_SPACING_MIN, CycleTimer
 
 #: s that a stop waits for the next SYNC; else a round is brought forward
 SYNC_WAIT_MAX = 0.02

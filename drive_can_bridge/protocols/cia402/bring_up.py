@@ -22,7 +22,7 @@ from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import Happened
-from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
 from drive_can_bridge.protocols.cia402 import pdo, states
@@ -148,7 +148,7 @@ class BringUp:
         data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
         reply = yield from self._transfer(Ask(index, subindex, data, attempts=self._attempts))
         return NOTHING if reply.abort is None else sentences.object_refused(
-            _place(index, subindex), abort_codes.describe(reply.abort))
+            _place(index, subindex), sdo.describe(reply.abort))
 
     def _must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
         refusal = yield from self._put(index, subindex, value, length)
@@ -174,7 +174,7 @@ class BringUp:
         while True:
             if reply.data is None:
                 raise _differs(sentences.object_refused(
-                    _place(states.STATUS_WORD), abort_codes.describe(reply.abort or 0)))
+                    _place(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
             raw = int.from_bytes(reply.data, 'little')
             state = states.state_of(raw)
             reacting = state is State.FAULT_REACTION    # it stops by itself, whatever it is told

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.outbox import Outbox
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.channel import Channel

@@ -25,8 +25,7 @@ way tells of older times, and 0006h or 0007h in the middle of a quick stop would
 from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.control_rules import TableRules
+from drive_can_bridge.core.control import ControlAction, TableRules
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.cia402 import states

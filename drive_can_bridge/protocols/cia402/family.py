@@ -12,18 +12,14 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
-    node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints,
-)
+    node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints)
 from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, STATUS_NAME, STATUS_PARAMETER, STATUS_WORD,
-)
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, Talk
+    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, STATUS_NAME, STATUS_PARAMETER, STATUS_WORD)
+from drive_can_bridge.protocols.family import Claim, Complaint, Family, IntegerList, option, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
-from drive_can_bridge.protocols.options import IntegerList, option
-
 
 #: s: longest period in which a drive that interpolates gets its setpoints
 INTERPOLATION_MAX = 0.02

@@ -12,7 +12,7 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
@@ -20,8 +20,7 @@ from drive_can_bridge.protocols.canopen.sdo import Kind as Said, Message
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict,
-)
+    DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict)
 from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
@@ -138,7 +137,7 @@ class Cia402Observer(DriveObserver):
         self._transfer = None
         if request.kind is Said.ABORT:
             self.tell(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
-                      remark=abort_codes.describe(request.number))
+                      remark=sdo.describe(request.number))
             return
         self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
             int.from_bytes(written, 'little'), len(written)])
@@ -155,7 +154,7 @@ class Cia402Observer(DriveObserver):
         self._requests.answer(
             place, asked, now, [] if not answer.data else [
                 int.from_bytes(answer.data, 'little'), len(answer.data)],
-            refusal=abort_codes.describe(answer.number) if answer.kind is Said.ABORT else '')
+            refusal=sdo.describe(answer.number) if answer.kind is Said.ABORT else '')
 
     def _take_segment(self, answer: Message, now: float) -> None:
         self._text += answer.data

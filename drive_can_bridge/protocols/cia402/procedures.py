@@ -11,16 +11,14 @@ from collections.abc import Generator, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, RetryPolicy, Written
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.protocols.access import Access, Found, Item
-from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne
+from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.pdo import width
-from drive_can_bridge.protocols.placement import OneByOne
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
@@ -43,7 +41,7 @@ def cells(parameter: Parameter) -> Cells:
 
 def refused(code: int) -> Failure:
     """Say that a drive refused a transfer."""
-    return Failure(sentences.refused_by_drive(code, abort_codes.describe(code)))
+    return Failure(sentences.refused_by_drive(code, sdo.describe(code)))
 
 
 class SdoAccess(Access[Parameter, Ask, Reply]):
@@ -79,7 +77,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         if not _own_width(parameter):
             found = yield from self._upload(parameter)
             if isinstance(found, Failure):
-                known = found.reason.fields.get('number') == abort_codes.READ_OF_WRITE_ONLY
+                known = found.reason.fields.get('number') == sdo.READ_OF_WRITE_ONLY
                 return Failure(sentences.width_unknown()) if known else found
             length = len(found[0])
             low, high = -1 << 8 * length - 1, (1 << 8 * length) - 1

@@ -17,20 +17,16 @@ from typing import Any
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.protocols.canopen import abort_codes, network, sdo
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.pdo import (
-    entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos,
-)
+    entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos)
 from drive_can_bridge.protocols.cia402.states import (
-    ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION,
-)
+    ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION)
 from drive_can_bridge.protocols.scanner import (
-    Certainty, Conversation, Finding, Prober, Question, Scanner,
-)
+    Certainty, Conversation, Finding, Prober, Question, Scanner)
 from drive_can_bridge.protocols.telegrams import Direction
-
 
 #: device profile, in the lower half of 1000h
 PROFILE = 0x0192
@@ -219,8 +215,8 @@ class Cia402Prober(Prober):
         if answer is None:
             return None
         if answer.kind is Kind.ABORT:
-            if answer.number not in (abort_codes.NO_SUCH_OBJECT, abort_codes.NO_SUCH_SUBINDEX):
-                self.notes.append(f'{index:04X}h: {abort_codes.describe(answer.number)}')
+            if answer.number not in (sdo.NO_SUCH_OBJECT, sdo.NO_SUCH_SUBINDEX):
+                self.notes.append(f'{index:04X}h: {sdo.describe(answer.number)}')
             return None
         return int.from_bytes(answer.data, 'little')
 

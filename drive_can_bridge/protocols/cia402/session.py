@@ -21,11 +21,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived,
-)
+    DriveState, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.process_image import ProcessImage
@@ -38,8 +36,7 @@ from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
-    Change, Node, START_PAUSE, START_PERIOD, START_SPACING,
-)
+    Change, Node, START_PAUSE, START_PERIOD, START_SPACING)
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
@@ -50,15 +47,13 @@ from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
-    cells, MAP, SdoAccess, write_until_answered,
-)
+    cells, MAP, SdoAccess, write_until_answered)
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER,
-)
+    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.life import Life, Script
-from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS
-from drive_can_bridge.protocols.stop_again import StopAgain
+from drive_can_bridge.protocols.safe_stop import (
+    ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain)
 
 #: s until a drive that differs, or runs on, is looked at again
 LOOK_AGAIN = 1.0

@@ -19,20 +19,19 @@ from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.cycle_timer import stop_spacing
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write,
-)
+    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
-from drive_can_bridge.protocols.datamodel.numbers import Numbers
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
+from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.datamodel.setpoint_writer import ControlByNumber
-from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopWrite
-from drive_can_bridge.protocols.stop_again import StopAgain
+from drive_can_bridge.protocols.exchange_book import stop_spacing
+from drive_can_bridge.protocols.safe_stop import (
+    SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
 
 
 class AcyclicSide:

@@ -30,10 +30,10 @@ from typing import Any, Protocol, Union
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
+from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.placement import SentWrites
-from drive_can_bridge.protocols.polling import Chunk
+from drive_can_bridge.protocols.polled_exchange import Chunk
 from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single

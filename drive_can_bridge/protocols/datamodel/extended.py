@@ -166,7 +166,7 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     Decode any telegram of the protocol.
 
     :param count: how many words of a cyclic telegram are mapped; the rest is undetermined and
-        left out (up to the first 0 of the map, see :func:`.mapping.effective`).
+        left out (up to the first 0 of the map, see :func:`.options.effective`).
     :param strict: accept only frames of eight bytes. Otherwise a shorter frame will do as long as
         it holds every word that is needed.
     :raises RemoteProtocolError: not a telegram of this protocol, or too short.

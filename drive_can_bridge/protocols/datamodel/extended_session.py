@@ -37,8 +37,8 @@ from typing import Any
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import MappingDiffered, MappingWritten, ProcessDataReceived
+from drive_can_bridge.core.events import (
+    DriveState, MappingDiffered, MappingWritten, ProcessDataReceived)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
@@ -49,7 +49,7 @@ from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended, procedures
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
 from drive_can_bridge.protocols.datamodel.channel import Procedure
-from drive_can_bridge.protocols.datamodel.mapping import differences, effective
+from drive_can_bridge.protocols.datamodel.options import differences, effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.life import Life, Script
 

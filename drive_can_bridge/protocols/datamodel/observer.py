@@ -12,12 +12,10 @@ from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict,
-)
+    DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict)
 from drive_can_bridge.protocols.pairing import (
-    Asked, CYCLES_WAITED, CyclicWatch, Requests, WriteGap,
-)
-from drive_can_bridge.protocols.polling import Chunk
+    Asked, CYCLES_WAITED, CyclicWatch, Requests, WriteGap)
+from drive_can_bridge.protocols.polled_exchange import Chunk
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE

@@ -16,14 +16,10 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
-from drive_can_bridge.protocols.datamodel.mapping import (
-    effective, REQUEST_MAP_BASE, RESPONSE_MAP_BASE,
-)
-from drive_can_bridge.protocols.datamodel.options import NUMBER_MAX
+from drive_can_bridge.protocols.datamodel.options import (
+    effective, NUMBER_MAX, REQUEST_MAP_BASE, RESPONSE_MAP_BASE)
 from drive_can_bridge.protocols.scanner import (
-    Certainty, Conversation, Finding, Prober, Question, Scanner,
-)
-
+    Certainty, Conversation, Finding, Prober, Question, Scanner)
 
 #: the highest station whose both identifiers fit 11 bits with the default bases
 STANDARD_STATION_MAX = 15

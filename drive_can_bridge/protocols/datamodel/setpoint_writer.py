@@ -23,9 +23,8 @@ from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterTransactor, Procedure, Reply, Step, Write,
-)
-from drive_can_bridge.protocols.datamodel.numbers import Numbers
+    ParameterTransactor, Procedure, Reply, Step, Write)
+from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 

@@ -9,8 +9,8 @@ from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Procedure, Read
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
-from drive_can_bridge.protocols.datamodel.numbers import Numbers
-from drive_can_bridge.protocols.polling import Chunk, round_time
+from drive_can_bridge.protocols.datamodel.procedures import Numbers
+from drive_can_bridge.protocols.polled_exchange import Chunk, round_time
 
 FRAME_BITS = worst_bits(PAYLOAD, extended=False)
 

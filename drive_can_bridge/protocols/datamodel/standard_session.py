@@ -22,9 +22,7 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_c
 from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
-from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
-from drive_can_bridge.protocols.polling import TOLERANCE
-
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws, TOLERANCE
 
 
 class StandardSession(Session):

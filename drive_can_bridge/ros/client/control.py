@@ -17,10 +17,9 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.ros.client.calls import (
-    ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service,
-)
+    ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.search import find_bridge, Graph, nobody, Search
-from drive_can_bridge.ros.recognition import namespace_of, sampled_among, stoppable_among
+from drive_can_bridge.ros.messages import namespace_of, sampled_among, stoppable_among
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
 STOP_TIMEOUT, _AGAIN = 10.0, 1.0

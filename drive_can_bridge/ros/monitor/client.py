@@ -30,10 +30,8 @@ from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
 from drive_can_bridge.ros.messages import (
-    drive_value, facts_of, limits_of, parameter_message, plain,
-)
-from drive_can_bridge.ros.recognition import (
-    bridges_among, namespace_of, sampled_among, stoppable_among,
+    bridges_among, drive_value, facts_of, limits_of, namespace_of, parameter_message, plain,
+    sampled_among, stoppable_among,
 )
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,

@@ -10,7 +10,7 @@ import math
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
-from drive_can_bridge.protocols.canopen import abort_codes, network
+from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
 from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, SdoServer
@@ -172,7 +172,7 @@ class CanopenNode(Companion):
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
             self._plan_heartbeat(self._now)
         elif self._content(index, subindex) is not None:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+            raise Refused(sdo.WRITE_OF_READ_ONLY)
         else:
             self._objects.write_object(index, subindex, data)
 
@@ -193,5 +193,5 @@ class CanopenNode(Companion):
             **self._constants(),
         }
         if (index, subindex) not in objects and any(place[0] == index for place in objects):
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+            raise Refused(sdo.NO_SUCH_SUBINDEX)
         return objects.get((index, subindex))

@@ -13,10 +13,9 @@ import math
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.canopen import abort_codes
+from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.simulation.canopen.sdo import (
-    bytes_of, checked_length, ObjectDictionary, TOO_HIGH,
-)
+    bytes_of, checked_length, ObjectDictionary, TOO_HIGH)
 from drive_can_bridge.simulation.registers import Refused
 
 COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
@@ -131,12 +130,12 @@ class Pdos:
                 return bytes((pdo.count,))
             if subindex <= ENTRIES_MAX:
                 return pdo.entries[subindex - 1].to_bytes(4, 'little')
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+            raise Refused(sdo.NO_SUCH_SUBINDEX)
         contents = {0: 5 if pdo.transmit else 2, 1: pdo.cob_id, 2: pdo.type}
         if pdo.transmit:
             contents |= {3: pdo.inhibit, 5: pdo.event}
         if subindex not in contents:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX)
+            raise Refused(sdo.NO_SUCH_SUBINDEX)
         return contents[subindex].to_bytes(_WIDTHS.get(subindex, 1), 'little')
 
     def write(self, pdo: Pdo, mapping: bool, subindex: int, data: bytes) -> None:
@@ -146,23 +145,23 @@ class Pdos:
             self._map(pdo, subindex, data)
             return
         if subindex == 0:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+            raise Refused(sdo.WRITE_OF_READ_ONLY)
         value = int.from_bytes(checked_length(data, _WIDTHS[subindex]), 'little')
         valid = not pdo.cob_id & INVALID
         if subindex == 1:
             if (value & EXTENDED or self.habits.no_remote and pdo.transmit
                     and not value & NO_REMOTE or valid and not value & INVALID
                     and value != pdo.cob_id):
-                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
+                raise Refused(sdo.VALUE_OUT_OF_RANGE)
             pdo.cob_id = value
             pdo.pending = pdo.sent = None
         elif subindex == 2:
             if value not in self.habits.types:
-                raise Refused(abort_codes.VALUE_OUT_OF_RANGE)
+                raise Refused(sdo.VALUE_OUT_OF_RANGE)
             pdo.type = value
         elif subindex == 3:
             if valid:
-                raise Refused(abort_codes.DEVICE_STATE)
+                raise Refused(sdo.DEVICE_STATE)
             pdo.inhibit = value
         else:
             pdo.event = value

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.protocols.canopen import abort_codes, sdo
+from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
@@ -23,9 +23,9 @@ WRITE_MAX = 1024
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
 #: abort codes of what registers refuse
 CODES = {
-    Refusal.READ_ONLY: abort_codes.WRITE_OF_READ_ONLY,
-    Refusal.OUT_OF_RANGE: abort_codes.VALUE_OUT_OF_RANGE,
-    Refusal.FORBIDDEN: abort_codes.DEVICE_STATE,
+    Refusal.READ_ONLY: sdo.WRITE_OF_READ_ONLY,
+    Refusal.OUT_OF_RANGE: sdo.VALUE_OUT_OF_RANGE,
+    Refusal.FORBIDDEN: sdo.DEVICE_STATE,
 }
 
 
@@ -58,7 +58,7 @@ class ObjectDictionary:
             return bytes((self._counts[index],))
         cell = self._cell(index, subindex)
         if not cell.readable:
-            raise Refused(abort_codes.READ_OF_WRITE_ONLY)
+            raise Refused(sdo.READ_OF_WRITE_ONLY)
         return self.content(cell)
 
     def content(self, cell: Parameter) -> bytes:
@@ -68,14 +68,14 @@ class ObjectDictionary:
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
         if subindex == 0 and index in self._counts:
-            raise Refused(abort_codes.WRITE_OF_READ_ONLY)
+            raise Refused(sdo.WRITE_OF_READ_ONLY)
         cell = self._cell(index, subindex)
         raw = cell.raw_from_word(int.from_bytes(checked_length(data, bytes_of(cell)), 'little'))
         refusal = self._registers.refusal({cell.name: raw})
         if refusal is Refusal.OUT_OF_RANGE:
             low, high = cell.raw_limits
             raise Refused(TOO_HIGH if raw > high else TOO_LOW if raw < low else
-                          abort_codes.VALUE_OUT_OF_RANGE)
+                          sdo.VALUE_OUT_OF_RANGE)
         if refusal is not None:
             raise Refused(CODES[refusal])
         self._registers.write(cell.name, raw)
@@ -87,8 +87,8 @@ class ObjectDictionary:
     def _cell(self, index: int, subindex: int) -> Parameter:
         cell = self.cells.get((index, subindex))
         if cell is None:
-            raise Refused(abort_codes.NO_SUCH_SUBINDEX if any(
-                place[0] == index for place in self.cells) else abort_codes.NO_SUCH_OBJECT)
+            raise Refused(sdo.NO_SUCH_SUBINDEX if any(
+                place[0] == index for place in self.cells) else sdo.NO_SUCH_OBJECT)
         return cell
 
 
@@ -138,13 +138,13 @@ class SdoServer:
             kind, place, data, number, toggle, last = sdo.decode(Direction.REQUEST, request)
         except RemoteProtocolError:
             self._place = int.from_bytes(request[1:3], 'little'), request[3]
-            raise Refused(abort_codes.UNKNOWN_COMMAND) from None
+            raise Refused(sdo.UNKNOWN_COMMAND) from None
         if place is None:
             under_way = self._rest if kind is Kind.SEGMENT_WANTED else self._written is not None
             if not under_way:
-                raise Refused(abort_codes.UNKNOWN_COMMAND)
+                raise Refused(sdo.UNKNOWN_COMMAND)
             if toggle != self._toggle:
-                raise Refused(abort_codes.TOGGLE_NOT_ALTERNATED)
+                raise Refused(sdo.TOGGLE_NOT_ALTERNATED)
             self._toggle ^= sdo.TOGGLE
             return self._next_segment(toggle) if kind is Kind.SEGMENT_WANTED else (
                 self._take_segment(data, toggle, last))
@@ -159,7 +159,7 @@ class SdoServer:
         elif self._segmented_writes:
             self._written, self._toggle, self._announced = b'', 0, number
         else:
-            raise Refused(abort_codes.UNKNOWN_COMMAND)
+            raise Refused(sdo.UNKNOWN_COMMAND)
         return Message(Kind.DOWNLOADED, place)
 
     def _take_segment(self, data: bytes, toggle: int, last: bool) -> Message:

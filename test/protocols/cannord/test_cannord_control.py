@@ -9,8 +9,7 @@ import pytest
 from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.protocols.cannord.control import hint
 
 ENABLE, DISABLE = ControlAction.ENABLE, ControlAction.DISABLE

@@ -14,11 +14,9 @@ import pytest
 from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired, StationFound,
-    StationLost,
-)
+    DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired,
+    StationFound, StationLost)
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 

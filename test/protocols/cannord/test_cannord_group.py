@@ -16,11 +16,9 @@ from saying import says
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted, StationFound,
-    StationLost,
-)
+    DriveState, Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted,
+    StationFound, StationLost)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome

@@ -19,11 +19,9 @@ from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
-    ProcessDataReceived, RequestCompleted, StationFound, StationLost,
-)
+    DriveState, ProcessDataReceived, RequestCompleted, StationFound, StationLost)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue, Written

@@ -13,8 +13,7 @@ import pytest
 from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted, StationLost
+from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.parameters import Access
 from drive_can_bridge.protocols.families import FAMILIES
 

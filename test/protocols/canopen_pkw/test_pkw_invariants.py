@@ -22,9 +22,8 @@ from pkw_builders import (
 import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import RequestCompleted, StationFound, StationLost
+from drive_can_bridge.core.events import DriveState, RequestCompleted, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import WriteRequest, Written
 from drive_can_bridge.protocols.families import FAMILIES

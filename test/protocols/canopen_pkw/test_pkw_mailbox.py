@@ -4,11 +4,10 @@
 import pytest
 
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxTransactor, Read, Refused, Reply, Silence, Write,
-)
+    Answered, MailboxTransactor, Read, Refused, Reply, Silence, Write)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout
 
 REGISTER = Address(455)

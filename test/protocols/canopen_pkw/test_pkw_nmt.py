@@ -10,8 +10,8 @@ from pkw_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted, ProcessDataReceived, StationFound, StationLost
+from drive_can_bridge.core.events import (
+    DriveState, Noted, ProcessDataReceived, StationFound, StationLost)
 
 TRIP = '085#1023020A00000000'
 

@@ -12,10 +12,8 @@ from pkw_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    AnswerLate, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
-)
+    AnswerLate, DriveState, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost)
 
 READ_SINGLE_0 = '505#C701002500000000'
 

@@ -12,8 +12,7 @@ from pkw_builders import (
 )
 from saying import may_run, says
 
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted, SetpointsExpired, StationLost
+from drive_can_bridge.core.events import DriveState, Noted, SetpointsExpired, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 WITHDRAWN = Noted('enable withdrawn: bridge inactive; only ~/enable starts the drive again')

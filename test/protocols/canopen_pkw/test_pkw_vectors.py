@@ -9,8 +9,8 @@ import pytest
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.protocols.canopen import abort_codes, network
-from drive_can_bridge.protocols.canopen_pkw import object_map, pkw, refusals
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'canopen_pkw.json').read_text(
     encoding='utf-8'))
@@ -193,21 +193,21 @@ def test_codes_of_refusals(row: dict[str, Any]) -> None:
     code, order = int(row['abort_code'], 16), row['abort_order']
     words = pkw.decode(data(row), layout(row)).words
     other = {'low_first': 'high_first', 'high_first': 'low_first'}[order]
-    assert refusals.code_from_words(words, order) == code
-    assert refusals.code_from_words(words, 'auto') == code
-    assert refusals.code_from_words(words, other) != code
-    assert refusals.words_from_code(code, order) == words
+    assert pkw.code_from_words(words, order) == code
+    assert pkw.code_from_words(words, 'auto') == code
+    assert pkw.code_from_words(words, other) != code
+    assert pkw.words_from_code(code, order) == words
 
 
 def test_table_of_codes() -> None:
     codes = {int(code, 16) for code in FILE['abort_codes']}
-    assert codes == set(abort_codes.TEXTS)
-    assert len(set(abort_codes.TEXTS.values())) == len(codes)
+    assert codes == set(sdo.TEXTS)
+    assert len(set(sdo.TEXTS.values())) == len(codes)
     # 'auto' can tell the order of every one of them
     for code in codes:
         for words in ((code & 0xFFFF, code >> 16), (code >> 16, code & 0xFFFF)):
-            assert refusals.code_from_words(words, 'auto') == code
-        assert f'{code:08X}h' in refusals.describe(code)
+            assert pkw.code_from_words(words, 'auto') == code
+        assert f'{code:08X}h' in pkw.describe(code)
 
 
 @pytest.mark.parametrize(('code', 'meaning'), [
@@ -226,15 +226,15 @@ def test_small_numbers_are_those_of_the_profibus_variant(code: int, meaning: str
 @pytest.mark.parametrize('row', FILE['object_map'], ids=lambda row: str(row['register']))
 def test_object_map(row: dict[str, Any]) -> None:
     place = int(row['index'], 16), int(row['subindex'], 16)
-    assert object_map.object_of(row['register']) == place
-    assert object_map.register_of(*place) == row['register']
+    assert addresses.object_of(row['register']) == place
+    assert addresses.register_of(*place) == row['register']
 
 
 def test_what_the_object_map_lacks() -> None:
     for register in FILE['without_object']:
-        assert object_map.object_of(register) is None
+        assert addresses.object_of(register) is None
     for index, subindex in FILE['without_register']:
-        assert object_map.register_of(int(index, 16), int(subindex, 16)) is None
+        assert addresses.register_of(int(index, 16), int(subindex, 16)) is None
 
 
 # -- the network around it ------------------------------------------------------------------------

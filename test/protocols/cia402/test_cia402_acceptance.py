@@ -15,7 +15,7 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.statistics import DriveStatistics
-from drive_can_bridge.protocols.canopen.abort_codes import describe
+from drive_can_bridge.protocols.canopen.sdo import describe
 from drive_can_bridge.protocols.cia402.handover import Handover
 
 

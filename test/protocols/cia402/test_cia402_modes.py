@@ -9,8 +9,7 @@ from saying import says
 from servo_builders import Axis, OBJECTS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.cia402.states import State
 

@@ -7,10 +7,9 @@ import pytest
 from saying import says
 from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import MappingDiffered, Noted
+from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.protocols.canopen.abort_codes import describe
+from drive_can_bridge.protocols.canopen.sdo import describe
 from drive_can_bridge.protocols.cia402.states import State
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)

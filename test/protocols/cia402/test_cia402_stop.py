@@ -6,8 +6,7 @@ import pytest
 from saying import says
 from servo_builders import Axis, servo
 
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted, StationLost
+from drive_can_bridge.core.events import DriveState, Noted, StationLost
 
 WATCH_OFF = '605#2316100100000000'
 DISABLE_BY_SDO = '605#2B40600007000000'

@@ -7,11 +7,10 @@ import pytest
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
-from drive_can_bridge.core.retry import RetryPolicy
+from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterTransactor, Procedure, Read, Words, Write,
-)
+    ParameterTransactor, Procedure, Read, Words, Write)
 
 
 def nobody(sent: bool, now: float) -> None:

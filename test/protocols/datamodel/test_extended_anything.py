@@ -7,7 +7,7 @@ from hypothesis import example, given, strategies as st
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.mapping import differences, effective, padded
+from drive_can_bridge.protocols.datamodel.options import differences, effective, padded
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 
 STATIONS = st.integers(0, 127)

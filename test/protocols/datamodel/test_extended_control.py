@@ -14,8 +14,7 @@ import pytest
 from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import FrameRejected, Noted, StationLost
+from drive_can_bridge.core.events import DriveState, FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 

@@ -13,10 +13,9 @@ from extended_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost,
-)
+    DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound,
+    StationLost)
 
 # -- pace -----------------------------------------------------------------------------------------
 

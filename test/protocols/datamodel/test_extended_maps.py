@@ -11,11 +11,9 @@ from extended_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    FrameRejected, MappingDiffered, MappingWritten, Noted, ProcessDataReceived, StationFound,
-    StationLost,
-)
+    DriveState, FrameRejected, MappingDiffered, MappingWritten, Noted, ProcessDataReceived,
+    StationFound, StationLost)
 
 OTHER_REQUEST_MAP = '102007A4#0033003200000000'
 

@@ -20,8 +20,7 @@ import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.events import DriveState, Noted
 
 RUNNING = '003FFFF0#03E8000000000000'
 #: speed_setpoint (50) and torque_limit (51) by number, and what asks for them

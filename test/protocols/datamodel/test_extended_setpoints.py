@@ -10,9 +10,8 @@ from builders import (
 from extended_builders import ANSWER, checked, exchange, NEUTRAL, online
 import pytest
 
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import SetpointsExpired
+from drive_can_bridge.core.events import DriveState, SetpointsExpired
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.core.setpoints import CommandOutcome
 

@@ -12,7 +12,7 @@ import pytest
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.protocols.datamodel import extended
-from drive_can_bridge.protocols.datamodel.mapping import effective
+from drive_can_bridge.protocols.datamodel.options import effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.families import FAMILIES
 

@@ -14,11 +14,9 @@ from standard_builders import (
 )
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
 from drive_can_bridge.core.events import (
-    AnswerLate, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, SetpointsExpired,
-    StationFound, StationLost,
-)
+    AnswerLate, DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived,
+    SetpointsExpired, StationFound, StationLost)
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
