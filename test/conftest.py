@@ -18,7 +18,7 @@ a drive; not so in the tests of that, ``configuration/`` and ``profiles/``.
 *Profiles.* Whatever is random looks for a short time, unless DRIVE_CAN_TEST_PROFILE is ``long``.
 How long one example takes says how busy the machine is, and is no failure.
 
-*In parallel*, with pytest-xdist (``-n auto --dist loadscope``, as ``make test`` does): the tests
+*In parallel*, with pytest-xdist (``--dist loadscope``, as ``make test`` does): the tests
 of a module stay together, because they may share what is expensive to start; those that consist of
 waiting for something of their own are spread. Long ones come first. What measures time has the
 mark ``alone``: nothing else of the test run happens meanwhile.

@@ -13,7 +13,7 @@ import re
 from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.configuration.schema import check_schema, profile_schema
+from drive_can_bridge.configuration.schema import check_schema, checked_profile
 from drive_can_bridge.core.complaints import says, suggestion
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import (
@@ -326,7 +326,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
     """Check a profile and make what can be made of it."""
     given = tree.data.get('parameters')
     names = tuple(map(str, given)) if isinstance(given, dict) else ()
-    check_schema(tree, profile_schema())
+    check_schema(tree, checked_profile())
     parameters: dict[str, Parameter] = {}
     for name, entry in tree.data.get('parameters', {}).items():
         path = ('parameters', name)

@@ -56,18 +56,15 @@ _Validator = extend(
         {'integer': _is_integer, 'number': _is_number}))
 
 
-def check_schema(tree: Tree, schema: Schema, start: str = '', *,
-                 override: Override | None = None) -> None:
+def check_schema(tree: Tree, schema: Schema, *, override: Override | None = None) -> None:
     """
     Check a tree, note what is wrong in it, and cut that out.
 
-    :param schema: a whole schema document.
-    :param start: name of the definition that describes the tree; '' for the document itself.
+    :param schema: without references, see :func:`resolved`.
     :param override: see :data:`Override`; called with path, value and the violated keyword.
     """
-    root: Schema = {'$ref': f'#/$defs/{start}', '$defs': schema['$defs']} if start else schema
     found: list[tuple[Path, Sentence, Path]] = []
-    for error in _Validator(root).iter_errors(tree.data):
+    for error in _Validator(schema).iter_errors(tree.data):
         for path, message, at in _sentences(error, tree):
             changed = override(path, error.instance, str(error.validator)) if override else None
             found.append((path, message if changed is None else changed, at))
@@ -199,6 +196,36 @@ def parameter_file_schema() -> Schema:
 def profile_schema() -> Schema:
     """Return the schema of a profile, with the names of all families."""
     return json.loads(shipped()[PROFILE])  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=None)
+def checked_bridge() -> Schema:
+    """Return what :func:`check_schema` takes for the parameters of a bridge."""
+    definitions = parameter_file_schema()['$defs']
+    bridge: Schema = resolved(definitions['bridge'], definitions)
+    return bridge
+
+
+@lru_cache(maxsize=None)
+def checked_profile() -> Schema:
+    """Return what :func:`check_schema` takes for a profile."""
+    schema = profile_schema()
+    profile: Schema = resolved(schema, schema['$defs'])
+    return profile
+
+
+def resolved(schema: Any, definitions: Schema) -> Any:
+    """Put definitions where references to them are: jsonschema looks up each one again."""
+    if isinstance(schema, list):
+        return [resolved(part, definitions) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    parts = {key: resolved(part, definitions) for key, part in schema.items()
+             if key not in ('$defs', '$ref')}
+    if '$ref' in schema:
+        name = schema['$ref'].removeprefix('#/$defs/')
+        return {**resolved(definitions[name], definitions), **parts}
+    return parts
 
 
 def compose(base: Schema, families: list[Family]) -> Schema:

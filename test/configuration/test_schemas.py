@@ -15,7 +15,7 @@ import yaml
 from drive_can_bridge.configuration import schema
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.problems import Tree
-from drive_can_bridge.configuration.schema import check_schema
+from drive_can_bridge.configuration.schema import check_schema, resolved
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import share_directory
@@ -125,7 +125,7 @@ def test_keys_of_several_families() -> None:
     def wrong(**keys: object) -> list[Sentence]:
         drive = {'bus': 'main', 'station': 1, 'profile': 'x', **keys}
         tree = Tree(drive)
-        check_schema(tree, document, 'drive')
+        check_schema(tree, resolved(document['$defs']['drive'], document['$defs']))
         return [problem.text for problem in tree.problems]
 
     assert wrong(protocol='other', mapping=2, layout='b') == []

@@ -21,7 +21,8 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveFailed, DriveState, Noted, StationFound
 from drive_can_bridge.core.frame import Frame
 
-DELAY = 0.001
+#: s: of the drives, and until an answer
+PERIOD, DELAY = 0.05, 0.001
 WORDS = dict.fromkeys((50, 51, 52), 0)
 
 
@@ -72,7 +73,7 @@ def _registers(*, word: bool) -> dict[int, int]:
 
 def _extended(word: bool) -> tuple[list[DriveConfiguration], list[Any]]:
     request = (SPEED, WORD) if word else (SPEED,)
-    return [drive(name=name, station=station, request=request,
+    return [drive(name=name, station=station, request=request, period=PERIOD,
                   control=CONTROL if word else None)
             for name, station in (('first', 1), ('second', 2))], [
         ExtendedDrive(_registers(word=word)) for _ in range(2)]
@@ -80,14 +81,14 @@ def _extended(word: bool) -> tuple[list[DriveConfiguration], list[Any]]:
 
 def _single(protocol: str, make: Callable[[int, dict[int, int]], Any], *,
             control: bool = True) -> tuple[list[DriveConfiguration], list[Any]]:
-    return [drive(protocol, name=name, station=station, request=(SPEED,), period=0.05,
+    return [drive(protocol, name=name, station=station, request=(SPEED,), period=PERIOD,
                   response=(ACTUAL, CURRENT, STATUS), control=CONTROL if control else None)
             for name, station in (('first', 1), ('second', 2))], [
         make(station, _registers(word=False)) for station in (1, 2)]
 
 
 def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
-    return [drive('cannord', name=name, station=station, request=(SPEED,),
+    return [drive('cannord', name=name, station=station, request=(SPEED,), period=PERIOD,
                   response=(ACTUAL, CURRENT), broadcast=broadcast)
             for name, station in (('first', 1), ('second', 2))], [
         Inverter(dict(WORDS), 2 * station, *[0x400] * (broadcast != 'none'))
@@ -155,7 +156,7 @@ class World:
         end = self.bench.now + seconds
         for _ in range(100_000):
             at = min(member.due for member in self.exchange._members)
-            at = min(max(at, self.bench.now), self.bench.now + 0.02)
+            at = min(max(at, self.bench.now), self.bench.now + PERIOD)
             if self.coming and self.coming[0][0] <= min(at, end):
                 self.bench.now, _, answer = heapq.heappop(self.coming)
                 self.exchange.frame_received(answer, 0.0)

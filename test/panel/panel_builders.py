@@ -31,6 +31,7 @@ FILE = """
         protocol: datamodel_extended
         station: 1
         profile: hostile
+        period: 0.1
         missed_limit: 1000
         parameter_timeout: 2.0
         cyclic_request: [speed_setpoint]
@@ -40,6 +41,7 @@ FILE = """
         protocol: datamodel_extended
         station: 2
         profile: datamodel_control_example
+        period: 0.1
         missed_limit: 1000
         parameter_timeout: 2.0
         cyclic_request: [control_word, speed_setpoint]
@@ -49,6 +51,7 @@ FILE = """
         protocol: datamodel_extended
         station: 3
         profile: without_quick_stop
+        period: 0.1
         missed_limit: 1000
         parameter_timeout: 2.0
         cyclic_request: [control_word]

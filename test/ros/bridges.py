@@ -146,7 +146,8 @@ class Bridge:
         gc.collect()
         self.context.try_shutdown()
         del self.context
-        gc.collect()
+        if waiting.virtual is None:
+            gc.collect()
         if self.simulation is not None:
             self.simulation.stop()
 

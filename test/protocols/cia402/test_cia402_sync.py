@@ -222,6 +222,15 @@ class TestRounds:
         for station, limit in ((1, 1500), (2, 300), (3, 900)):
             assert one.drives[station].number(0x1016, 1) == 127 << 16 | limit
 
+    def test_it_beats_as_the_node_that_those_know_who_are_to_hear_it(self) -> None:
+        one = Bus(*(servo('pv', name=f'axis_{station}', station=station, bridge_heartbeat=beat,
+                          bridge_node=node)
+                    for station, beat, node in ((1, 0.0, 100), (2, 0.1, 126))))
+        one.start()
+        one.live(1.0)
+        assert {text for _, text in one.log if text.endswith('#05')} == {'77E#05'}
+        assert one.drives[2].number(0x1016, 1) == 126 << 16 | 300
+
 
 class TestEvent:
 
