@@ -184,7 +184,7 @@ class Bus:
                 for events in self.events]
 
 
-LAGS = [(period, lag * period) for period in (0.01, 0.02, 0.05) for lag in (
+LAGS = [(period, lag * period) for period in (0.01, 0.05) for lag in (
     0.2, 0.9, 1.3, 1.6, 2.2, 2.7)]
 
 

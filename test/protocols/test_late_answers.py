@@ -24,7 +24,7 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.protocols.families import FAMILIES
 
 TIMEOUT = 0.1
-REQUESTS = 3_000
+REQUESTS = 1_500
 SPEED = parameter('speed', 200, access=RO)
 ACTUAL = parameter('actual', None, type=INT16, access=RO)
 REGISTERS = tuple(parameter(f'register_{number}', number, storage=RAM if number < 42 else EEPROM)

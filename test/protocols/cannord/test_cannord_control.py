@@ -111,13 +111,6 @@ def test_quick_stop_while_disabled_succeeds() -> None:
     assert words(talk, 10.04, READY) == ['7E04']
 
 
-def test_setpoints_go_along_whatever_the_control_word() -> None:
-    talk = running()
-    talk.commands(0, 0.0, 10.07)
-    talk.commands(0, 25.0, 10.071)
-    assert exchange(talk, 10.08, RUNNING) == '002#7F040020'
-
-
 def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     talk = running()
     talk.hears(FAULT, 10.065)
@@ -213,20 +206,6 @@ def test_parameter_set_is_in_every_word() -> None:
     assert words(talk, 10.06, FAULT, FAULT) == ['7A84', '7E84']
     talk.asks(RESET_FAULT, 10.095)
     assert words(talk, 10.1, FAULT, READY, READY, READY) == ['FE84', 'FE84', 'FE84', '7E84']
-
-
-def test_stop_disables() -> None:
-    talk = running()
-    talk.deactivate(10.07)
-    assert [text for _, text in talk.until(11.0)] == ['002#7E040000'] * 6    # nobody answers
-
-
-def test_refused_while_offline_or_inactive() -> None:
-    talk = online()
-    talk.until(10.2)
-    assert talk.session.services.control_refusal(ENABLE) == 'drive offline'
-    talk.deactivate(10.2)
-    assert talk.session.services.control_refusal(ENABLE) == 'bridge inactive'
 
 
 # -- asked again for a stop -----------------------------------------------------------------------

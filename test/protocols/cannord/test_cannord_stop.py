@@ -1,13 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
-from dataclasses import replace
-import math
 
 from builders import Conversation, read, write
 from cannord_session_builders import (
-    ACTUAL, commanded, ENABLED, enabled, exchange, FREQUENCY, inverter, MONITORING, OFFSET, online,
-    READY, READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
+    ACTUAL, commanded, ENABLED, exchange, FREQUENCY, inverter, MONITORING, OFFSET, online, READY,
+    READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
 )
 import pytest
 from saying import may_run, says
@@ -51,16 +49,6 @@ def warnings(talk: Conversation) -> list[str]:
 # -- in every state -------------------------------------------------------------------------------
 
 
-def test_signal_right_after_a_stall() -> None:
-    talk = running()
-    assert talk.time_lost(15.0) == []
-    assert talk.deactivate(15.0) == []
-    assert exchange(talk, 15.0) == READY_FRAME
-    assert talk.until(16.0) == [(15.02, READY_FRAME), (15.04, READY_FRAME)]
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
 def test_what_is_under_way_during_a_stall_is_not_missed() -> None:
     talk = running()
     talk.at(10.06)
@@ -68,71 +56,6 @@ def test_what_is_under_way_during_a_stall_is_not_missed() -> None:
     talk.time_lost(15.0)
     assert exchange(talk, 15.0) == READY_FRAME
     assert talk.session.statistics.missed == missed
-
-
-def test_signal_right_after_a_stall_to_a_drive_that_does_not_answer() -> None:
-    talk = running()
-    assert talk.time_lost(15.0) == []
-    assert talk.deactivate(15.0) == []
-    assert [text for _, text in talk.until(16.0)] == [READY_FRAME] * 6
-    assert talk.session.stopped
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
-
-
-def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
-    talk = running()
-    assert talk.deactivate(15.0) == []
-    assert talk.at(15.0) == [READY_FRAME]
-    # nobody answers: three more
-    assert talk.until(16.0) == [(at, READY_FRAME) for at in (15.02, 15.04, 15.14, 15.16, 15.18)]
-
-
-def test_signal_right_after_the_bus_came_back() -> None:
-    talk = running()
-    assert talk.bus_down(10.05) == []
-    assert warnings(talk) == [
-        says('may_still_be_running', why=says('bus_lost_before_stop'))]
-    assert talk.bus_up(12.0) == []
-    assert talk.deactivate(12.0) == []
-    assert exchange(talk, 12.0) == READY_FRAME
-    assert talk.until(13.0) == [(12.02, READY_FRAME), (12.04, READY_FRAME)]
-    assert warnings(talk) == []
-
-
-def test_bus_that_is_lost_during_the_stop() -> None:
-    talk = running()
-    talk.deactivate(10.05)
-    talk.bus_down(10.055)
-    assert talk.session.stopped
-    assert warnings(talk) == [
-        says('may_still_be_running', why=says('bus_lost_before_stop'))]
-
-
-def test_end_while_the_bus_is_lost() -> None:
-    talk = running()
-    talk.bus_down(10.05)
-    talk.events()
-    assert talk.deactivate(11.0) == []
-    assert talk.session.stopped
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_possible'))]
-
-
-def test_end_while_a_drive_that_ran_is_lost() -> None:
-    """It has answered none of the frames that stop it."""
-    talk = running()
-    talk.until(11.0)
-    assert not talk.session.online
-    talk.deactivate(11.01)
-    assert [text for _, text in talk.until(12.0)][-3:] == [READY_FRAME] * 3
-    assert talk.session.stopped
-    assert warnings(talk)[-1] == says('may_still_be_running')
-
-
-def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:
-    talk = online()
-    talk.bus_down(10.05)
-    talk.deactivate(11.0)
-    assert warnings(talk) == []
 
 
 def test_after_a_stall_nobody_waits_for_the_beat() -> None:
@@ -147,72 +70,6 @@ def test_after_a_stall_nobody_waits_for_the_beat() -> None:
 
 
 # -- frames that the bus refuses ------------------------------------------------------------------
-
-
-def test_three_refused_stop_frames_are_no_stop() -> None:
-    talk = running()
-    talk.refusing = lambda text: True
-    talk.deactivate(10.05)
-    assert talk.until(10.101) == [], '10.06, 10.08, 10.1'
-    assert not talk.session.stopped
-    talk.refusing = lambda text: False
-    assert exchange(talk, 10.12) == READY_FRAME
-    assert talk.until(11.0) == [(10.14, READY_FRAME), (10.16, READY_FRAME)]
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
-def test_drive_that_falls_silent_together_with_the_stop() -> None:
-    """It may have been disconnected in the meantime, and run on by itself."""
-    talk = running()
-    talk.deactivate(10.05)
-    assert talk.until(10.35) == [
-        (at, READY_FRAME) for at in (10.06, 10.08, 10.1, 10.2, 10.22, 10.24)]
-    assert talk.session.stopped
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
-
-
-def test_drive_that_answers_the_last_cycle_of_a_stop() -> None:
-    talk = running()
-    talk.deactivate(10.05)
-    talk.until(10.1)
-    assert not talk.session.stopped, 'its answer is waited for'
-    assert talk.hears(READY, 10.15) == []
-    assert talk.session.stopped
-    assert talk.until(11.0) == []
-    assert warnings(talk) == []
-
-
-def test_nobody_waits_for_a_drive_that_never_ran() -> None:
-    talk = online()
-    talk.deactivate(10.05)
-    talk.until(10.1)
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
-def test_bus_that_is_lost_while_the_last_answer_is_waited_for() -> None:
-    talk = running()
-    talk.deactivate(10.05)
-    talk.until(10.1)
-    talk.bus_down(10.12)
-    assert talk.session.stopped
-    assert talk.until(11.0) == []
-    assert warnings(talk) == [
-        says('may_still_be_running', why=says('bus_lost_before_stop'))]
-
-
-def test_bus_that_takes_no_stop_frame_at_all() -> None:
-    talk = running()
-    talk.refusing = lambda text: True
-    talk.deactivate(10.05)
-    assert talk.until(10.6) == []
-    assert not talk.session.stopped
-    talk.session.give_up(10.61)
-    assert talk.sent() == []
-    assert talk.session.stopped
-    assert talk.session.next_timer() == math.inf
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_possible'))]
 
 
 def test_one_stop_frame_that_left_is_a_word() -> None:
@@ -260,15 +117,6 @@ def test_refused_enable_is_no_enable() -> None:
     talk.refusing = lambda text: False
     assert exchange(talk, 10.04, RUNNING) == STANDING_FRAME
     assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
-
-
-def test_drive_whose_enable_never_left_is_no_worry() -> None:
-    talk = online()
-    talk.refusing = lambda text: text.startswith('002#7F04')
-    talk.asks(ENABLE, 10.003)
-    talk.until(10.021)
-    talk.bus_down(10.03)
-    assert warnings(talk) == []
 
 
 def test_refused_disable_goes_on() -> None:
@@ -366,53 +214,11 @@ def test_commands_count_from_operation_enabled_on() -> None:
     assert exchange(talk, 10.08, RUNNING) == HALF_FRAME
 
 
-@pytest.mark.parametrize('immediate', [False, True])
-def test_what_was_left_standing_does_not_move_it_when_it_is_enabled(immediate: bool) -> None:
-    talk = online(rearm_immediate=immediate)
-    for place in range(10):     # somebody goes on publishing
-        assert talk.commands(0, 25.0, 10.003 + 0.001 * place) is CommandOutcome.DISABLED
-    talk.asks(ENABLE, 10.015)
-    assert exchange(talk, 10.02, ENABLED) == STANDING_FRAME
-    assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
-    assert exchange(talk, 10.04, ENABLED) == STANDING_FRAME
-    outcome = talk.commands(0, 25.0, 10.05)
-    assert outcome is (CommandOutcome.ARMED if immediate else CommandOutcome.NOT_ARMED)
-    assert exchange(talk, 10.06, ENABLED) == (HALF_FRAME if immediate else STANDING_FRAME)
-
-
-@pytest.mark.parametrize('action', [DISABLE, QUICK_STOP])
-def test_any_other_word_disarms_when_it_is_chosen(action: ControlAction) -> None:
-    talk = running()
-    talk.asks(action, 10.05)
-    assert talk.session.state is DriveState.DISABLED
-    assert talk.commands(0, 25.0, 10.051) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.06, RUNNING)[8:] == '0000'
-    assert not talk.session.setpoints.items[0].armed
-
-
 def test_a_drive_that_drops_out_by_itself_is_neutral_at_once() -> None:
     talk = running()
     assert exchange(talk, 10.06, '003#170B0010') == HALF_FRAME
     assert talk.commands(0, 25.0, 10.063) is CommandOutcome.DISABLED
     assert exchange(talk, 10.08) == READY_FRAME
-
-
-@pytest.mark.parametrize(('hertz', 'arms'), [
-    (0.003, True), (-0.003, True), (0.0031, False), (-0.0031, False), (0.0046, False)])
-def test_what_is_neutral_of_a_double(hertz: float, arms: bool) -> None:
-    """One raw step is 50/16384 Hz, 0.00305; what rounds to it is not meant."""
-    talk = enabled()
-    assert talk.commands(0, hertz, 10.023) is (
-        CommandOutcome.ARMED if arms else CommandOutcome.NOT_ARMED)
-
-
-@pytest.mark.parametrize(('value', 'arms'), [(0, True), (1, False), (-1, False)])
-def test_what_is_neutral_of_an_integer(value: int, arms: bool) -> None:
-    counted = replace(FREQUENCY, scale=1.0, unit='', scaled=False)
-    talk = enabled(request=(counted,), table=(counted, *VALUES))
-    assert talk.commands(0, value, 10.023) is (
-        CommandOutcome.ARMED if arms else CommandOutcome.NOT_ARMED)
-    assert exchange(talk, 10.04, ENABLED) == STANDING_FRAME
 
 
 # -- its own requests -----------------------------------------------------------------------------
@@ -442,26 +248,6 @@ def test_a_drive_that_comes_and_goes_is_asked_once_for_its_time_out() -> None:
 
 
 # -- silent while it runs -------------------------------------------------------------------------
-
-
-def test_inverter_that_falls_silent_while_it_runs_is_warned_about_once() -> None:
-    talk = running()
-    talk.until(10.13)
-    assert not talk.session.online
-    assert warnings(talk) == [], 'it may have heard those that are not neutral'
-    assert {text for _, text in talk.until(10.18 + TICK)} == {READY_FRAME}
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
-    talk.until(20.0)
-    assert warnings(talk) == []
-    talk.hears(READY, 20.001)
-    assert talk.session.online
-    assert not talk.session.duty.owed
-
-
-def test_inverter_that_falls_silent_at_rest_is_no_worry() -> None:
-    talk = online()
-    talk.until(12.0)
-    assert warnings(talk) == []
 
 
 def test_bus_that_is_lost_before_silent_neutral_cycles_count_as_unheard() -> None:

@@ -117,19 +117,6 @@ def test_drive_that_refuses_its_status_is_not_driven_on() -> None:
         note.text for note in talk.events(Noted)]
 
 
-def test_enabling_while_tripped_is_refused() -> None:
-    talk = ready()
-    talk.until(10.0901)
-    talk.hears(TRIPPED_0, 10.091)
-    assert talk.asks(ControlAction.ENABLE, 10.095) == []
-    assert talk.control_outcomes() == [('enable', False, says('reset_first'))]
-
-
-def test_offline_drive_is_not_enabled() -> None:
-    talk = started(control=CONTROL)
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'drive offline'
-
-
 # -- lost answers ---------------------------------------------------------------------------------
 
 

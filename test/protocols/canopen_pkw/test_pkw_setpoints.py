@@ -64,13 +64,6 @@ def test_change_is_written_before_the_round_and_once() -> None:
     assert cycle(talk, 10.09) == []
 
 
-def test_newest_command_wins() -> None:
-    talk = armed(command_timeout=0.0)
-    for value in (20.0, 30.0, 40.0):
-        talk.commands(0, value, 10.065)
-    assert cycle(talk, 10.07) == ['C60290010000']
-
-
 def test_command_while_the_write_is_under_way_goes_with_the_next_round() -> None:
     talk = armed(command_timeout=0.0)
     assert talk.at(10.07) == [SPEED_1]
@@ -85,26 +78,11 @@ def test_unchanged_values_are_written_again_after_the_refresh_interval() -> None
     assert [beat for beat, writes in enumerate(written) if writes] == [0, 5, 10]
 
 
-def test_no_refresh_without_an_interval() -> None:
-    talk = armed(command_timeout=0.0, refresh_interval=0.0, period=1.0)
-    assert cycle(talk, 11.05) == ['C60264000000']
-    assert [cycle(talk, 12.05 + beat) for beat in range(20)] == [[]] * 20
-
-
 def test_32_bits() -> None:
     talk = online(request=(POSITION,), command_timeout=0.0)
     talk.commands(0, 0, 10.06)
     talk.commands(0, -2, 10.06)
     assert cycle(talk, 10.07) == ['D002FFFFFEFF']
-
-
-def test_command_timeout_sends_neutral() -> None:
-    talk = armed(command_timeout=0.05)
-    assert cycle(talk, 10.07) == ['C60264000000']
-    assert cycle(talk, 10.09) == []
-    assert cycle(talk, 10.12) == ['C60200000000']
-    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed',))]
-    assert talk.session.state is DriveState.NOT_ARMED
 
 
 def test_neutral_does_not_wait_for_the_next_round() -> None:

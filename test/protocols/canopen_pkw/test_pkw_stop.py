@@ -2,7 +2,6 @@
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
 from dataclasses import replace
-import math
 from typing import Any
 
 from builders import BOOL, Conversation, parameter, RAM, read, write
@@ -58,33 +57,10 @@ def test_stall() -> None:
     assert worries(talk) == []
 
 
-def test_signal_right_after_a_stall() -> None:
-    talk = running()
-    assert talk.time_lost(15.0) == [START, DISABLE_0]
-    assert talk.deactivate(15.0) == []
-    assert talk.hears(DISABLED_0, 15.003) == [DISABLE_1]
-    assert not talk.session.stopped
-    assert talk.hears(DISABLED_1, 15.006) == []
-    assert talk.session.stopped
-    assert worries(talk) == []
-
-
 def test_signal_that_comes_before_anybody_noticed_the_stall() -> None:
     talk = running()
     assert talk.until(10.1101) == [(10.11, READ_0)]
     assert talk.deactivate(15.0) == [DISABLE_1], 'nobody waits for that answer any more'
-
-
-def test_signal_right_after_the_bus_came_back() -> None:
-    talk = running()
-    assert talk.bus_down(10.1) == []
-    assert worries(talk) == [may_run('bus_lost_before_stop')]
-    assert talk.bus_up(12.0) == [START, DISABLE_0]
-    assert talk.deactivate(12.0) == []
-    assert talk.hears(DISABLED_0, 12.003) == [DISABLE_1]
-    assert talk.hears(DISABLED_1, 12.006) == []
-    assert talk.session.stopped
-    assert worries(talk) == []
 
 
 def test_nobody_answers_after_the_bus_came_back() -> None:
@@ -123,23 +99,6 @@ def test_slow_device_after_the_bus_came_back() -> None:
     assert worries(talk) == [may_run('bus_lost_before_stop')]
 
 
-def test_end_while_the_bus_is_lost() -> None:
-    talk = running()
-    talk.bus_down(10.1)
-    talk.events()
-    assert talk.deactivate(11.0) == []
-    assert talk.session.stopped
-    assert worries(talk) == [may_run('stop_not_possible')]
-
-
-def test_bus_that_is_lost_during_the_stop() -> None:
-    talk = running()
-    assert talk.deactivate(10.1) == [DISABLE_0]
-    talk.bus_down(10.101)
-    assert talk.session.stopped
-    assert len(worries(talk)) == 1
-
-
 @pytest.mark.parametrize('heard', [PRE_OPERATIONAL, STOPPED])
 def test_stop_while_the_heartbeat_holds_rounds_back(heard: str) -> None:
     """The network module says so; what the motor does is another matter."""
@@ -170,14 +129,6 @@ def test_held_back_and_silent_is_told() -> None:
     assert sent == [(10.433333, DISABLE_1), (10.566667, DISABLE_0)]
     assert worries(talk) == [may_run('stop_failed', what=[
         says('write_not_acknowledged', what='control_register_1 0000h', attempts=3)])]
-
-
-def test_drive_that_was_told_nothing_but_neutral_is_no_worry() -> None:
-    talk = ready()
-    assert talk.time_lost(15.0) == [START]
-    talk.bus_down(15.01)
-    talk.deactivate(16.0)
-    assert worries(talk) == []
 
 
 # -- frames that the bus refuses ------------------------------------------------------------------
@@ -220,17 +171,6 @@ def test_bus_that_takes_no_stop_at_all() -> None:
         says('write_not_taken', what='control_register_1 0000h')])]
 
 
-def test_stop_that_is_given_up() -> None:
-    talk = running()
-    refuse(talk)
-    talk.deactivate(10.1)
-    talk.session.give_up(10.2)
-    assert talk.sent() == []
-    assert talk.session.stopped
-    assert talk.session.next_timer() == math.inf
-    assert worries(talk) == [may_run('stop_not_possible')]
-
-
 def test_refused_disable_of_a_user_is_tried_until_the_bus_takes_it() -> None:
     talk = running()
     refuse(talk)
@@ -255,24 +195,6 @@ def test_disable_that_the_bus_takes_at_last_has_time_for_its_answer() -> None:
     assert talk.control_outcomes() == []        # the status is still to be read
     assert talk.session.statistics.rejected == 0
     assert not talk.session.duty.owed
-
-
-def test_refused_enable_was_never_told() -> None:
-    talk = ready()
-    refuse(talk)
-    assert talk.asks(ControlAction.ENABLE, 10.075) == []
-    talk.bus_down(10.08)
-    assert worries(talk) == []
-
-
-def test_refused_setpoint_was_never_told() -> None:
-    talk = online(request=(SPEED,))
-    talk.commands(0, 0.0, 10.06)
-    talk.commands(0, 10.0, 10.06)
-    refuse(talk, 'C602')
-    talk.until(10.08)
-    talk.bus_down(10.09)
-    assert worries(talk) == []
 
 
 def test_refused_enable_is_written_with_the_next_round() -> None:
@@ -547,26 +469,6 @@ def test_what_arms(what: Parameter, value: float, arms: bool) -> None:
     sent = [text for _, text in talk.until(10.0701)]
     assert not any(text[10:12] in ('2A', 'AA') and text[12:16] == '0100' for text in sent
                    ) or value == 0.1
-
-
-@pytest.mark.parametrize('immediate', [False, True])
-def test_what_was_left_standing_does_not_move_it_when_it_is_enabled(immediate: bool) -> None:
-    talk = online(request=(SPEED,), control=CONTROL, rearm_immediate=immediate)
-    for place in range(10):
-        assert talk.commands(0, 10.0, 10.06 + 0.001 * place) is CommandOutcome.DISABLED
-    assert talk.until(10.0701) == [(10.07, READ_0)]
-    assert talk.hears(ANSWER_0, 10.071) == []
-    assert talk.asks(ControlAction.ENABLE, 10.075) == [STILL_1]
-    assert talk.hears('485#C60200AA00000000', 10.0755) == [ENABLE_0]
-    assert talk.hears(DISABLED_0, 10.076) == []
-    assert talk.commands(0, 10.0, 10.08) is CommandOutcome.DISABLED, 'not seen running yet'
-    assert talk.until(10.0901) == [(10.09, READ_1)]
-    assert talk.hears(RUNS_1, 10.091) == []
-    assert talk.session.state is DriveState.NOT_ARMED
-    assert talk.until(10.1101) == [(10.11, READ_0)], 'no setpoint'
-    assert talk.hears(RUNS_0, 10.111) == []
-    outcome = talk.commands(0, 10.0, 10.12)
-    assert outcome is (CommandOutcome.ARMED if immediate else CommandOutcome.NOT_ARMED)
 
 
 # -- a node in a loop -----------------------------------------------------------------------------

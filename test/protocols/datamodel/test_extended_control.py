@@ -11,7 +11,7 @@ from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, SILENT, TICK, ZEROS,
 )
 import pytest
-from saying import says, status_word
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, FrameRejected, Noted, StationLost
@@ -48,57 +48,6 @@ def at_once(talk: Conversation, now: float, answer: str) -> list[str]:
 # -- in the cyclic request ------------------------------------------------------------------------
 
 
-def test_word_starts_as_disable_and_takes_its_slot() -> None:
-    talk = inside(rearm_immediate=True)
-    assert exchange(talk, 10.02) == NEUTRAL
-    talk.asks(ControlAction.ENABLE, 10.023)
-    exchange(talk, 10.04, READY)
-    exchange(talk, 10.06, ENABLED)
-    talk.commands(0, 100.0, 10.063)
-    assert exchange(talk, 10.08, ENABLED) == '003FFFF0#000103E800000000'
-
-
-def test_commands_before_it_is_enabled_do_not_count() -> None:
-    talk = inside(rearm_immediate=True)
-    assert talk.session.state is DriveState.DISABLED
-    assert talk.commands(0, 100.0, 10.003) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.02, READY) == NEUTRAL
-    talk.asks(ControlAction.ENABLE, 10.023)
-    assert talk.commands(0, 100.0, 10.03) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.04, READY) == '003FFFF0#0001000000000000'
-    # enable was sent, but the drive does not say yet that it is enabled
-    assert talk.commands(0, 100.0, 10.05) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#0001000000000000'
-    assert talk.session.state is DriveState.NOT_ARMED
-    assert exchange(talk, 10.08, ENABLED) == '003FFFF0#0001000000000000'    # nothing was kept
-
-
-@pytest.mark.parametrize('action, word', [
-    (ControlAction.DISABLE, '0000'), (ControlAction.QUICK_STOP, '0002')])
-def test_any_other_word_disarms(action: ControlAction, word: str) -> None:
-    talk = inside(rearm_immediate=True)
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    exchange(talk, 10.04, ENABLED)
-    talk.commands(0, 100.0, 10.05)
-    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#000103E800000000'
-    talk.asks(action, 10.07)
-    assert talk.commands(0, 100.0, 10.071) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.08, ENABLED) == f'003FFFF0#{word}000000000000'
-
-
-def test_stop_brings_the_cycle_forward() -> None:
-    talk = inside(period=0.5)
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.5, READY)
-    exchange(talk, 11.0, ENABLED)
-    talk.asks(ControlAction.DISABLE, 11.003)
-    assert talk.until(11.1) == [(11.005, NEUTRAL)]      # 5 ms after the last one
-    talk.hears(READY, 11.006)
-    assert talk.control_outcomes()[-1] == ('disable', True, 'ready')
-    assert talk.until(11.6) == [(11.505, NEUTRAL)]
-
-
 def test_enable_in_the_cycle() -> None:
     talk = inside()
     assert talk.asks(ControlAction.ENABLE, 10.003) == []
@@ -129,19 +78,6 @@ def test_word_with_its_top_bit_set_in_a_signed_parameter() -> None:
                   table=table)
     talk.asks(ControlAction.ENABLE, 10.003)
     assert exchange(talk, 10.02, READY) == '003FFFF0#8001000000000000'
-
-
-def test_fault_ends_it() -> None:
-    talk = inside()
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    exchange(talk, 10.04, ENABLED)
-    exchange(talk, 10.06, FAULT)
-    assert talk.session.state is DriveState.FAULT
-    assert [note.text for note in talk.events(Noted)] == [
-        says('fault_came', ran=True, status=status_word(0x0008))]
-    assert exchange(talk, 10.08, READY) == NEUTRAL
-    assert exchange(talk, 10.1, READY) == NEUTRAL
 
 
 def test_response_without_its_status_confirms_nothing() -> None:
@@ -183,57 +119,6 @@ def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
     assert cut(talk, 10.18) == NEUTRAL
     assert exchange(talk, 10.2, ENABLED) == NEUTRAL
     assert talk.session.state is DriveState.DISABLED, 'nothing but a new ~/enable starts it'
-
-
-def test_loss_puts_the_word_back() -> None:
-    talk = inside()
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    exchange(talk, 10.04, ENABLED)
-    running = '003FFFF0#0001000000000000'
-    assert [text for _, text in talk.until(10.12 + TICK)] == [
-        running, running, running, NEUTRAL]
-    talk.hears(ENABLED, 10.121)
-    assert exchange(talk, 10.14, ENABLED) == NEUTRAL
-    assert says('enable_withdrawn', reason=SILENT) in [note.text for note in talk.events(Noted)]
-
-
-def test_a_stop_that_was_wanted_is_no_warning() -> None:
-    talk = inside()
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    exchange(talk, 10.04, ENABLED)
-    talk.events()
-    talk.deactivate(10.05)
-    note, = talk.events(Noted)
-    assert note.text == says('enable_withdrawn', reason=says('bridge_inactive'))
-    assert not note.warning
-
-
-def test_time_out_of_a_request() -> None:
-    talk = inside(control_timeout=0.05)
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    exchange(talk, 10.04, READY)
-    assert talk.session.next_timer() == pytest.approx(10.053)
-    assert talk.until(10.054) == []
-    (action, success, text), = talk.control_outcomes()
-    assert (action, success) == ('enable', False)
-    assert text == says('stuck', timeout=0.05, state='ready')
-    assert exchange(talk, 10.06, READY) == NEUTRAL
-
-
-def test_refusals() -> None:
-    plain = online()
-    assert plain.session.services.control_refusal(ControlAction.ENABLE) == (
-        says('no_control_section'))
-    assert plain.control_outcomes() == []
-    talk = Conversation(drive(control=CONTROL))
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'bridge inactive'
-    talk.activate(2.0)
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'bus down'
-    talk.bus_up(3.0)
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == 'drive offline'
 
 
 # -- written --------------------------------------------------------------------------------------
@@ -413,35 +298,6 @@ def test_loss_writes_disable() -> None:
     assert [text for _, text in found if text != ASK_WORD] == (
         [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
     assert talk.events(StationLost) == [StationLost(SILENT)]
-
-
-@pytest.mark.parametrize('mapping', ['assume', 'verify'])
-def test_enabled_drive_that_is_deaf_to_disable(mapping: str) -> None:
-    """It stood at neutral, but enabled, and nothing shows that it has ever been told else."""
-    talk = online(control=CONTROL, mapping=mapping)
-    enable(talk)
-    assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
-    sent = [text for _, text in talk.until(10.2)]
-    assert not talk.session.online
-    assert DISABLE in sent
-    talk.deactivate(10.3)
-    talk.until(11.0)
-    assert talk.session.stopped
-    assert [note.text for note in talk.events(Noted) if note.warning][-1] == says(
-        'may_still_be_running')
-
-
-def test_enabled_drive_that_hears_disable() -> None:
-    talk = beside()
-    enable(talk)
-    assert talk.asks(ControlAction.DISABLE, 10.07) == [DISABLE]
-    talk.until(10.08 + TICK)
-    talk.hears(READY, 10.082)
-    talk.until(10.2)
-    assert not talk.session.online
-    talk.deactivate(10.3)
-    talk.until(11.0)
-    assert says('may_still_be_running') not in [note.text for note in talk.events(Noted)]
 
 
 def test_differing_map_writes_disable() -> None:

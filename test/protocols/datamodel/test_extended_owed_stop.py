@@ -13,8 +13,8 @@ from builders import (
     CONTROL, Conversation, drive, GAIN, LIMIT, parameter, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
-    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, exchange, NEUTRAL, online,
-    REQUEST_MAP, RESPONSE_MAP, TICK,
+    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
+    RESPONSE_MAP, TICK,
 )
 import pytest
 from saying import may_run, says
@@ -82,23 +82,6 @@ def test_stop_under_way_is_not_begun_anew() -> None:
     assert talk.hears(LIMIT_IS_ZERO, 12.062) == [ASK_REQUEST_MAP]
 
 
-def test_stop_right_after_a_stall_that_nobody_confirms() -> None:
-    talk = running()
-    talk.time_lost(12.0)
-    talk.deactivate(12.0001)
-    talk.until(12.0 + talk.session.longest_stop)
-    assert talk.session.stopped
-    assert warnings(talk) == [UNHEARD]
-
-
-def test_drive_that_was_only_told_neutral_is_not_written_to_after_a_stall() -> None:
-    talk = online()
-    assert talk.time_lost(12.0) == [ASK_REQUEST_MAP]
-    assert talk.deactivate(12.0001) == []
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
 def test_stall_with_assumed_maps_needs_no_writes() -> None:
     talk = running(mapping='assume')
     assert talk.time_lost(12.0) == []
@@ -138,37 +121,6 @@ def test_stop_while_the_maps_are_read_again() -> None:
     assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
     assert talk.deactivate(12.05) == []     # it has confirmed to stand still
     assert talk.session.stopped
-
-
-def test_stop_while_nobody_answers_after_the_bus_came_back() -> None:
-    talk = running()
-    talk.bus_down(10.03)
-    talk.bus_up(12.0)
-    talk.until(12.35)
-    assert warnings(talk)[-1] == says('may_still_be_running')
-    assert talk.deactivate(12.4) == [SPEED_ZERO]    # still owed
-    talk.until(14.0)
-    assert talk.session.stopped
-    assert warnings(talk) == [UNHEARD]
-
-
-def test_end_while_the_bus_is_lost() -> None:
-    talk = running()
-    talk.bus_down(10.03)
-    talk.events()
-    assert talk.deactivate(10.1) == []
-    assert talk.session.stopped
-    assert warnings(talk) == [may_run('stop_not_possible')]
-
-
-def test_bus_that_goes_during_the_stop() -> None:
-    talk = running()
-    talk.time_lost(12.0)
-    talk.deactivate(12.0001)
-    talk.events()
-    talk.bus_down(12.0002)
-    assert talk.session.stopped
-    assert warnings(talk) == [may_run('bus_lost_before_stop')]
 
 
 # -- the maps differ ------------------------------------------------------------------------------
@@ -403,101 +355,11 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     assert talk.session.state is DriveState.MAPPING_DIFFERS
 
 
-def test_end_while_a_drive_that_ran_is_lost() -> None:
-    """Its neutral cycles were heard by nobody: the cable may be in its place again any time."""
-    talk = running()
-    last = [text for _, text in talk.until(12.0)]
-    assert last.count(NEUTRAL) == 3
-    assert not talk.session.online
-    talk.events()
-    sent = talk.deactivate(12.05)
-    sent += [text for _, text in talk.until(13.0)]
-    assert SPEED_ZERO in sent and LIMIT_ZERO in sent    # no map can misroute these
-    assert talk.session.stopped
-    assert warnings(talk)[-1] == says('may_still_be_running')
-
-
-def test_end_while_maps_differ_and_the_stop_is_not_confirmed() -> None:
-    talk = running()
-    look(talk)
-    talk.hears(OTHER_REQUEST, 11.003)
-    talk.deactivate(11.0035)
-    assert not talk.session.stopped
-    talk.until(12.0)
-    assert talk.session.stopped
-    assert warnings(talk)[-1] == says('may_still_be_running')
-
-
 # -- frames that the bus refuses ------------------------------------------------------------------
 
 
 def everything(text: str) -> bool:
     return True
-
-
-def test_stop_frames_that_are_refused_are_no_stop() -> None:
-    talk = running()
-    talk.refusing = everything
-    talk.deactivate(10.03)
-    assert talk.until(11.0) == []
-    assert not talk.session.stopped
-    talk.session.give_up(11.0)
-    assert talk.session.stopped
-    assert warnings(talk) == [may_run('stop_not_possible')]
-
-
-def test_stop_goes_on_until_three_frames_were_taken() -> None:
-    talk = running()
-    talk.refusing = everything
-    talk.deactivate(10.03)
-    talk.until(10.09)
-    talk.refusing = lambda text: False
-    assert exchange(talk, 10.1) == NEUTRAL
-    assert [text for _, text in talk.until(10.5)] == [NEUTRAL] * 2
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
-@pytest.mark.parametrize('mapping', ['verify', 'assume'])
-def test_drive_that_falls_silent_together_with_the_stop(mapping: str) -> None:
-    talk = running(mapping=mapping)
-    talk.deactivate(10.03)
-    sent = talk.until(10.4)
-    assert [text for _, text in sent] == [NEUTRAL] * 6
-    assert talk.session.stopped
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
-
-
-@pytest.mark.parametrize('mapping', ['verify', 'assume'])
-def test_drive_that_answers_the_last_cycle_of_a_stop(mapping: str) -> None:
-    talk = running(mapping=mapping)
-    talk.deactivate(10.03)
-    sent = talk.until(10.12)
-    assert [text for _, text in sent] == [NEUTRAL] * 3
-    assert not talk.session.stopped, 'its answer is waited for'
-    assert talk.hears(ANSWER, 10.13) == []
-    assert talk.session.stopped
-    assert not talk.session.online
-    assert talk.until(11.0) == []
-    assert warnings(talk) == []
-
-
-def test_nothing_is_doubted_of_a_drive_that_stands_still_when_the_bus_goes() -> None:
-    talk = running()
-    talk.commands(0, 0.0, 10.03)
-    assert exchange(talk, 10.04) == NEUTRAL
-    talk.bus_down(10.05)
-    assert warnings(talk) == []
-
-
-def test_second_end_while_the_last_answer_is_waited_for() -> None:
-    talk = running()
-    talk.deactivate(10.03)
-    talk.until(10.12)
-    talk.deactivate(10.13)
-    assert [text for _, text in talk.until(11.0)] == [NEUTRAL] * 6
-    assert talk.session.stopped
-    assert warnings(talk) == [says('may_still_be_running', why=says('stop_not_answered'))]
 
 
 def test_stop_of_a_lost_drive_counts_frames_that_were_taken() -> None:
@@ -536,13 +398,6 @@ def test_written_disable_that_was_refused_is_written_again(
     assert '00300341#0000000000000000' in [text for _, text in talk.until(10.09)]
 
 
-def test_unacknowledged_write_that_was_refused_was_not_sent() -> None:
-    talk = online(verify_writes=False)
-    talk.refusing = lambda text: text.startswith('00300281')
-    talk.submits(write((GAIN, 7)), 10.003)
-    assert talk.outcomes() == [[says('not_sent')]]
-
-
 def test_many_writes_that_are_refused_end_with_the_first() -> None:
     talk = online(verify_writes=False)
     refused: list[str] = []
@@ -560,14 +415,6 @@ def test_many_writes_that_are_refused_end_with_the_first() -> None:
 # -- what the drive is not told again -------------------------------------------------------------
 
 
-def test_new_activation_owes_nothing() -> None:
-    talk = running()
-    talk.bus_down(10.03)
-    talk.deactivate(10.04)
-    talk.bus_up(11.0)
-    assert talk.activate(12.0) == [ASK_REQUEST_MAP]
-
-
 def test_neutral_by_command_is_a_stop() -> None:
     talk = running()
     talk.commands(0, 0.0, 10.03)
@@ -575,14 +422,7 @@ def test_neutral_by_command_is_a_stop() -> None:
     assert talk.time_lost(12.0) == [ASK_REQUEST_MAP]
 
 
-def test_cycling_that_begins_again_makes_writes_needless() -> None:
-    talk = cycling()
-    assert talk.at(10.0) == [NEUTRAL]
-    assert not talk.session.duty.owed
-
-
 # -- the drive falls silent -----------------------------------------------------------------------
-
 
 
 def left_alone() -> Conversation:

@@ -7,9 +7,7 @@ from builders import (
     CONTROL, Conversation, CURRENT, drive, GAIN, parameter, RAMP, read, SPEED, STATUS, TABLE, WORD,
     write,
 )
-from extended_builders import (
-    ANSWER, ASK_REQUEST_MAP, checked, cycling, exchange, NEUTRAL, online, TICK,
-)
+from extended_builders import ANSWER, ASK_REQUEST_MAP, cycling, exchange, NEUTRAL, online, TICK
 import pytest
 from saying import may_run, says
 
@@ -17,7 +15,6 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
 
 DISABLE = '00300341#0000000000000000'
-ENABLE = '00300341#0001000000000000'
 ASK_WORD = '00200341#0000000000000000'
 #: an EEPROM cell is the default where the profile does not say
 SLOW_WORD = parameter('control_word', 52)
@@ -62,29 +59,6 @@ def test_answer_to_the_last_cycle_is_no_surprise() -> None:
     assert len(talk.events(FrameRejected)) == 1
 
 
-def test_stop_does_not_depend_on_answers() -> None:
-    talk = online()
-    talk.deactivate(10.01)
-    assert talk.until(11.0) == [(10.02, NEUTRAL), (10.04, NEUTRAL), (10.06, NEUTRAL)]
-    silent(talk, 11.0)
-
-
-def test_commands_are_not_taken_while_stopping() -> None:
-    talk = online(rearm_immediate=True)
-    talk.deactivate(10.01)
-    assert talk.commands(0, 100.0, 10.011).value == 'not armed'
-    assert exchange(talk, 10.02) == NEUTRAL
-    assert talk.commands(0, 100.0, 10.023).value == 'not armed'
-    assert exchange(talk, 10.04) == NEUTRAL
-
-
-def test_long_periods_do_not_make_the_stop_long() -> None:
-    talk = online(period=5.0)
-    talk.deactivate(11.0)
-    assert talk.until(12.0) == [(11.0, NEUTRAL), (11.1, NEUTRAL), (11.2, NEUTRAL)]
-    silent(talk, 12.0)
-
-
 @pytest.mark.parametrize('asked, first', [(10.01, 10.01), (10.003, 10.005), (14.98, 14.98)])
 def test_first_neutral_cycle_is_brought_forward(asked: float, first: float) -> None:
     # not under 5 ms after the last one
@@ -120,26 +94,6 @@ def test_stop_while_the_drive_is_being_left() -> None:
     silent(talk, 11.0)
 
 
-def test_deactivated_twice() -> None:
-    talk = online()
-    talk.deactivate(10.01)
-    talk.until(10.02 + TICK)
-    talk.deactivate(10.03)
-    assert talk.until(11.0) == [(10.04, NEUTRAL), (10.06, NEUTRAL), (10.08, NEUTRAL)]
-    assert talk.deactivate(12.0) == []
-    silent(talk, 12.0)
-
-
-def test_bus_that_goes_while_stopping() -> None:
-    talk = online()
-    talk.deactivate(10.01)
-    talk.until(10.02 + TICK)
-    talk.bus_down(10.03)
-    silent(talk, 10.04)
-    assert talk.bus_up(10.05) == []
-    silent(talk, 10.06)
-
-
 def test_no_look_at_the_maps_while_stopping() -> None:
     talk = online(period=0.1)
     for cycle in range(1, 10):
@@ -169,14 +123,6 @@ def test_acyclic_frames_end_with_the_stop() -> None:
     talk.submits(read(GAIN), 10.003)
     talk.deactivate(10.004)
     assert {text for _, text in talk.until(11.0)} == {NEUTRAL}
-
-
-def test_time_lost_while_stopping_goes_on_stopping() -> None:
-    talk = online()
-    talk.deactivate(10.01)
-    assert talk.time_lost(15.0) == []
-    assert [text for _, text in talk.until(16.0)] == [NEUTRAL] * 3
-    silent(talk, 16.0)
 
 
 # -- with a control word --------------------------------------------------------------------------
@@ -364,16 +310,3 @@ def test_status_without_slot_is_read_after_the_last_cycle(
     silent(talk, 10.17)
     assert talk.session.control is not None
     assert (talk.session.control.state, talk.session.control.off) == (state, off)
-
-
-def test_nothing_is_left_of_an_enabled_drive_after_a_restart() -> None:
-    talk = enabled()
-    talk.deactivate(12.0)
-    talk.until(13.0)
-    talk.activate(14.0)
-    checked(talk, 14.0)
-    talk.until(14.002)
-    assert talk.hears(ANSWER, 14.004) == [DISABLE]
-    assert talk.control_outcomes() == []
-    assert talk.session.control is not None
-    assert talk.session.control.word == 0

@@ -19,7 +19,7 @@ from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
 #: where the round reads, and where users read
 POLLED = tuple(parameter(f'polled_{number}', number, access=RO) for number in (200, 201, 210, 300))
 ASKED = tuple(parameter(f'asked_{number}', number, access=RW) for number in range(20, 60, 3))
-READS = 10_000
+READS = 5_000
 
 
 class LateDrive:

@@ -15,8 +15,9 @@ from standard_builders import (
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
-    AnswerLate, DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived,
-    SetpointsExpired, StationFound, StationLost)
+    AnswerLate, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound,
+    StationLost,
+)
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
@@ -235,11 +236,6 @@ def test_unchanged_setpoints_are_refreshed() -> None:
     assert refreshed == [(26, SPEED_ZERO), (26, LIMIT_ZERO), (51, SPEED_ZERO), (52, LIMIT_ZERO)]
 
 
-def test_without_refresh_interval_only_changes_are_written() -> None:
-    talk = online(refresh_interval=0.0)
-    assert [round_of(talk, 10.0 + 0.02 * cycle) for cycle in range(1, 100)] == [[]] * 99
-
-
 def test_setpoints_go_out_while_a_read_is_unanswered() -> None:
     talk = online(rearm_immediate=True)
     assert talk.until(10.0205) == [(10.02, ASK)]
@@ -251,16 +247,6 @@ def test_setpoints_go_out_while_a_read_is_unanswered() -> None:
     talk.until(10.13)
     talk.commands(0, 170.0, 10.13)
     assert talk.until(10.15) == [(10.14, '3F1#063200A406000000')]
-
-
-def test_a_command_that_nobody_repeats_expires() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.1)
-    talk.commands(0, 150.0, 10.01)
-    assert round_of(talk, 10.02) == ['3F1#063200DC05000000']
-    for cycle in range(2, 6):
-        assert round_of(talk, 10.0 + 0.02 * cycle) == []
-    assert round_of(talk, 10.12) == [SPEED_ZERO]
-    assert talk.events(SetpointsExpired) == [SetpointsExpired(('speed_setpoint',))]
 
 
 def test_setpoints_of_unknown_storage_know_no_eeprom_pause() -> None:
@@ -537,40 +523,6 @@ def test_a_stop_that_does_not_take_is_repeated_and_told() -> None:
         says('write_read_back', what='speed_setpoint (P50)', found=1500, wanted=0)])]
 
 
-def test_a_stop_that_nobody_answers_ends_and_is_told() -> None:
-    talk = moving()
-    sent = talk.deactivate(10.03)
-    sent += [text for _, text in talk.until(10.03 + talk.session.longest_stop)]
-    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3
-    assert talk.session.stopped
-    assert warnings(talk) == [UNHEARD]
-
-
-def test_nobody_is_warned_of_a_drive_that_was_never_told_to_run() -> None:
-    talk = online()
-    talk.deactivate(10.03)
-    talk.until(11.0)
-    assert talk.session.stopped
-    assert warnings(talk) == []
-
-
-def test_a_bus_that_comes_back_stops_what_was_running() -> None:
-    talk = moving()
-    assert talk.bus_down(10.03) == []
-    assert warnings(talk) == [may_run('bus_lost_before_stop')]
-    assert talk.bus_up(12.0) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(12.0025)] == [LIMIT_ZERO, ASK_SPEED]
-
-
-def test_the_end_while_the_bus_is_lost_is_told() -> None:
-    talk = moving()
-    talk.bus_down(10.03)
-    talk.events()
-    assert talk.deactivate(10.04) == []
-    assert talk.session.stopped
-    assert warnings(talk) == [may_run('stop_not_possible')]
-
-
 def test_a_stop_while_the_stop_after_a_stall_is_under_way() -> None:
     talk = moving()
     assert talk.time_lost(12.0) == [SPEED_ZERO]
@@ -602,32 +554,11 @@ def test_a_setpoint_that_the_bus_refused_is_written_again() -> None:
     assert round_of(talk, 10.08) == []
 
 
-def test_unacknowledged_write_that_the_bus_refused_was_not_sent() -> None:
-    talk = online(verify_writes=False)
-    talk.refusing = lambda text: text.startswith('3F1#0628')
-    talk.submits(write((GAIN, 7), (DAMPING, 8)), 10.005)
-    talk.until(10.01)
-    assert talk.outcomes() == [[says('not_sent')] * 2]
-
-
 def test_a_drive_that_never_answered_gets_nothing_at_the_stop() -> None:
     talk = polling()
     assert talk.deactivate(10.05) == []
     assert talk.session.stopped
     assert talk.until(11.0) == []
-
-
-def test_a_process_that_stood_still_sends_nothing_stale() -> None:
-    talk = online(rearm_immediate=True)
-    talk.commands(0, 150.0, 10.01)
-    assert talk.until(10.0225)[-1] == (10.021, ASK)
-    assert talk.time_lost(15.0) == [SPEED_ZERO]
-    # the answer to the last read lay in a buffer all the while
-    talk.hears(ANSWER, 15.0)
-    assert talk.events(ProcessDataReceived) == []
-    sent = [text for _, text in talk.until(15.1)]
-    assert '3F1#063200DC05000000' not in sent
-    assert sent[0] == LIMIT_ZERO
 
 
 def test_a_parameter_that_nobody_has_is_named() -> None:
@@ -706,14 +637,6 @@ def test_a_word_of_which_no_notice_is_taken_is_written_again() -> None:
         talk.hears(ENABLED, 10.044 + 0.02 * beat)
     assert again == [10.26, 10.68]
     assert DISABLE_WORD in talk.asks(ControlAction.DISABLE, 12.05), 'at once for who asks again'
-
-
-def test_a_fault_puts_the_word_back() -> None:
-    talk = enabled()
-    talk.until(10.0605)
-    talk.hears(FAULT, 10.062)
-    assert talk.session.state is DriveState.FAULT
-    assert talk.until(10.07) == [(10.063, DISABLE_WORD)]
 
 
 def test_enable_with_the_word_by_hand() -> None:
@@ -797,15 +720,6 @@ def test_nothing_is_left_of_a_pulse_that_the_bus_cut_short() -> None:
     assert talk.at(10.2) == []
 
 
-def test_the_stop_disables() -> None:
-    talk = enabled()
-    assert talk.deactivate(10.05) == [DISABLE_WORD]
-    sent = [text for _, text in talk.until(11.0)]
-    assert sent[:2] == [SPEED_ZERO, '3F1#0334000100000000']
-    assert sent.count(SPEED_ZERO) == 3
-    assert talk.session.stopped
-
-
 @pytest.mark.parametrize('answer, state, off', [
     ('7F1#0300000000000000', 'enabled', False), ('7F1#0100000000000000', 'ready', True),
     ('', 'enabled', False)])
@@ -827,43 +741,6 @@ def test_stop_ends_with_a_look_at_the_status(answer: str, state: str, off: bool)
     assert talk.session.control is not None
     assert (talk.session.control.state, talk.session.control.off) == (state, off)
     assert warnings(talk) == []
-
-
-def test_commands_are_taken_while_it_is_enabled_only() -> None:
-    talk = controlled(rearm_immediate=True)
-    assert talk.session.state is DriveState.DISABLED
-    assert talk.commands(0, 150.0, 10.005) is CommandOutcome.DISABLED
-    talk.asks(ControlAction.ENABLE, 10.01)
-    assert talk.commands(0, 150.0, 10.011) is CommandOutcome.DISABLED
-    round_of(talk, 10.02, READY)
-    assert ENABLE_WORD in [text for _, text in talk.until(10.03)]
-    assert talk.commands(0, 150.0, 10.031) is CommandOutcome.DISABLED
-    round_of(talk, 10.04, ENABLED)
-    assert talk.session.state is DriveState.NOT_ARMED
-    assert talk.commands(0, 150.0, 10.045) is CommandOutcome.ARMED
-    assert '3F1#063200DC05000000' in round_of(talk, 10.06, ENABLED)
-    talk.asks(ControlAction.DISABLE, 10.065)
-    assert talk.commands(0, 150.0, 10.066) is CommandOutcome.DISABLED
-    assert SPEED_ZERO in round_of(talk, 10.08, ENABLED)
-
-
-@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
-@pytest.mark.parametrize('request_', [(SPEED, WORD), (SPEED,)])
-def test_setpoints_stop_with_the_word(request_: tuple[Parameter, ...],
-                                      action: ControlAction) -> None:
-    talk = polling(request=request_, control=CONTROL, period=1.0, control_timeout=5.0,
-                   command_timeout=0.0, refresh_interval=60.0, rearm_immediate=True)
-    talk.hears(READY, 10.002)
-    talk.until(10.9)
-    talk.asks(ControlAction.ENABLE, 10.95)
-    round_of(talk, 11.0, READY)
-    talk.until(11.9)
-    round_of(talk, 12.0, ENABLED)
-    talk.commands(0, 150.0, 12.1)
-    assert '3F1#063200DC05000000' in round_of(talk, 13.0, ENABLED)
-    stop, = talk.asks(action, 13.1)
-    assert stop.startswith('3F1#063400')
-    assert SPEED_ZERO in [text for _, text in talk.until(13.15)]
 
 
 def test_enable_is_not_repeated_before_the_status_was_read() -> None:
