@@ -14,8 +14,7 @@ from saying import may_run, says
 from test_contract import Partner, PARTNERS, worries
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.drive_state import DriveState
-from drive_can_bridge.core.events import Noted, StationLost
+from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 WORDLESS = [name for name, partner in sorted(PARTNERS.items()) if not partner.words]

@@ -216,8 +216,8 @@ def test_table_of_codes() -> None:
     (11, 'word value too low'), (12, 'byte value too high'), (13, 'byte value too low'),
     (16, 'invalid value'), (20, 'bad answer'), (0xFF, 'unknown')])
 def test_small_numbers_are_those_of_the_profibus_variant(code: int, meaning: str) -> None:
-    assert meaning in refusals.describe(code)
-    assert 'no SDO abort code' in refusals.describe(code)
+    assert meaning in pkw.describe(code)
+    assert 'no SDO abort code' in pkw.describe(code)
 
 
 # -- registers as objects -------------------------------------------------------------------------

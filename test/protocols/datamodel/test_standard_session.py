@@ -15,8 +15,8 @@ from standard_builders import (
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
-    AnswerLate, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound,
-    StationLost,
+    AnswerLate, DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived,
+    StationFound, StationLost,
 )
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
