@@ -33,6 +33,8 @@ TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32
 VELOCITY = parameter('actual_velocity', None, index=0x606C, subindex=0, type=INT32, access=RO,
                      unit='rpm')
 POSITION = parameter('position', None, index=0x6064, subindex=0, type=INT32, access=RO)
+TURNS = parameter('motor_turns', None, index=0x6091, subindex=1, type=ParameterType.UINT32)
+ACCELERATION = parameter('acceleration', None, index=0x6083, type=ParameterType.UINT32)
 
 STATUS = parameter('system_status', 455, access=RO, bits=(('ready', 0), ('on', 1)))
 CURRENT = parameter('average_current', 500, type=ParameterType.UINT32, scale=0.01, unit='A',
@@ -49,7 +51,8 @@ def inverter(name: str = 'mixer', station: int = 100, **options: Any) -> DriveCo
 def axis(**options: Any) -> DriveConfiguration:
     keys = {'response': (VELOCITY,), 'period': 0.01, 'mode': 'csv', **options}
     return drive('cia402', name='axis', station=4, parameter_timeout=0.1,
-                 table=(TARGET, VELOCITY, POSITION), request=(TARGET,), **keys)
+                 table=(TARGET, VELOCITY, POSITION, TURNS, ACCELERATION),
+                 request=(TARGET,), **keys)
 
 
 def starter(*response: Any, **options: Any) -> DriveConfiguration:
