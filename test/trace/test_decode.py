@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is understood of frames, in lines of text (decode.yaml)."""
 
+import gc
 from typing import Any
 
 from builders import drive, INT16, INT32, parameter, RO
@@ -11,7 +12,7 @@ from transcripts import replayed, stories
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Record, RecordKind
-from drive_can_bridge.core.parameters import ParameterType, Storage
+from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.protocols.observer import Verdict
 from drive_can_bridge.trace.sinks import Only
@@ -32,6 +33,8 @@ TARGET = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT32
 VELOCITY = parameter('actual_velocity', None, index=0x606C, subindex=0, type=INT32, access=RO,
                      unit='rpm')
 POSITION = parameter('position', None, index=0x6064, subindex=0, type=INT32, access=RO)
+TURNS = parameter('motor_turns', None, index=0x6091, subindex=1, type=ParameterType.UINT32)
+ACCELERATION = parameter('acceleration', None, index=0x6083, type=ParameterType.UINT32)
 
 STATUS = parameter('system_status', 455, access=RO, bits=(('ready', 0), ('on', 1)))
 CURRENT = parameter('average_current', 500, type=ParameterType.UINT32, scale=0.01, unit='A',
@@ -48,7 +51,8 @@ def inverter(name: str = 'mixer', station: int = 100, **options: Any) -> DriveCo
 def axis(**options: Any) -> DriveConfiguration:
     keys = {'response': (VELOCITY,), 'period': 0.01, 'mode': 'csv', **options}
     return drive('cia402', name='axis', station=4, parameter_timeout=0.1,
-                 table=(TARGET, VELOCITY, POSITION), request=(TARGET,), **keys)
+                 table=(TARGET, VELOCITY, POSITION, TURNS, ACCELERATION),
+                 request=(TARGET,), **keys)
 
 
 def starter(*response: Any, **options: Any) -> DriveConfiguration:
@@ -108,6 +112,23 @@ class Story:
 @pytest.mark.parametrize('story', STORIES)
 def test_lines(story: str) -> None:
     assert replayed(STORIES[story], Story().step) == STORIES[story]
+
+
+def test_a_raw_address_is_forgotten_with_its_telegram() -> None:
+    witness = Witness(DRIVES['pump'])
+
+    def read(*registers: int) -> int:
+        """Return how many parameters there are after that."""
+        for register in registers:
+            toggle = register % 2 << 7
+            place = register.to_bytes(2, 'little').hex().upper()
+            (line,) = witness.hears(f'505#{place}00{toggle | 0x25:02X}00000000', 0.01)
+            assert line.endswith(f'read: p{register}')
+            witness.hears(f'485#{place}00{toggle | 0x25:02X}01000000', 0.005)
+        witness.telegrams.clear()
+        gc.collect()
+        return sum(isinstance(each, Parameter) for each in gc.get_objects())
+    assert read(*range(9000, 9010)) == read(*range(9010, 9100))
 
 
 def test_what_is_remembered_of_tasks_has_an_end_but_for_those_under_way() -> None:
