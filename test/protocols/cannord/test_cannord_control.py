@@ -103,14 +103,6 @@ def test_quick_stop_holds_its_word_until_the_drive_stands() -> None:
     assert talk.control_outcomes() == [('enable', True, 'operation enabled')]
 
 
-def test_quick_stop_while_disabled_succeeds() -> None:
-    talk = online()
-    exchange(talk, 10.02)
-    talk.asks(QUICK_STOP, 10.03)
-    assert talk.control_outcomes() == [('quick_stop', True, STANDING)]
-    assert words(talk, 10.04, READY) == ['7E04']
-
-
 def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     talk = running()
     talk.hears(FAULT, 10.065)
@@ -122,14 +114,6 @@ def test_a_fault_told_unasked_disables_with_the_next_frame() -> None:
     assert talk.control_outcomes() == [('enable', False, says('reset_first'))]
 
 
-def test_a_fault_ends_an_enable() -> None:
-    talk = online()
-    talk.asks(ENABLE, 10.003)
-    assert words(talk, 10.02, READY, FAULT, FAULT) == ['7F04', '7F04', '7E04']
-    assert talk.control_outcomes() == [
-        ('enable', False, says('fault_while_enabling', status=status_word(0x0B38)))]
-
-
 def test_reset_is_a_rising_edge() -> None:
     talk = online(FAULT)
     talk.asks(RESET_FAULT, 10.003)
@@ -138,20 +122,6 @@ def test_reset_is_a_rising_edge() -> None:
     assert words(talk, 10.08, DISABLED, READY) == ['7E04', '7E04']
     assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
     assert talk.session.state is not DriveState.FAULT
-
-
-def test_reset_while_the_cause_is_there() -> None:
-    talk = online(FAULT, control_timeout=0.1)
-    talk.asks(RESET_FAULT, 10.003)
-    assert words(talk, 10.02, FAULT, FAULT, FAULT, FAULT) == ['FE04', 'FE04', 'FE04', '7E04']
-    assert talk.until(10.104)[0][1] == '002#7E040000'
-    assert talk.control_outcomes() == [
-        ('reset_fault', False, says('fault_present', status=status_word(0x0B38), timeout=0.1))]
-    assert words(talk, 10.12, FAULT) == ['7E04']
-    talk.asks(RESET_FAULT, 10.13)      # with an edge of its own
-    assert words(talk, 10.14, FAULT, DISABLED, DISABLED, DISABLED) == [
-        'FE04', 'FE04', 'FE04', '7E04']
-    assert talk.control_outcomes() == [('reset_fault', True, 'switch-on disabled')]
 
 
 def test_reset_waits_for_the_end_of_the_fault_reaction() -> None:
@@ -172,13 +142,6 @@ def test_reset_pulse_hurries_where_the_period_is_long() -> None:
     assert times == pytest.approx([10.5, 10.6, 10.7, 10.705])
 
 
-def test_reset_without_a_fault_succeeds() -> None:
-    talk = running()
-    talk.asks(RESET_FAULT, 10.07)
-    assert talk.control_outcomes() == [('reset_fault', True, 'operation enabled')]
-    assert words(talk, 10.08, RUNNING) == ['7F04']
-
-
 @pytest.mark.parametrize(('status', 'state'), [(BRAKING, 'quick stop'), (NOT_READY, 'not ready')])
 def test_a_drive_that_drops_out_by_itself_is_not_started_again(status: str, state: str) -> None:
     talk = running()
@@ -188,14 +151,6 @@ def test_a_drive_that_drops_out_by_itself_is_not_started_again(status: str, stat
     assert words(talk, 10.12, status) == ['7E04']
     assert talk.session.control is not None
     assert talk.session.control.state == state
-
-
-def test_silence_withdraws_the_enable() -> None:
-    talk = running()
-    assert [text[4:8] for _, text in talk.until(10.121)] == ['7F04'] * 3
-    assert [text[4:8] for _, text in talk.until(10.161)] == ['7E04'] * 2
-    talk.hears(RUNNING, 10.162)
-    assert words(talk, 10.18, RUNNING) == ['7E04']
 
 
 def test_parameter_set_is_in_every_word() -> None:

@@ -360,13 +360,3 @@ def test_activation_during_the_stop() -> None:
     assert answered(talk, talk.at(10.121), 10.121) == ['C60200000000']
     assert talk.session.online
     assert not talk.session.stopped
-
-
-def test_lost_time_means_neutral() -> None:
-    talk = armed(command_timeout=0.0)
-    cycle(talk, 10.07)
-    assert talk.time_lost(15.0) == [START, STILL_1]
-    assert talk.events(StationLost) == [StationLost(says('bridge_stood_still'))]
-    assert talk.hears('485#C60200AA00000000', 15.001) == []
-    assert answered(talk, talk.at(15.05), 15.05) == ['C60200000000']
-    assert talk.session.state is DriveState.NOT_ARMED

@@ -76,16 +76,6 @@ def test_nobody_answers_after_the_bus_came_back() -> None:
         says('write_not_acknowledged', what='control_register_1 0000h', attempts=3)])]
 
 
-def test_bus_that_comes_back_stops_setpoints_without_control_too() -> None:
-    talk = online(request=(SPEED,), command_timeout=0.0)
-    talk.commands(0, 0.0, 10.06)
-    talk.commands(0, 10.0, 10.06)
-    assert talk.at(10.07) == [SPEED_1]
-    assert talk.bus_down(10.075) == []
-    assert len(worries(talk)) == 1, 'sent, if not answered'
-    assert talk.bus_up(12.0) == [START, STILL_0]
-
-
 def test_slow_device_after_the_bus_came_back() -> None:
     """It answers after 0.3 s: that is too late for the attempts in between, not for the last."""
     talk = running()

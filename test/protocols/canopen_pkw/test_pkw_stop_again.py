@@ -206,14 +206,6 @@ def test_services_refuse_while_it_is_offline() -> None:
         assert talk.session.services.control_refusal(action) == 'drive offline'
 
 
-def test_complete_round_finds_it_as_ever() -> None:
-    """One read a round: what answers that is online, and gets the word with everything else."""
-    talk = silent(running(), 14.0)
-    sent = talk.served(14.5, well)
-    assert talk.session.online
-    assert len(stops(sent)) == 1
-
-
 def test_restart_has_it_told_once() -> None:
     talk = silent(running(), 14.0)
     sent = [(14.001, text) for text in talk.hears(BOOT_UP, 14.001)] + talk.until(17.0)

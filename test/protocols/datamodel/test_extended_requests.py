@@ -197,16 +197,6 @@ def test_write_that_is_not_read_back() -> None:
     assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]
 
 
-def test_write_to_an_offline_drive() -> None:
-    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    talk.at(10.0)
-    assert talk.submits(write((GAIN, 7), (DAMPING, 8)), 16.0) == ['00300281#0007000000000000']
-    assert [text for _, text in talk.until(16.2)] == [ASK_GAIN]
-    assert talk.outcomes() == [[says('no_answer_offline')] * 2]
-
-
 def test_writes_without_verification() -> None:
     talk = quiet(verify_writes=False)
     note = 'sent; this protocol does not acknowledge writes'

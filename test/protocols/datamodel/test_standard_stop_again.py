@@ -116,12 +116,3 @@ def test_a_control_word_that_wears_an_eeprom_is_told_less_and_less_often() -> No
                     if text == DISABLE])
     gaps = [round(later - sooner) for sooner, later in zip(begun, begun[1:])]
     assert gaps == [3, 5, 9, 17], gaps
-
-
-
-def test_a_complete_round_finds_it_as_ever() -> None:
-    talk = lost(request=(SPEED, LIMIT))
-    sent = talk.served(13.0, lambda text: well(1).get(text) or half(text))
-    assert talk.session.online
-    assert talk.session.duty.owed is False
-    assert sent
