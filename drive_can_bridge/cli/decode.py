@@ -121,14 +121,14 @@ def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack
     endings: list[Callable[[], None]] = []
     selection = Selection(args.drive, args.only)
     drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
-    if args.csv is not None:
-        stream = stack.enter_context(open_text(args.csv, newline=''))
-        sinks.append(TableWriter(stream, drives))
-    if args.plot:
+    if args.plot:       # refuses unknown names, so before a file is replaced
         picture, *wanted = args.plot
         plotter = Plotter(configuration, wanted)
         sinks.append(plotter)
         endings.append(lambda: _draw(plotter, picture))
+    if args.csv is not None:
+        stream = stack.enter_context(open_text(args.csv, newline=''))
+        sinks.append(TableWriter(stream, drives))
     if not (sinks or args.summary):
         write = _flushed if args.live else sys.stdout.write
         sinks.append(LineWriter(write, selection, as_json=args.json))

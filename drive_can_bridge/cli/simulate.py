@@ -27,6 +27,7 @@ from drive_can_bridge.simulation.faults import Fault, parse_fault, usage_lines
 from drive_can_bridge.simulation.registers import Mechanics
 from drive_can_bridge.simulation.simulation import PlayedDrive, Say, ShowFrame, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
+from drive_can_bridge.transport.adapters import check_interface
 
 _CHUNK = 4096
 _LINE_MAX = 1000
@@ -176,6 +177,9 @@ def run(args: argparse.Namespace) -> int:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
             raise WrongUsage('--pty and --interface/--channel exclude each other')
+        unusable = check_interface(args.interface) if args.interface else None
+        if unusable is not None:    # before the bus is announced
+            raise BusMisconfigured(f'--interface: {unusable}')
         # imported late: it reads schemas, and --help needs none
         from drive_can_bridge.configuration.load import configuration_from_file
         configuration = _on_buses(configuration_from_file(args.params_file), args.interface,

@@ -169,7 +169,8 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
     (('--bitrate', '99'), 2, '--bitrate: 99: allowed are 1000 to 8000000 bit/s, also as 500k; '
                              'see drive_can simulate --help'),
     (('--axis', 'lift:load=2'), 2, "'load=2' is not possible; allowed: load=0…1"),
-    (('--interface', 'nonsense'), 1, 'nonsense'),
+    (('--interface', 'nonsense'), 1,
+     "drive_can simulate: --interface: 'nonsense' is no interface of python-can, allowed: "),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),
     (('--params-file', '/nowhere.yaml'), 1, 'drive_can simulate: /nowhere.yaml: No such file'),
     (('--params-file', '/dev/null'), 1, 'drive_can simulate: /dev/null: not a regular file'),
