@@ -194,7 +194,7 @@ def test_a_full_disk_is_told_with_the_name_of_the_file(suffix: str, tmp_path: Pa
 #: sqlite takes a limit of the process for a full disk
 FULL = """
 import pathlib, resource, sys, time
-from drive_can_bridge.core.record import Record
+from drive_can_bridge.core.frame import Record
 from drive_can_bridge.trace.files import TraceWriter
 path, looking = pathlib.Path(sys.argv[1]), sys.argv[2] == 'looking'
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
