@@ -92,12 +92,19 @@ def serve(commands: dict[str, Callable[..., Any]], ready: Any = True, *,
     """
     Be the far end: obey until the standard input ends, and then end the process.
 
-    It does not take Python's way out, on which the middleware finds its threads still running.
+    The answers have standard output for themselves: what the middleware writes there goes where
+    errors go. It does not take Python's way out, on which the middleware finds its threads still
+    running.
     """
-    print(json.dumps(ready), flush=True)
+    answers = os.fdopen(os.dup(1), 'w')
+    os.dup2(2, 1)
+
+    def answer(content: Any) -> None:
+        print(json.dumps(content), file=answers, flush=True)
+    answer(ready)
     for line in sys.stdin:
         name, *arguments = line.split()
-        print(json.dumps(commands[name](*map(float, arguments))), flush=True)
+        answer(commands[name](*map(float, arguments)))
     close()
     sys.stderr.flush()
     os._exit(0)

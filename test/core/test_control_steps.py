@@ -50,7 +50,7 @@ def live(story: Story) -> list[object]:
         faulted = (faulted or state == 'fails' and place == 5) and resets < 3
         starting = starting + 1 if word == RUN and not faulted else 0
         running = 3 if starting > 1 else max(0, running - 1)
-        status = (ENABLED if running else READY) & ~faulted | FAULT * faulted
+        status = (ENABLED if running else READY) & ~int(faulted) | FAULT * faulted
         said.append(cycle(control, None if place == 0 else status, now))
         said += [(done.request.action, done.success) for done in control.take_completed()]
         said += ['operating'] * control.operating
