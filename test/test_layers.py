@@ -34,14 +34,16 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
-        'exchange', 'process', 'ros.messages'},
+        'exchange', 'process', 'ros.messages', 'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'clock', 'core', 'monitor'},
     'ros.messages': {'', 'core'},
-    'ros.client': {'', 'clock', 'core', 'ros.messages'},
-    'ros.monitor': {'', 'core', 'monitor', 'ros.client', 'ros.messages'},
+    'ros.recognition': {''},
+    'ros.client': {'', 'clock', 'core', 'ros.recognition'},
+    'ros.monitor': {
+        '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {''},
     'client.drive': {'', 'core', 'process'},

@@ -54,7 +54,7 @@ from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.messages import BRIDGES, bridges_among
+from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 from drive_can_bridge.transport import adapters

@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from drive_can_bridge.ros.client.calls import (
     ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.search import find_bridge, Graph, nobody, Search
-from drive_can_bridge.ros.messages import namespace_of, sampled_among, stoppable_among
+from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
 STOP_TIMEOUT, _AGAIN = 10.0, 1.0
@@ -139,11 +139,8 @@ class Stop:
         """Return drives that are new in the graph, in the namespaces of bridges."""
         if self._search.settled:
             return []
-        places = {namespace_of(name) for name in self._search.found}
-        stoppable = [node for node in stoppable_among(self._search.services)
-                     if node not in self._drives and namespace_of(node) in places]
-        drives = sampled_among(self._client_node.topics()) if stoppable else set[str]()
-        return [node for node in stoppable if node in drives]
+        return drives_among(self._search.services, self._client_node.topics, self._search.found,
+                            self._drives)
 
     @property
     def seen(self) -> set[str]:

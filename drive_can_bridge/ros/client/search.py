@@ -24,7 +24,7 @@ from rclpy.qos import QoSProfile
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
-from drive_can_bridge.ros.messages import BRIDGES, bridges_among, Entries, namespace_of
+from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
 #: s between two looks at what has arrived
 LOOK_PERIOD = 0.002

@@ -30,9 +30,8 @@ from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
 from drive_can_bridge.ros.messages import (
-    bridges_among, drive_value, facts_of, limits_of, namespace_of, parameter_message, plain,
-    sampled_among, stoppable_among,
-)
+    drive_value, facts_of, limits_of, parameter_message, plain)
+from drive_can_bridge.ros.recognition import bridges_among, drives_among
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
@@ -212,13 +211,10 @@ class MonitorClient:
 
     def _notice(self) -> None:
         """Look for drives whose bridge has not told of them: it hangs, or takes its time."""
-        services, known = self._node.services(), set(self._model.drives)
-        places = {namespace_of(bridge) for bridge in bridges_among(services)}
-        found = {node for node in stoppable_among(services)
-                 if node not in known and namespace_of(node) in places}
-        if found:
-            found &= sampled_among(self._node.topics())
-        self._model.noticed(found, self._now)
+        services = self._node.services()
+        self._model.noticed(drives_among(
+            services, self._node.topics, bridges_among(services), set(self._model.drives)),
+            self._now)
 
     def _find_bits(self) -> None:
         """Subscribe to the bits of drives: ``~/<parameter>/<bit>``."""
