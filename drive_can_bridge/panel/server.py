@@ -95,10 +95,10 @@ class Connection(H11Protocol):
     def handle_websocket_upgrade(self, event: Any) -> None:
         # a WebSocket is no connection of this kind any more when the gate hears of it
         entry = self._access.judge('websocket', 'GET', self.headers, b'')
-        if isinstance(entry, Entry) and not self.enter(entry.role, stop=False):
+        role = entry.role if isinstance(entry, Entry) else Role.VIEWER
+        if not self.enter(role, stop=False):
             self.show_out()
             return
-        self._outside.pop(self, None)
         super().handle_websocket_upgrade(event)
 
     def enter(self, role: Role, *, stop: bool) -> bool:
