@@ -6,10 +6,11 @@ It is looked for once, when a fault shows: in samples where it is mapped, otherw
 like that of a user.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import (
@@ -34,8 +35,13 @@ class Watched(Protocol):
 
     configuration: DriveConfiguration
     control: ControlMachine | None
+    interlock: CommandInterlock
     report: Reporter
     sample_parameters: tuple[Parameter, ...]
+
+    @property
+    def shows_fault(self) -> bool:
+        """Its own status says so."""
 
     @property
     def services(self) -> Desk:
@@ -67,13 +73,14 @@ class FaultWatch:
         name, self._mask = table.bit or ('', 0)
         self._bit_place = sample.index(name) if name in sample else None
         self.shows = False
+        self._wanted = False    # the number is to be read; what is under way is of a fault before
         self._request: ReadRequest | None = None
 
     def look(self, events: Iterable[Event]) -> None:
         """Look at what has happened; there may be more to be told, and to be sent, then."""
         for event in tuple(events):
             if isinstance(event, ProcessDataReceived):
-                self._sampled(event.raws, event.received_at)
+                self.sampled(event.raws, event.received_at)
             elif isinstance(event, StationLost):
                 self._gone()
 
@@ -83,8 +90,8 @@ class FaultWatch:
             return False
         self._request = None
         outcome = event.outcomes[0]
-        if not self.shows:
-            return True     # and reset before it was known
+        if self._wanted or not self.shows:
+            return True     # it was reset before it was known
         if isinstance(outcome, ReadValue):
             self._known(outcome.raw)
         elif isinstance(outcome, Failure):
@@ -92,12 +99,14 @@ class FaultWatch:
             self._tell(sentences.fault_unread(outcome.reason))
         return True
 
-    def _sampled(self, raws: tuple[int, ...], now: float) -> None:
-        control, place = self._session.control, self._bit_place
-        if control is not None:
-            shows = control.fault
-        elif place is not None and place < len(raws):
-            shows = bool(raws[place] & self._mask)
+    def sampled(self, raws: Sequence[int | None], now: float) -> None:
+        """Look at a sample; None stands for what the drive refused."""
+        found: dict[int | None, int | None] = {**dict(enumerate(raws))}
+        status = found.get(self._bit_place)
+        if self._session.control is not None:
+            shows = self._session.shows_fault
+        elif status is not None:
+            shows = bool(status & self._mask)
         else:
             return
         if not shows:
@@ -105,13 +114,15 @@ class FaultWatch:
             return
         if not self.shows:
             self.shows = True
-            if self._place is None:
-                self._request = ReadRequest((self._parameter,))
-                self._session.services.submit(self._request, now)
-        if not self.text and self._place is not None and self._place < len(raws):
-            raw = raws[self._place]
-            if raw or raw in self._names:   # some drives say what it is a moment later
-                self._known(raw)
+            self._wanted = self._place is None
+        if self._wanted and self._request is None:
+            self._wanted = False
+            self._request = ReadRequest((self._parameter,))
+            self._session.services.submit(self._request, now)
+        raw = found.get(self._place)
+        # some drives say what it is a moment later
+        if not self.text and raw is not None and (raw or raw in self._names):
+            self._known(raw)
 
     def _known(self, raw: int) -> None:
         name = self._names.get(raw, '')
@@ -121,14 +132,16 @@ class FaultWatch:
         self._tell(sentences.fault_named(number, name))
 
     def _tell(self, what: Sentence) -> None:
-        control = self._session.control
-        if control is not None:
-            control.fault_text = self.text
+        self._have_refusals_tell(self.text)
         self._session.report.note(Noted(what, warning=True))
 
     def _gone(self) -> None:
         if self.shows:
-            self.shows = False
+            self.shows = self._wanted = False
             self.text, self.unread = '', NOTHING
-            if self._session.control is not None:
-                self._session.control.fault_text = ''
+            self._have_refusals_tell('')
+
+    def _have_refusals_tell(self, text: str) -> None:
+        obeyed = self._session.interlock.obeyed     # in a group not its own
+        if obeyed is not None:
+            obeyed.fault_text = text

@@ -498,6 +498,11 @@ class Session(ABC):
         return self.interlock.state
 
     @property
+    def shows_fault(self) -> bool:
+        """Its own status says that it has a fault."""
+        return self.control is not None and self.control.fault
+
+    @property
     def warning(self) -> Sentence:
         """Why all is not well although the drive is online, and what to do; '' otherwise."""
         return NOTHING

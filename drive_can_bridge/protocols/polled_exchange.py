@@ -184,6 +184,8 @@ class PolledExchange:
         if len(sample) == len(raws):
             self._book.answered(self.received_at)
             session.report.note(ProcessDataReceived(sample, self.received_at))
+        elif session.fault_watch is not None:
+            session.fault_watch.sampled(raws, now)
 
     def _miss(self, now: float) -> None:
         session, limit = self._session, self._session.configuration.missed_limit

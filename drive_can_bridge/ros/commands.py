@@ -41,9 +41,7 @@ def _by_hand(command: str, drive: str, node: Node) -> str:
 
 def how_to_enable(session: Session, node: Node) -> str:
     """Say what to do about a drive that is disabled."""
-    lead = session.enabled_by
-    whom = ('' if lead == session.configuration.name
-            else f' of {lead}, which leads the broadcast group')
+    lead, whom = _leader(session)
     return f'call ~/enable{whom} ({_by_hand("enable", lead, node)})'
 
 
@@ -51,9 +49,16 @@ def how_to_reset(session: Session, node: Node) -> str:
     """Say what to do about a drive in fault, when its cause is gone."""
     if session.control is None:
         return 'reset it at the drive'
-    lead, own = session.enabled_by, session.configuration.name
-    return (f'call ~/reset_fault ({_by_hand("reset", own, node)}) and ~/enable '
+    lead, whom = _leader(session)
+    return (f'call ~/reset_fault{whom} ({_by_hand("reset", lead, node)}) and ~/enable '
             f'({_by_hand("enable", lead, node)})')
+
+
+def _leader(session: Session) -> tuple[str, str]:
+    """Return the drive that takes the commands for this one, and what is said of it."""
+    lead = session.enabled_by
+    return lead, ('' if lead == session.configuration.name
+                  else f' of {lead}, which leads the broadcast group')
 
 
 class _Target(NamedTuple):

@@ -2,17 +2,23 @@
 """Which fault it is: the profile's section ``fault``, in all families."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
-from builders import ACTUAL, CONTROL, CURRENT, parameter, RO, STATUS, TABLE
+from builders import (
+    ACTUAL, CONTROL, CURRENT, drive, frame, parameter, RO, SPEED, STATUS, TABLE)
 import pytest
 from saying import says
 from test_contract import Partner, PARTNERS
 
-from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.events import (
+    DriveState, Noted, ProcessDataReceived, RequestCompleted)
 from drive_can_bridge.core.fault_watch import FaultWatch
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.profile import FaultTable
+from drive_can_bridge.core.requests import ReadRequest, ReadValue
+from drive_can_bridge.protocols.families import make_sessions
 
 CODE = parameter('fault_code', 217, access=RO)
 CODES = ((7, 'overcurrent'), (9, 'hot'))
@@ -136,3 +142,69 @@ def test_a_mapped_number_may_come_a_moment_later(name: str) -> None:
     trip(partner, 0)
     assert text(partner) == ''
     assert says('fault_named', number='7', name='overcurrent') in trip(partner, 7)
+
+
+def test_a_fault_that_comes_again_while_the_last_one_is_asked_for() -> None:
+    asked: list[ReadRequest] = []
+    session: Any = PARTNERS['cia402']().talk.session
+    session.configuration = replace(session.configuration, profile=replace(
+        session.configuration.profile, parameters={'fault_code': CODE}))
+    seen = SimpleNamespace(
+        configuration=session.configuration, control=object(),
+        interlock=SimpleNamespace(obeyed=SimpleNamespace(fault_text='')),
+        report=SimpleNamespace(note=lambda event: None), sample_parameters=(), shows_fault=False,
+        services=SimpleNamespace(submit=lambda request, now: asked.append(request)))
+    watch = FaultWatch(seen, FaultTable('fault_code', CODES, None))
+    for seen.shows_fault in (True, False, True, True):
+        watch.look([ProcessDataReceived((), 1.0)])
+    assert len(asked) == 1
+    assert watch.take(RequestCompleted(asked[0], (ReadValue(7),)))
+    assert watch.text == ''
+    for _ in range(2):
+        watch.look([ProcessDataReceived((), 1.0)])
+    assert len(asked) == 2
+    assert watch.take(RequestCompleted(asked[1], (ReadValue(9),)))
+    assert watch.text == seen.interlock.obeyed.fault_text == '9 hot'
+    assert not watch.take(RequestCompleted(ReadRequest((CODE,)), (ReadValue(7),)))
+
+
+def test_an_inverter_that_leads_is_not_asked_for_the_fault_of_another_but_tells_it() -> None:
+    table = (ACTUAL, CODE)
+    drives = [drive('cannord', name=f'drive_{station}', station=station, request=(SPEED,),
+                    response=(ACTUAL,), table=(SPEED, *table), broadcast='group', period=0.02)
+              for station in (1, 2)]
+    drives = [replace(each, profile=replace(
+        each.profile, fault=FaultTable('fault_code', CODES, None))) for each in drives]
+    sessions = make_sessions(drives)
+    now, asked = 10.0, list[Frame]()
+    for session in sessions:
+        session.bus_up(now)
+        session.activate(now)
+    while now < 11.0:
+        now = max(now, min(session.next_timer() for session in sessions))
+        for session in sessions:
+            session.handle_timer(now)
+        for session in sessions:
+            for sent in session.take_frames():
+                if sent.identifier in (0x002, 0x004):   # the second one has a fault
+                    index = sent.identifier // 4
+                    sessions[index].receive_frame(frame(
+                        ('003#310B0000', '005#380B0000')[index]), now)
+                if sent.identifier in (0x202, 0x204):
+                    asked.append(sent)
+                    session.receive_frame(frame('205#D910000000000700'), now)
+            session.frames_left(now)
+            session.take_events()
+    assert {each.identifier for each in asked} == {0x204}
+    sessions[0].services.submit(ControlRequest(ControlAction.ENABLE), now)
+    refusal, = [event.message for event in sessions[0].take_events()
+                if isinstance(event, ControlCompleted)]
+    assert refusal == says('reset_first', fault='7 overcurrent')
+
+
+@pytest.mark.parametrize('control', [CONTROL, None])
+def test_a_poll_that_is_refused_hides_no_fault(control: Any) -> None:
+    partner = meet('canopen_pkw', control=control, bit=('status_word', 8))
+    del partner.registers[CURRENT.number or 0]
+    assert says('fault_named', number='7', name='overcurrent') in trip(partner, 7)
+    assert partner.talk.session.state is DriveState.FAULT

@@ -82,6 +82,7 @@ class CannordSession(Session):
                         cyclic_refusal=group.cyclic_refusal if self._led else publish_it),
             leader=group.control)
         self.enabled_by = group.leads
+        self._faulted = False
         self._extended: bool = options.extended_identifiers
         request_identifier, self._response_identifier, task_identifier, \
             self._task_response_identifier = (
@@ -189,20 +190,21 @@ class CannordSession(Session):
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""
         word, values = decode_main(data, swap=self._swap)
+        self._faulted = is_faulted(word)
         answers = self._answers
         asked = answers.wanted
         if asked:
             answers.answered(received_at)
-        elif not (is_faulted(word) and self.online):
+        elif not (self._faulted and self.online):
             # a fault while offline is told again by the first exchange
-            if not is_faulted(word):
+            if not self._faulted:
                 answers.expects('process data', now, received_at)
             return
         if not self.online and self.stage is Stage.RUNNING:
             self.be_online()
             self._timeout.look(now)
             self._group.found(self)
-        if asked and is_faulted(word) and not self._machine.fault:
+        if asked and self._faulted and not self._machine.fault:
             answers.book.stale = 1      # it may have been told unasked: then the answer follows
         if self._led:
             self._machine.status_received(word, now)
@@ -222,6 +224,10 @@ class CannordSession(Session):
             self.report.reject(sentences.unasked('additional process data'))
 
     # -- state ------------------------------------------------------------------------------------
+
+    @property
+    def shows_fault(self) -> bool:
+        return self._faulted    # the control of a leader tells of faults of all
 
     @property
     def warning(self) -> Sentence:
