@@ -158,6 +158,8 @@ class ExtendedSession(Session):
                     return      # who starts over follows the last of the cycles
                 if not exchange.cycling:
                     self._nobody_answers(now)
+                    if silent_looks >= SILENT_LOOKS:    # what they were says nothing any more
+                        self._differs, self._told = False, NOTHING
                     look_at = now   # paced by the time-out of the read
                 elif silent_looks >= SILENT_LOOKS and not exchange.leaving:
                     # there, the cyclic answers tell who is there
@@ -275,9 +277,9 @@ class ExtendedSession(Session):
 
     def _tell(self, text: Sentence) -> None:
         """Report a difference, once."""
+        self.report.advice = sentences.mapping_differs(text)
         if text != self._told:
             self._told = text
-            self.report.advice = sentences.mapping_differs(text)
             self.report.note(MappingDiffered(text))
 
     def _nobody_answers(self, now: float) -> None:

@@ -123,6 +123,24 @@ def test_maps_differ(request_map: str, response_map: str, text: str) -> None:
     assert talk.until(11.001) == []
 
 
+def test_a_drive_whose_maps_differ_and_which_falls_silent_is_offline() -> None:
+    talk = asked()
+    talk.hears(OTHER_REQUEST_MAP, 10.001)
+    talk.hears(RESPONSE_MAP, 10.002)
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    told, = talk.events(MappingDiffered)
+    talk.until(11.3)    # one look may be lost
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert talk.session.offline_advice == says('maps_unread')
+    now = talk.until(14.0)[-1][0]
+    assert talk.session.state is DriveState.OFFLINE
+    talk.hears(OTHER_REQUEST_MAP, now + 0.001)
+    talk.hears(RESPONSE_MAP, now + 0.002)
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
+    assert talk.events(MappingDiffered) == [told]
+    assert talk.session.offline_advice == f'mapping differs: {told.text}'
+
+
 def test_corrected_maps_are_seen_after_a_second() -> None:
     talk = asked()
     talk.hears(OTHER_REQUEST_MAP, 10.001)
