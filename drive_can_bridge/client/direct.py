@@ -368,13 +368,14 @@ class DirectDrive(Drive):
     # -- state ------------------------------------------------------------------------------------
 
     def enabled(self) -> Enabled:
-        control = self._drive.profile.control
-        if control is None or control.enabled is None or control.status_parameter is None:
+        told = self._family.tells_enabled(self._drive)
+        if told is None:
             return Enabled.UNKNOWN
-        outcome = self.read(control.status_parameter)[control.status_parameter]
+        status, is_enabled = told
+        outcome, = self.ask([(status.name, status)])
         if outcome.raw is None:
             return Enabled.UNKNOWN
-        return Enabled.YES if control.enabled.matches(outcome.raw) else Enabled.NO
+        return Enabled.YES if is_enabled(outcome.raw) else Enabled.NO
 
     def identity(self) -> str:
         names = self._drive.profile.identity

@@ -249,6 +249,16 @@ class Family(ABC):
         """
         return None
 
+    def tells_enabled(self, drive: DriveConfiguration,
+                      ) -> tuple[Parameter, Callable[[int], bool]] | None:
+        """Return what can be read to see whether a drive is enabled, and what it says then."""
+        control = drive.profile.control
+        status = control and control.status_parameter and drive.profile.parameters.get(
+            control.status_parameter)
+        if control is None or control.enabled is None or not status:
+            return None
+        return status, control.enabled.matches
+
     # -- who talks and listens --------------------------------------------------------------------
 
     @abstractmethod

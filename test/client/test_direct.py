@@ -244,6 +244,8 @@ def test_a_drive_that_goes_away_in_the_middle(tmp_path: Path) -> None:
 
 # -- one master -----------------------------------------------------------------------------------
 
+AXIS = {'bus': 'main', 'protocol': 'cia402', 'station': 7, 'profile': 'cia402_servo', 'mode': 'pv',
+        'cyclic_request': ['target_velocity']}
 REQUESTS = {'conveyor': '002003C4#0000000000000000', 'lift': '3F2#1E00',
             'mixer': '264#0012000000000000', 'pump': '505#0000000000000000'}
 
@@ -255,6 +257,27 @@ def test_another_master_before_the_first_request(tmp_path: Path, name: str) -> N
             with pytest.raises(AnotherMaster, match=(
                     rf'^bus main: another master talks to drive {name} \(')):
                 open_drives(world.file, only=['conveyor'])
+
+
+@pytest.mark.parametrize('seen', ['207#0F00', '607#4041600000000000', '000#0107'])
+def test_another_master_of_an_axis(tmp_path: Path, seen: str) -> None:
+    with a_world(tmp_path, axis=AXIS) as world:
+        with stranger(world, frame(seen), after=0.4 * LISTEN):
+            with pytest.raises(AnotherMaster, match='another master talks to drive axis '):
+                open_drives(world.file)
+
+
+def test_an_axis_says_whether_it_is_enabled(tmp_path: Path) -> None:
+    with a_world(tmp_path, axis=AXIS) as world:
+        with open_drives(world.file) as drives:
+            assert drives['axis'].enabled() is Enabled.NO
+        # 6060h := 3 (pv), then 6040h
+        for written in ('2F606000030000', '2B406000060000', '2B406000070000', '2B4060000F0000'):
+            world.send(frame(f'607#{written}00'))
+        with open_drives(world.file) as drives:
+            assert drives['axis'].enabled() is Enabled.YES
+            world.drives['axis'].fault('silent')
+            assert drives['axis'].enabled() is Enabled.UNKNOWN
 
 
 def test_another_master_later(tmp_path: Path) -> None:

@@ -435,23 +435,28 @@ class BringUp:
         judged = transmit or self._options.mapping == 'configure'
         if judged and kind not in (types if written or transmit else types[:1]):
             return _difference(at, pdo.TRANSMISSION, kind or 0, types[0]), identifier
-        entries = wanted.entries
-        mapping = at + pdo.MAPPING_OFFSET
-        count = yield from self._read(mapping)
-        if count != len(entries):
-            return _difference(mapping, 0, count or 0, len(entries)), identifier
-        for place, entry in enumerate(entries, 1):
-            found = (yield from self._read(mapping, place)) or 0
-            if found != entry:
-                return sentences.object_differs(
-                    _place(mapping, place), pdo.entry_text(found),
-                    pdo.entry_text(entry)), identifier
+        difference = yield from self._other_content(wanted)
+        if difference:
+            return difference, identifier
         if transmit and self._options.mapping == 'configure' and not written:
             for subindex, value in self._timers():
                 time = yield from self._read(at, subindex)
                 if time is not None and time != value:
                     return _difference(at, subindex, time, value), identifier
         return NOTHING, identifier
+
+    def _other_content(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
+        """Return in what a PDO holds something else."""
+        entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
+        count = yield from self._read(mapping)
+        if count != len(entries):
+            return _difference(mapping, 0, count or 0, len(entries))
+        for place, entry in enumerate(entries, 1):
+            found = (yield from self._read(mapping, place)) or 0
+            if found != entry:
+                return sentences.object_differs(
+                    _place(mapping, place), pdo.entry_text(found), pdo.entry_text(entry))
+        return NOTHING
 
     def _timers(self) -> list[tuple[int, int]]:
         """Return inhibit time (0.1 ms) and event timer (ms) that a TPDO shall have."""
@@ -465,25 +470,20 @@ class BringUp:
         """
         Write one PDO, in the order that all devices take.
 
-        :return: the refusal of an RPDO that is fixed: it may fit as it is, but for its type.
+        :return: the refusal of one that is fixed: it may fit as it is, but for type and times.
         """
-        at, mapping = wanted.communication, wanted.communication + pdo.MAPPING_OFFSET
+        at, types = wanted.communication, self._types(transmit=transmit)
         kept = identifier & (pdo.NO_REMOTE | pdo.LONG_IDENTIFIER)
-        refusal = yield from self._put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
-        if refusal and transmit:
-            raise _differs(refusal)
+        fixed = yield from self._put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
+        refusal = NOTHING if fixed else (yield from self._map(wanted))
         if refusal:
-            yield from self._put(at, pdo.TRANSMISSION, self._types(transmit=False)[0], 1)
-            return refusal
-        yield from self._must(mapping, 0, 0, 1)
-        for place, entry in enumerate(wanted.entries, 1):
-            yield from self._must(mapping, place, entry, 4)
-        yield from self._must(mapping, 0, len(wanted.entries), 1)
-        for kind in self._types(transmit=transmit):
+            yield from self._put(at, pdo.COB_ID, identifier, 4)     # as it was found
+            raise _differs(refusal)
+        for kind in types[:1] if fixed else types:
             refusal = yield from self._put(at, pdo.TRANSMISSION, kind, 1)
             if not refusal:
                 break
-        if refusal:
+        if refusal and not fixed:
             raise _differs(refusal)
         for subindex, value in self._timers() if transmit else ():
             found = yield from self._read(at, subindex)
@@ -494,7 +494,19 @@ class BringUp:
                 raise _differs(refusal)
             if refusal:
                 self.tell(refusal)
-        yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
+        if not fixed:
+            yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
+        return fixed
+
+    def _map(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
+        """Write what a PDO holds; return the refusal where it is fixed to something else."""
+        mapping = wanted.communication + pdo.MAPPING_OFFSET
+        refusal = yield from self._put(mapping, 0, 0, 1)
+        if refusal:
+            return refusal if (yield from self._other_content(wanted)) else NOTHING
+        for place, entry in enumerate(wanted.entries, 1):
+            yield from self._must(mapping, place, entry, 4)
+        yield from self._must(mapping, 0, len(wanted.entries), 1)
         return NOTHING
 
     def _close(self, first: int, used: Iterable[Pdo]) -> Procedure:

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for drives of CiA 402."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,7 +17,8 @@ from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, STATUS_NAME, STATUS_PARAMETER, STATUS_WORD)
+    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, MOVING, state_of, STATUS_NAME, STATUS_PARAMETER,
+    STATUS_WORD)
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, IntegerList, option, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
@@ -84,8 +85,6 @@ class Cia402(Family):
     builtin_names = frozenset((STATUS_NAME,))
     widths = frozenset((8, 16, 32))
     keeps_by = 'not stored: lost at power-off; to store all of it: x1010.1=0x65766173'
-    #: a device may take its time: nothing is documented
-    drive_defaults = {'parameter_timeout': 0.5}
     options_type = Cia402Options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
@@ -168,6 +167,9 @@ class Cia402(Family):
         return None if place is None else Parameter(
             name=name, type=ParameterType.UINT32, index=place[0], subindex=place[1], listed=False,
             width_known=False)
+
+    def tells_enabled(self, drive: DriveConfiguration) -> tuple[Parameter, Callable[[int], bool]]:
+        return STATUS_PARAMETER, lambda word: state_of(word) in MOVING
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cia402.observer import Cia402Observer

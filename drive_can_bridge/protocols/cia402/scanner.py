@@ -129,8 +129,9 @@ class Cia402Prober(Prober):
     """Asks one node. SDO is answered in every state but stopped."""
 
     def __init__(self, drive: DriveConfiguration) -> None:
-        super().__init__(drive, [Route(
-            sdo.REQUEST_BASE + drive.station, STANDARD_IDENTIFIER_MAX, False)])
+        super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
+            *(request.identifier for request in request_pdos(drive)),
+            sdo.REQUEST_BASE + drive.station, network.NMT_IDENTIFIER)])
 
     def converse(self) -> Conversation:
         device = yield from self._value(sdo.DEVICE_TYPE, 0)

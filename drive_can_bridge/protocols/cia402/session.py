@@ -62,7 +62,6 @@ EVENT_PERIODS = 1.5
 #: emergency code of a node that has missed the heartbeats of another
 HEARTBEAT_ERROR = 0x8130
 _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.MODE, subindex=0)
-_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 
 
 class Heartbeats:
@@ -532,11 +531,12 @@ class Cia402Session(Session):
         listens = not book.missed_in_row or (
             book.stop_shown and book.missed_in_row < self.configuration.missed_limit)
         if now < self._stop_until and listens and (
-                self._rules.state in _MOVING or self._rules.state and self._machine.word_due):
+                self._rules.state in states.MOVING
+                or self._rules.state and self._machine.word_due):
             self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
             return
         self.exchange.doubt_the_end()
-        if self._rules.state in _MOVING:
+        if self._rules.state in states.MOVING:
             self.duty.channel(CYCLE, Happened.RUN_LEFT)
             self.duty.happened(Happened.SILENT)     # of what it should have done
         self.exchange.stop()

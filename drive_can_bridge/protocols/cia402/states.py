@@ -92,6 +92,8 @@ PATTERNS = {
     State.FAULT_REACTION: (0x004F, 0x000F),
     State.FAULT: (0x004F, 0x0008),
 }
+#: in which a motor has current, and may move
+MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 _MASK = 0x006F
 #: of all combinations of the bits that states are told by
 _STATES = {raw: next((state for state, (mask, value) in PATTERNS.items()

@@ -87,6 +87,31 @@ def test_a_fixed_drive_that_fits_but_for_the_type_of_its_rpdo(kind: int) -> None
     assert axis.session.online
 
 
+CONTENTS = [place for place in FITS if place[0] in (0x1600, 0x1A00)]
+
+
+@pytest.mark.parametrize('fixed', [CONTENTS, [*CONTENTS, (0x1800, 1)]])
+def test_a_fixed_mapping_that_fits_but_for_types_that_can_be_written(
+        fixed: list[tuple[int, int]]) -> None:
+    axis = Axis(objects={**FITS, (0x1400, 2): b'\xFF', (0x1800, 2): b'\xFF'})
+    axis.drive.fixed = dict.fromkeys(fixed, 0x06010000)
+    axis.start()
+    sent = axis.take()
+    assert '605#2F00140201000000' in sent and '605#2F00180201000000' in sent
+    assert axis.session.online
+
+
+def test_a_fixed_mapping_that_does_not_fit_is_left_as_it_was_found() -> None:
+    axis = Axis(objects={**FITS, (0x1600, 1): bytes.fromhex('10007160')})
+    axis.drive.fixed = dict.fromkeys(CONTENTS, 0x06010000)
+    found = axis.drive.objects[0x1400, 1]
+    axis.start()
+    assert not axis.session.online
+    assert axis.session.offline_advice == says('mapping_differs', how=says(
+        'object_refused', what='1600h.00h', why=describe(0x06010000)))
+    assert axis.drive.objects[0x1400, 1] == found
+
+
 def test_a_fixed_drive_that_differs_says_what_it_refused() -> None:
     axis = Axis(objects={**FITS, (0x1600, 1): bytes.fromhex('10007160')})
     axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
