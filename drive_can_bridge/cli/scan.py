@@ -8,9 +8,11 @@ CANopen node was heard or answered.
 """
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from itertools import chain
 import json
+import math
 from pathlib import Path
 import re
 import shlex
@@ -20,13 +22,16 @@ from drive_can_bridge.cli.command import (
     above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, print_json, WrongUsage,
 )
 from drive_can_bridge.cli.output import may_overwrite, write_atomically
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import BusUnavailable, TransportError
+from drive_can_bridge.core.errors import BusUnavailable, ConfigurationError, TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
+from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
+from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scanner import Scanner, Sighting
+from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
@@ -157,6 +162,9 @@ _HEAD = """\
 """
 #: families without a known table -> what their drives are called
 _UNKNOWN = {'datamodel_extended': 'drive', 'datamodel_standard': 'drive_std'}
+#: families whose stations are Node-IDs
+_ON_CANOPEN = ('cia402', 'canopen_pkw')
+_SURER = (Certainty.CERTAIN, Certainty.LIKELY)
 
 
 def tables_beside(path: Path) -> list[Path]:
@@ -166,22 +174,30 @@ def tables_beside(path: Path) -> list[Path]:
 
 
 def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[Sighting],
-                         settings: Sequence[dict[str, Any]]) -> list[Path]:
+                         settings: Sequence[dict[str, Any]], nodes: Collection[int] = (),
+                         ) -> list[Path]:
     """
     Write a parameter file that ``validate`` accepts, after the tables that it names.
 
+    What cannot be there beside a surer one, as both would use the same identifiers, is a comment.
+
     :param sightings: at least one.
     :param settings: for each sighting, what its scanner knows.
+    :param nodes: Node-IDs of devices that are there.
     :return: the files written.
     :raises OSError: they cannot be written.
     """
     written = [path]
-    # so slow that all of them fit the bus
-    period = max(0.05, 0.01 * len(sightings))
-    lines = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
-             f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
-             f'        bitrate: {bus.bitrate}', '    drives:']
-    for sighting, keys in zip(sightings, settings):
+    # so slow that all of them fit the bus: an exchange has at most 320 bits
+    period = max(0.05, 0.01 * len(sightings), math.ceil(1e6 * len(sightings) / bus.bitrate) / 1e3)
+    taken = {each.station for each in sightings if each.protocol in _ON_CANOPEN} | {*nodes}
+    bridge_node = max(set(range(1, NODE_MAX + 1)) - taken, default=NODE_MAX)
+    head = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
+            f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
+            f'        bitrate: {bus.bitrate}', '    drives:']
+    drives: dict[str, list[str]] = {}
+    for sighting, keys in sorted(zip(sightings, settings), key=lambda each: _SURER.index(
+            each[0].certainty)):
         if sighting.protocol in _KNOWN:
             kind, profile, request, response = _KNOWN[sighting.protocol]
         else:
@@ -192,16 +208,37 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
             _write_table(table, sighting, keys)
             written.append(table)
             profile = str(table)
-            lines += [f'      # {remark}' for remark in keys.get('remarks', ())]
-        lines += [f'      {kind}_{sighting.station}:   # {sighting.text}', '        bus: main',
+        name = f'{kind}_{sighting.station}'
+        drives[name] = lines = [f'      # {remark}' for remark in keys.get('remarks', ())]
+        lines += [f'      {name}:   # {sighting.text}', '        bus: main',
                   f'        protocol: {sighting.protocol}',
                   f'        station: {sighting.station}',
                   f'        profile: {json.dumps(profile)}',
                   f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
                   f'        cyclic_response: [{", ".join(response)}]']
         lines += [f'        mode: {keys["mode"]}'] if 'mode' in keys else []
-    _write(path, lines)
+        if sighting.protocol == 'cia402' and bridge_node != NODE_MAX:
+            lines.append(f'        bridge_node: {bridge_node}')
+    _write(path, [*head, *chain.from_iterable(drives.values())])
+    collisions = _collisions(path)
+    for name, why in collisions.items():
+        drives[name] = [f'      # left out, station {why}',
+                        *(f'# {line}' for line in drives[name])]
+    if collisions:
+        _write(path, [*head, *chain.from_iterable(drives.values())])
     return written
+
+
+def _collisions(path: Path) -> dict[str, str]:
+    """Return the drives of a parameter file that collide with earlier ones, and with what."""
+    try:
+        configuration_from_file(path)
+    except ConfigurationError as error:
+        keys = {problem: problem.fields['key'] for problem in error.problems
+                if isinstance(problem, Sentence) and problem.code == 'collides'}
+        return {key.split('.')[1]: problem.partition(f'{key}: ')[2]
+                for problem, key in keys.items()}
+    return {}
 
 
 def _write_table(path: Path, sighting: Sighting, keys: dict[str, Any]) -> None:
@@ -309,7 +346,7 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
         for path in write_parameter_file(
                 args.output, bus, survey.sightings,
                 [survey.scanners[each.protocol].settings(each.station)
-                 for each in survey.sightings]):
+                 for each in survey.sightings], survey.nodes):
             complain(f'written: {path}')
         complain(f'next: drive_can validate {shlex.quote(str(args.output))}')
     elif survey.sightings:

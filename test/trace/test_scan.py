@@ -21,7 +21,7 @@ from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.scanner import Certainty, Scanner
+from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
 from drive_can_bridge.transport.end_point import EndPoint
@@ -450,6 +450,28 @@ def test_what_is_written_is_valid_whatever_the_maps(
     remarks = [line.strip() for line in output.read_text(encoding='utf-8').splitlines()
                if 'cannot be exchanged' in line]
     assert [remark.split(' cannot')[0] for remark in remarks] == [f'# {text}' for text in unfit]
+
+
+def test_what_is_written_is_valid_whoever_is_there(tmp_path: Path) -> None:
+    seen = [Sighting('cannord', 1, 'by chance', Certainty.LIKELY),
+            Sighting('cia402', 2, 'a servo', Certainty.CERTAIN),
+            Sighting('cia402', 127, 'a servo', Certainty.CERTAIN),
+            *(Sighting('canopen_pkw', node, 'a starter', Certainty.LIKELY)
+              for node in (*range(20, 40), 126))]
+    output = tmp_path / 'found.yaml'
+    for rate, nodes, period, bridge_node in ((10_000, [125], 2.4, 124), (500_000, [], 0.24, 125)):
+        write_parameter_file(
+            output, BusConfiguration('main', 'virtual', 'a', rate), seen,
+            [FAMILIES[each.protocol].make_scanner().settings(each.station) for each in seen],
+            nodes)
+        assert drive_can('validate', output) == 0
+        drives = configuration_from_file(output).drives
+        assert len(drives) == 23 and 'inverter_1' not in drives
+        assert drives['axis_2'].options.bridge_node == bridge_node
+        assert drives['axis_2'].period == period
+    text = output.read_text(encoding='utf-8')
+    assert '\n#       inverter_1:   # by chance\n#         bus: main\n' in text
+    assert '\n      # left out, station 1 collides with drive axis_2 (station 2)' in text
 
 
 def test_beside_a_bridge_all_drives_are_found_by_listening(

@@ -32,6 +32,8 @@ from drive_can_bridge.protocols.scanner import (
 #: function, so that it writes nothing there
 PARAMETER = 700
 _NUMBER_BITS = 0x07FF
+#: what an answer may be asked for by
+_TASKS = {int(task): task for task in Task if task is not Task.NONE}
 #: the service that goes on beside process data
 _PARAMETERS = 1
 #: control words that masters send; the bits of direction and parameter set left out
@@ -54,7 +56,8 @@ class CannordScanner(Scanner):
 
     protocol = 'cannord'
     hazard = ('a task on 200h + 2·address is RPDO1 (process data) or TPDO of CANopen nodes, '
-              'on 300h to 3FEh RPDO2 and TPDO3: a CANopen drive may take it for a command')
+              'on 300h to 3FEh RPDO2 and TPDO3: a CANopen drive may take it for a command; an '
+              'inverter whose P513 is not 0 supervises telegrams once it has got one')
 
     def begin(self) -> None:
         data = ParameterLayout().encode(Task.READ, PARAMETER)
@@ -81,7 +84,14 @@ class CannordScanner(Scanner):
                          lambda request: len(request) == len(data))
         elif kind is MessageObject.PARAMETER_RESPONSE and len(data) == LENGTH:
             self._answer(station, f'answers to tasks for P{_number(data)}', now,
-                         lambda request: _number(request) == _number(data), service=_PARAMETERS)
+                         lambda request: _follows(request, data), service=_PARAMETERS)
+
+
+def _follows(request: bytes, data: bytes) -> bool:
+    """Tell whether a response may follow a task: others use these identifiers, too."""
+    task = _TASKS.get(request[1] >> 4)
+    return task is not None and _number(request) == _number(data) and (
+        data[1] >> 4 in (*task.responses, Response.REFUSED))
 
 
 def _number(data: bytes) -> int:
