@@ -13,6 +13,9 @@ import shlex
 import sys
 
 _PACKAGE = 'drive_can_bridge'
+_NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your installation '
+           "(/opt/ros/jazzy/setup.bash), or get it as wheels with the extra 'ros' of this package "
+           "(pip install '.[ros]')")
 
 
 def share_directory() -> Path:
@@ -60,6 +63,16 @@ def command_that_brings(extra: str) -> str:
               if condition.strip().endswith((f"'{extra}'", f'"{extra}"'))]
     return shlex.join([sys.executable, '-m', 'pip', 'install',
                        *(needed or [f'{_PACKAGE}[{extra}]'])])
+
+
+def what_is_missing(command: str, error: ImportError) -> str:
+    """Say what to install where a module cannot be imported."""
+    module = error.name or str(error)
+    if module.startswith('drive_can_bridge'):
+        return f'{command}: {error}'
+    if module.partition('.')[0] in ('can', 'yaml', 'jsonschema'):
+        return f'{command}: the Python module {module} is not installed'
+    return _NO_ROS.format(command=command, module=module)
 
 
 def _candidates() -> Iterator[Path]:

@@ -28,9 +28,6 @@ FAILED = 1
 WRONG_USAGE = 2
 #: characters of a line of complaint: some name all that there is
 LINE_MAX = 4000
-_NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your installation '
-           "(/opt/ros/jazzy/setup.bash), or get it as wheels with the extra 'ros' of this package "
-           "(pip install '.[ros]')")
 #: stands for ``--params-file`` in commands that have no way through a bridge
 PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'
 Parsed = TypeVar('Parsed')
@@ -71,16 +68,6 @@ def complain(text: str) -> None:
     """Write to standard error, a line or more."""
     print('\n'.join(printable(line, LINE_MAX) for line in text.split('\n')), file=sys.stderr,
           flush=True)
-
-
-def what_is_missing(command: str, error: ImportError) -> str:
-    """Say what to install where a module cannot be imported."""
-    module = error.name or str(error)
-    if module.startswith('drive_can_bridge'):
-        return f'{command}: {error}'
-    if module.partition('.')[0] in ('can', 'yaml', 'jsonschema'):
-        return f'{command}: the Python module {module} is not installed'
-    return _NO_ROS.format(command=command, module=module)
 
 
 def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:

@@ -7,13 +7,15 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+import re
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    complain, FAILED, namespace, print_json, say, what_is_missing, WrongUsage,
+    complain, FAILED, namespace, print_json, say, WrongUsage,
 )
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.process.locks import bridges, Present, short
+from drive_can_bridge.resources import what_is_missing
 
 STOP = 'stop'
 _WORDS = {
@@ -27,6 +29,7 @@ _WORDS = {
 }
 #: in a pattern, not in a name
 _WILD = frozenset('*?[')
+_UP_TO_WILD = re.compile(r'[^*?[]*')
 
 
 def define(parser: ArgumentParser) -> None:
@@ -116,11 +119,21 @@ def _stop(args: Namespace, graph: Any) -> int:
 
 def _concerns(present: Present, namespace: str | None, words: Sequence[str]) -> bool:
     """Tell whether a bridge of this host may have one of the drives that are meant."""
+    if not present.name or '~' in present.name:     # nobody knows where it is
+        return True
     place = present.name.rpartition('/')[0]
     if namespace is not None:
         return place == namespace
-    return not words or any(not word.startswith('/') or word.rpartition('/')[0] == place
+    return not words or any(not word.startswith('/') or _may_mean(word, f'{place}/')
                             for word in words)
+
+
+def _may_mean(word: str, place: str) -> bool:
+    """Tell whether a full name, or a pattern of some, may mean a drive in a namespace."""
+    literal = _UP_TO_WILD.match(word)[0]    # type: ignore[index]  # matches anything
+    if literal.startswith(place):
+        return '/' not in literal[len(place):]
+    return literal != word and place.startswith(literal)
 
 
 def _of_host(present: Present, domain: int) -> str:

@@ -20,14 +20,14 @@ import tempfile
 import termios
 from threading import Event
 
-from drive_can_bridge.cli.command import above_zero, of_drive, what_is_missing, whole, WrongUsage
+from drive_can_bridge.cli.command import above_zero, of_drive, whole, WrongUsage
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.demo.child import Child
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
-from drive_can_bridge.resources import config_file
+from drive_can_bridge.resources import config_file, what_is_missing
 from drive_can_bridge.simulation.faults import parse_fault, usage_lines
 from drive_can_bridge.simulation.simulation import Simulation
 

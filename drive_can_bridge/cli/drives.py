@@ -12,12 +12,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from drive_can_bridge.cli.command import complain, namespace, what_is_missing, WrongUsage
+from drive_can_bridge.cli.command import complain, namespace, WrongUsage
 from drive_can_bridge.cli.output import counting, waiting
 from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
+from drive_can_bridge.resources import what_is_missing
 
 
 def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metavar: str,

@@ -11,7 +11,7 @@ import json
 import os
 import sys
 
-from drive_can_bridge.cli.command import namespace, what_is_missing
+from drive_can_bridge.cli.command import namespace
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
@@ -19,6 +19,7 @@ from drive_can_bridge.monitor.snapshot import Source
 from drive_can_bridge.monitor.summary import balance, documents, Lines
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.resources import what_is_missing
 
 #: s between two lines of a drive, and between two looks at what arrives
 LINE_PERIOD = 1.0

@@ -10,12 +10,12 @@ from collections.abc import Callable
 import socket
 import sys
 
-from drive_can_bridge.cli.command import namespace, what_is_missing, whole
+from drive_can_bridge.cli.command import namespace, whole
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import leave, SignalWatcher
-from drive_can_bridge.resources import command_that_brings
+from drive_can_bridge.resources import command_that_brings, what_is_missing
 
 COMMAND = 'drive_can panel'
 #: messages per second to be sampled for all drives that nobody looks at closely

@@ -139,6 +139,40 @@ def test_one_that_holds_drives_of_this_host_is_named(
     assert run('stop') == (0, ['lift: ready'], '')
 
 
+@pytest.mark.parametrize(('word', 'may'), [
+    ('/*', True), ('/cell*/lift', True), ('/cell1/lift', True), ('/cell1/l*', True),
+    ('/cell1*', True), ('lift', True), ('l*', True),
+    ('/cell2/*', False), ('/cell/lift', False), ('/cell1/hall/lift', False), ('/lift', False)])
+def test_which_hung_bridge_may_have_a_drive_that_is_meant(
+        client: Client, run: Run, word: str, may: bool) -> None:
+    answer(client, '/x/bridge', drives='lift')()
+    drive(client, '/x/lift')
+    hung = Presence(client.node.context.get_domain_id() + 1, '/cell1/drive_can_bridge')
+    try:
+        _, lines, _ = run('stop', word)
+    finally:
+        hung.withdraw()
+    assert any(line.startswith('cell1/drive_can_bridge: NOT STOPPED') for line in lines) is may
+
+
+def test_patterns_of_namespaces(bridge: StartBridge, client: Client, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a1'))
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/a2'))
+    for each in (one, two):
+        each.online()
+    assert run('enable', '/a1/lift', '/a1/hoist', '/a2/lift')[0] == 0
+    assert run('disable', '/a*/lift')[0] == 0
+    assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (
+        ['disabled', 'online'], ['disabled'])
+    hang(client, '/a3/bridge')
+    replay('a pattern, and one that hangs', run)
+
+
+def test_a_bridge_that_is_not_configured(client: Client, run: Run) -> None:
+    answer(client, '/bridge', drives='')()
+    replay('no drives', run)
+
+
 def drive(client: Client, name: str, message: str = 'stopped', online: bool = True) -> None:
     """Be a drive that can be stopped."""
     def stop(_: Any, response: Any) -> Any:

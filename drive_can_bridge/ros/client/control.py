@@ -18,7 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.ros.client.calls import (
     ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
-from drive_can_bridge.ros.client.search import find_bridge, Graph, nobody, Search
+from drive_can_bridge.ros.client.search import (
+    find_bridge, find_bridges, Graph, nobody, Search)
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
@@ -28,6 +29,8 @@ _ONLINE_TIMEOUT = 5.0
 #: s that anything else may take: it is the bridge that says when it is over
 _CONTROL_TIMEOUT = 120.0
 _RUNNING = 'may still be running'
+#: in a pattern, not in a name
+_WILD = frozenset('*?[')
 
 
 class Answer(NamedTuple):
@@ -164,7 +167,8 @@ class Stop:
                  if found and not any(matches(word, node) for node in self._drives)]
         if not found:
             told.append(Answer('', False, nobody(self._namespace), bridge=True))
-        return told
+        return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
+                        for name in found]
 
     def _everybody(self) -> list[str]:
         return [node.lstrip('/') for each in self._search.found.values() for node in each.nodes]
@@ -200,7 +204,9 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
     for word in words:
         place = namespace_of(word) if word.startswith('/') else namespace
         if place not in bridges:
-            bridges[place] = find_bridge(graph, place).nodes
+            bridges[place] = tuple(
+                node for each in find_bridges(graph, place) for node in each.nodes
+            ) if place and _WILD & {*place} else find_bridge(graph, place).nodes
         found = [node for node in bridges[place] if matches(word, node)]
         if not found:
             there = ', '.join(node.lstrip('/') for node in bridges[place])

@@ -14,6 +14,7 @@ comes through.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 import math
 import os
 from typing import Any
@@ -267,7 +268,26 @@ def find_bridge(graph: Graph, namespace: str | None) -> Found:
     for each in search.found.values():
         if each.answered and each.drives:
             return each
-    raise NoBridge(nobody(namespace, names))
+    raise NoBridge(nobody(namespace, [name for name in names if not search.found[name].answered]))
+
+
+def find_bridges(graph: Graph, pattern: str) -> list[Found]:
+    """
+    Return the bridges in all namespaces that fit to a shell pattern.
+
+    :raises NoBridge: there is none, or one that does not answer.
+    """
+    search = Search(graph.client_node, None)
+
+    def done(now: float) -> bool:
+        search.look(now)
+        return search.settled or search.over(now)
+    graph.wait(done, 2.0 * _LONGEST)
+    found = [each for each in search.found.values()
+             if fnmatchcase(namespace_of(each.name), pattern)]
+    if not found or not all(each.answered for each in found):
+        raise NoBridge(nobody(pattern, [each.name for each in found if not each.answered]))
+    return found
 
 
 def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
