@@ -2,8 +2,9 @@
 """``drive_can decode``: what the frames of a trace, or of a bus, mean."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from contextlib import closing, ExitStack
+from itertools import chain
 import json
 from pathlib import Path
 import sys
@@ -92,17 +93,30 @@ def run(args: Namespace) -> int:
             check_readable(Path(args.file))
         except UnknownFormat as error:
             raise WrongUsage(str(error)) from None
+    complaints = _Complaints(args.file)
+    records: Iterator[Record] = (
+        iter(()) if args.live else read_records(Path(args.file), complaints))
+    first = next(records, None)
+    if first is None and not args.live:
+        complaints.conclude()
+        complain(f'{args.file}: there is no frame in it')
+        return FAILED
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, stack)
         tracer = Tracer(configuration, _together(sinks))
         if args.summary:
             endings.append(lambda: _summarise(tracer, as_json=args.json))
-        code = _live(args, configuration, tracer) if args.live else _file(args, tracer)
+        if first is None:
+            _live(args, configuration, tracer)
+        else:
+            take = tracer.take
+            for record in chain((first,), records):
+                take(record)
+            complaints.conclude()
         tracer.finish()
-        if code == 0:
-            for ending in endings:
-                ending()
-    return code
+        for ending in endings:
+            ending()
+    return 0
 
 
 def _written_over(args: Namespace) -> Path | None:
@@ -150,25 +164,7 @@ def _flushed(line: str) -> None:
     sys.stdout.flush()
 
 
-def _file(args: Namespace, tracer: Tracer) -> int:
-    complaints = _Complaints(args.file)
-    frames = _run_through(read_records(Path(args.file), complaints), tracer)
-    complaints.conclude()
-    if not frames:
-        complain(f'{args.file}: there is no frame in it')
-        return FAILED
-    return 0
-
-
-def _run_through(records: Iterable[Record], tracer: Tracer) -> bool:
-    take = tracer.take
-    record = None
-    for record in records:
-        take(record)
-    return record is not None
-
-
-def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
+def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> None:
     with closing(Taps(configuration, args.clock)) as taps:
         try:
             for record in taps.records(args.seconds):
@@ -178,7 +174,6 @@ def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -
                     tracer.take(record)
         except KeyboardInterrupt:
             pass
-    return 0
 
 
 def _draw(plotter: Plotter, path: str) -> None:

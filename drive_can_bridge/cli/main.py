@@ -24,6 +24,7 @@ from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, 
 from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.text import nearest
 from drive_can_bridge.process.beginning import let_signals_in
 
 #: what for, subcommand, one line of help
@@ -231,6 +232,10 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         module.define(own)
         own.epilog = '\n\n'.join(filter(None, (own.epilog, examples(PROGRAM, wanted))))
     complete(parser)
+    if arguments[:1] == [wanted] and wanted not in parsers:
+        near = nearest(wanted, parsers)
+        parser.error(f'there is no subcommand {wanted!r}'
+                     + (f', did you mean {near}?' if near else ''))
     args, rest = parser.parse_known_args(arguments)
     if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only
         args.words += [word for word in rest if not word.startswith('-')]

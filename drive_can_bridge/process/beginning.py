@@ -21,15 +21,15 @@ def begin() -> None:
 
 
 def open_streams() -> None:
-    """Open to nobody what is closed of the descriptors 0, 1 and 2, and of Python's outputs."""
+    """Open to nobody what is closed of the descriptors 0, 1 and 2, and of Python's streams."""
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)      # takes the lowest number, which is this one
-    for descriptor, name in ((1, 'stdout'), (2, 'stderr')):
+    for descriptor, name, mode in ((0, 'stdin', 'r'), (1, 'stdout', 'w'), (2, 'stderr', 'w')):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(descriptor, 'w', encoding='utf-8', closefd=False))
+            setattr(sys, name, open(descriptor, mode, encoding='utf-8', closefd=False))
 
 
 def hold_signals() -> None:

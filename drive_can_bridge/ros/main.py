@@ -24,6 +24,7 @@ from drive_can_bridge.core.sentences import ends_before_stop, may_still_be_runni
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
 from drive_can_bridge.process.standard_outputs import StandardOutputs
+from drive_can_bridge.resources import what_is_missing
 
 if TYPE_CHECKING:
     from drive_can_bridge.ros.bridge_node import BridgeNode
@@ -43,13 +44,25 @@ def main(args: Sequence[str] | None = None) -> int:
           StandardOutputs(clock) as outputs):
         watcher.last_steps.append(outputs.flush)
         _tell_rcutils(outputs)
-        code = watcher.exit_code(run(watcher, clock, arguments))
+        try:
+            code = run(watcher, clock, arguments)
+        except ImportError as error:
+            code = _complain(what_is_missing('drive_can_bridge', error))
+        except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
+            code = _complain('drive_can_bridge: internal error, please report it: '
+                             f'{type(error).__name__}: {error}')
+        code = watcher.exit_code(code)
         if args is None:
             sys.stdout.flush()
             sys.stderr.flush()
             outputs.flush()
             leave(code)
         return code
+
+
+def _complain(text: str) -> int:
+    print(text, file=sys.stderr, flush=True)
+    return 1
 
 
 def _tell_rcutils(outputs: StandardOutputs) -> None:

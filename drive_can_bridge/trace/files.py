@@ -31,6 +31,7 @@ from typing import Any, TextIO, TypeVar
 import can
 
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
 from drive_can_bridge.transport.tap import message_of, record_of
@@ -345,6 +346,9 @@ def _binary_records(path: Path, complain: Complain) -> Iterator[Record]:
         with can.LogReader(str(path)) as reader:
             for message in reader:
                 yield _record(message)
+    except NotImplementedError:     # of .mf4 only
+        raise DriveCanError(
+            f'{path}: .mf4 needs the Python module asammdf (pip install asammdf)') from None
     except Exception as error:  # noqa: BLE001  readers raise whatever a file makes them
         complain(f'the rest cannot be read: {type(error).__name__}: {error}')
 

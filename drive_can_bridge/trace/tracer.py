@@ -59,7 +59,7 @@ class BusTrace:
         self.bits = 0
         self.first = math.nan
         self.last = math.nan
-        self.peak_load = 0.0
+        self.peak_load = 0.0 if bitrate else math.nan
         self.somebody_sent = False
         self._second = math.nan
         self._second_bits = 0
@@ -92,14 +92,14 @@ class BusTrace:
 
     def close_second(self) -> None:
         """See whether the second that ends was the busiest."""
-        self.peak_load = max(self.peak_load,
-                             STUFFING * self._second_bits / max(self.bitrate, 1))
+        if self.bitrate:
+            self.peak_load = max(self.peak_load, STUFFING * self._second_bits / self.bitrate)
 
     @property
     def load(self) -> float:
-        """Mean load from the first frame to the last, 0 to 1 and more."""
-        elapsed = self.last - self.first
-        return STUFFING * self.bits / (elapsed * self.bitrate) if elapsed > 0.0 else math.nan
+        """Mean load from the first frame to the last, 0 to 1 and more; NaN: nobody knows."""
+        most = (self.last - self.first) * self.bitrate
+        return STUFFING * self.bits / most if most > 0.0 else math.nan
 
 
 class Tracer:

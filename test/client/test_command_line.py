@@ -123,6 +123,16 @@ def test_wrong_usage_is_told_before_a_bridge_is_looked_for(
     assert code == 2
 
 
+@pytest.mark.parametrize(('word', 'hint'), [
+    ('valdate', ', did you mean validate?'), ('stpo', ', did you mean stop?'), ('x', '')])
+def test_a_subcommand_that_is_not_there(word: str, hint: str,
+                                        capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        main([word, 'robot.yaml'])
+    assert capsys.readouterr() == (
+        '', f"drive_can: there is no subcommand '{word}'{hint}; see drive_can --help\n")
+
+
 def test_completion(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('argcomplete')
     for shell in completion_script.SHELLS:

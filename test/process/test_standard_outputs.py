@@ -185,6 +185,7 @@ print('output')
 print('error', file=sys.stderr)
 sys.stdout.flush()
 assert os.open(os.devnull, os.O_RDONLY) > 2
+assert sys.stdin.read() == '' and not sys.stdin.isatty()
 """
 
 

@@ -13,6 +13,8 @@ import pytest
 from transcripts import replayed, stories
 import yaml
 
+from drive_can_bridge.ros import main as executable
+
 CONFIG = Path(__file__).parents[2] / 'config'
 MAIN = 'import sys; from ros2cli.cli import main; sys.exit(main())'
 #: no daemon: it would outlive the test
@@ -49,6 +51,30 @@ def _ros2() -> Ros2:
                 break
         return told
     return run
+
+
+@pytest.mark.usefixtures('threads')
+@pytest.mark.parametrize(('missing', 'words'), [
+    ('rclpy', 'drive_can_bridge: needs ROS 2 (Python module rclpy): source your installation'),
+    ('can', 'drive_can_bridge: the Python module can is not installed\n')])
+def test_without_what_it_needs(missing: str, words: str, monkeypatch: pytest.MonkeyPatch,
+                               capsys: pytest.CaptureFixture[str]) -> None:
+    def run(*_: object) -> int:
+        raise ModuleNotFoundError(f'No module named {missing!r}', name=missing)
+    monkeypatch.setattr(executable, 'run', run)
+    assert executable.main(['drive_can_bridge']) == 1
+    assert capsys.readouterr().err.startswith(words)
+
+
+@pytest.mark.usefixtures('threads')
+def test_a_defect_of_the_executable_itself(monkeypatch: pytest.MonkeyPatch,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    def run(*_: object) -> int:
+        raise KeyError('a defect')
+    monkeypatch.setattr(executable, 'run', run)
+    assert executable.main(['drive_can_bridge']) == 1
+    assert capsys.readouterr().err == (
+        "drive_can_bridge: internal error, please report it: KeyError: 'a defect'\n")
 
 
 def replay(story: str, ros2: Ros2) -> None:

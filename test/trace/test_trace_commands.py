@@ -103,6 +103,18 @@ def test_summary(file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) ->
     assert lines[4].split()[:3] == ['main', '0.200', '8']
 
 
+def test_summary_of_a_bus_that_the_file_does_not_have(
+        file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace.write_text(TRACE + TRACE.replace(' can0 ', ' can7 '))
+    assert drive_can('decode', trace, '--summary', '--json', '--params-file', file) == 0
+    *_, main, foreign = map(json.loads, capsys.readouterr().out.splitlines())
+    assert main['bus'] == 'main' and main['load_percent'] > 0
+    assert {key: foreign[key] for key in ('bus', 'load_percent', 'peak_load_percent')} == {
+        'bus': 'can7', 'load_percent': None, 'peak_load_percent': None}
+    assert drive_can('decode', trace, '--summary', '--params-file', file) == 0
+    assert capsys.readouterr().out.splitlines()[-1].split()[::3] == ['can7', '–']
+
+
 def test_csv(file: Path, trace: Path, tmp_path: Path) -> None:
     table = tmp_path / 'values.csv'
     assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 0
@@ -127,9 +139,22 @@ def test_nothing_is_replaced_for_a_trace_that_cannot_be_read(file: Path, trace: 
                                                              tmp_path: Path) -> None:
     table = tmp_path / 'values.csv'
     table.write_text('of yesterday')
-    for wrong, code in ((tmp_path / 'absent.log', 1), (trace.with_suffix('.pcap'), 2)):
+    (tmp_path / 'empty.log').touch()
+    for wrong, code in ((tmp_path / 'absent.log', 1), (trace.with_suffix('.pcap'), 2),
+                        (tmp_path / 'empty.log', 1)):
         assert drive_can('decode', wrong, '--csv', table, '--params-file', file) == code
         assert table.read_text() == 'of yesterday'
+
+
+def test_a_format_whose_module_is_not_there(file: Path, trace: Path,
+                                             monkeypatch: pytest.MonkeyPatch,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr('can.io.mf4.asammdf', None)
+    wrong = trace.rename(trace.with_suffix('.mf4'))
+    assert drive_can('decode', wrong, '--params-file', file) == 1
+    assert capsys.readouterr() == (
+        '', f'drive_can decode: {wrong}: .mf4 needs the Python module asammdf '
+        '(pip install asammdf)\n')
 
 
 def test_plot(file: Path, trace: Path, tmp_path: Path,
