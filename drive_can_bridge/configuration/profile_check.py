@@ -120,7 +120,7 @@ def control_table(control: dict[str, Any]) -> ControlTable:
 #: of one name: as clients find it between others, and as a person may type it
 NAME_MAX = 60
 _NAME = re.compile(r'[^\s"\\]+( [^\s"\\]+)*')
-_NUMBER = re.compile(r'[+-]?[0-9.]')
+_NUMBER = re.compile(r'[+-]?(0[xX][0-9a-fA-F]+|[0-9.]+([eE][+-]?[0-9]+)?)')
 _NEXT = re.compile(r'(^| )-?[0-9]+:')
 
 
@@ -157,7 +157,7 @@ def check_names(tree: Tree, path: Path, given: dict[str, Any],
             tree.wrong(here, says('word_is_bool', word=word))
         elif not isinstance(name, str):
             tree.wrong(here, says('is_number', name=name))
-        elif (len(name) > NAME_MAX or not _NAME.fullmatch(name) or _NUMBER.match(name)
+        elif (len(name) > NAME_MAX or not _NAME.fullmatch(name) or _NUMBER.fullmatch(name)
               or _NEXT.search(name)):
             tree.wrong(here, says('no_name', name=name, longest=NAME_MAX))
         elif name in names:

@@ -240,8 +240,8 @@ WORDS = {
     'bool_has_no': 'a bool has no {entry}, allowed is to leave it out',
     'no_integer': '{limit!r} is no integer, allowed without scale, offset and unit are integers',
     'no_name':
-        '{name!r} is no name, allowed are at most {longest} characters that begin with no '
-        'digit, without quotes and double spaces',
+        '{name!r} is no name, allowed are at most {longest} characters that are no number, '
+        'without quotes and double spaces',
     'other_unit':
         '{name!r} has {unit}, allowed is an actual value with {wanted}, that of {parameter!r}',
     'cannot_be_sent': '{name!r} cannot be sent, allowed is {kind}{allowed}',

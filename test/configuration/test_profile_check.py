@@ -256,8 +256,9 @@ CASES = [
      [at('table.yaml:16: fault.parameter', 'write_only_one', name='order'),
       at('table.yaml:16: fault.codes.9', 'name_of_other', name='hot', other='7')]),
     ('control:\n', 'fault: {parameter: current, codes: {7: hot}}\ncontrol:\n', []),
-    ('control:\n', 'fault: {parameter: current, codes: {7: "7 hot"}}\ncontrol:\n',
-     [at('table.yaml:16: fault.codes.7', 'no_name', name='7 hot', longest=60)]),
+    ('control:\n', 'fault: {parameter: current, codes: {7: "24 V missing", 8: "+1"}}\n'
+     'control:\n',
+     [at('table.yaml:16: fault.codes.8', 'no_name', name='+1', longest=60)]),
     ('control:\n', 'fault: {parameter: current, codes: {}}\ncontrol:\n',
      [at('table.yaml:16: fault.codes', 'empty_mapping')]),
     ('control:\n', 'fault: {parameter: current, bit: status.redy}\ncontrol:\n',
