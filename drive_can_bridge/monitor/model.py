@@ -84,7 +84,6 @@ class DriveRecord:
         self._offline_at = -math.inf
         self._sampled_since: float | None = None
         self._readings: dict[str, tuple[str, float]] = {}
-        self._told_again = 0
 
     @property
     def rate(self) -> float:
@@ -123,7 +122,6 @@ class DriveRecord:
                  if known.get(name, info) is not info}
         self._readings = {name: reading for name, reading in self._readings.items()
                           if known.get(name) is self.parameters.get(name)}
-        self._told_again += bool(again)
         if any(known[name] != self.parameters[name] for name in again):
             # what was in another unit does not belong to the same line
             self.responses, self.requests = _Values(), _Values()
@@ -162,7 +160,7 @@ class DriveRecord:
             parameters=tuple(self.parameters.values()),
             readings={name: Reading(text, now - at)
                       for name, (text, at) in self._readings.items()},
-            told_again=self._told_again, silent=bool(silent))
+            silent=bool(silent))
 
     def _judge(self, report: Report, now: float, silent: float) -> tuple[str, Level, str, bool]:
         """Return state, level, advice, and whether it is online."""

@@ -261,7 +261,6 @@ class DriveSnapshot:
     :param asked_for: s for which its samples have been asked for without a break; 0: they are not.
     :param parameters: what the drive has; empty until it has told.
     :param readings: of the parameters that were asked for.
-    :param told_again: how often it has told of them once more: readings are asked for anew.
     """
 
     name: str
@@ -287,7 +286,6 @@ class DriveSnapshot:
     place: Place = Place()
     parameters: tuple[ParameterInfo, ...] = ()
     readings: Mapping[str, Reading] = field(default_factory=dict)
-    told_again: int = 0
     silent: bool = False
 
 

@@ -153,8 +153,10 @@ class CyclicExchange(Generic[TelegramT]):
                 # a drive has that long for its answer
                 timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
             return
-        if self._ending and self._waiting and not self._insist(now):
-            return
+        if self._ending and self._waiting:
+            self._insist(now)
+            if now < timer.due:     # that was all
+                return
         if not answers.in_turn or now >= answers.due:
             answers.settle(now)
         if timer.due == math.inf:   # what was missed has ended the cycles
@@ -318,16 +320,15 @@ class CyclicExchange(Generic[TelegramT]):
         else:
             self._teller.last_cycle_left(now)
 
-    def _insist(self, now: float) -> bool:
-        """Begin with more cycles for who has not shown to have heard one; False: that is all."""
+    def _insist(self, now: float) -> None:
+        """Begin with more cycles for who has not shown to have heard one."""
         if self.insisting or not self._unheard:
             self._end(now)
-            return False
+            return
         self._ending, self.cycles_left = Ending.MORE, MORE_CYCLES
         if self._session.configuration.period <= LAST_ANSWER:   # late answers have come by now
             for each in self.audience:
                 each.book.forget_asked()
-        return True
 
     def wait_out(self, now: float) -> None:
         """Come to the end of a stop that only waits for an answer, if that came."""

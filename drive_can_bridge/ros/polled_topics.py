@@ -36,8 +36,8 @@ from drive_can_bridge.ros.middleware import command_quality, GONE, overriding
 LATENESS_MAX = 250_000_000
 #: messages that are taken at once where everything is kept
 DEPTH_UNBOUNDED = 1000
-#: bytes of a message that are looked at: a JointState of some hundred joints
-LENGTH_MAX = 65536
+#: bytes of a message that are looked at: a JointState of a thousand joints with long names
+LENGTH_MAX = 1 << 20
 #: bytes in front of every message: how the rest is encoded
 HEADER = 4
 #: struct code of the one number of these messages

@@ -113,3 +113,18 @@ def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None
     one.node.stop()
     one.node.stop()
     assert client.state() == 'active'
+
+
+def test_a_drive_that_is_stopped_for_a_defect_says_so(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = run(bridge, client)
+    session = one.node.drives['lift'].session
+
+    def fail(*_: Any) -> None:
+        monkeypatch.undo()
+        raise KeyError('a defect')
+    monkeypatch.setattr(type(session), 'handle_timer', fail)
+    wait_until(lambda: session.defect)
+    defect = session.defect
+    assert client.set('/lift', ramp_time=1.0) == [(False, defect)]
+    one.online()
