@@ -189,7 +189,8 @@ LOG_MAX = 500
 BRIDGES_MAX, BUSES_MAX, DRIVES_MAX = 64, 256, 1024
 #: s that a bridge may be late with its diagnostics, beside one and a half of its periods
 _PATIENCE = 1.5
-_PERIOD_MIN = 1.0
+#: s of that period: taken for it until it is known (an answer may take its time), and limits
+_PERIOD_UNKNOWN, _PERIOD_MIN, _PERIOD_MAX = 3.0, 1.0, 3600.0
 
 
 class _BusRecord:
@@ -225,12 +226,25 @@ class _BridgeRecord:
         self.buses: dict[str, _BusRecord] = {}
         self.drives: dict[str, DriveRecord] = {}
         self._at = self._stamp = math.nan
-        self._period = _PERIOD_MIN
+        self._paced_at = -math.inf
+        self._period = _PERIOD_UNKNOWN
 
     def heard(self, stamp: float, now: float) -> None:
         if stamp > self._stamp:
-            self._period = max(_PERIOD_MIN, stamp - self._stamp)
+            self._goes_on_after(stamp - self._stamp)
         self._at, self._stamp = now, stamp
+
+    def paced(self, period: float, now: float) -> None:
+        self._paced_at = now
+        if not math.isnan(period):
+            self._goes_on_after(period)
+
+    def _goes_on_after(self, period: float) -> None:
+        self._period = min(max(period, _PERIOD_MIN), _PERIOD_MAX)
+
+    def late(self, now: float) -> bool:
+        """Tell whether it is to be asked for its period: that may have become longer."""
+        return now - max(self._at, self._paced_at) > 1.5 * self._period
 
     def silent(self, now: float) -> float:
         elapsed = now - self._at
@@ -301,6 +315,11 @@ class Model:
         if drive in self._drives:
             self._drives[drive].read(readings, now)
 
+    def paced(self, bridge: str, period: float, now: float) -> None:
+        """Take every how many s a bridge says that it tells of itself; NaN: it does not say."""
+        if bridge in self._bridges:
+            self._bridges[bridge].paced(period, now)
+
     def placed(self, drive: str, place: Place) -> None:
         """Take where a drive is."""
         if drive in self._drives:
@@ -340,10 +359,10 @@ class Model:
         record = self._bridges.get(bridge)
         return tuple(record.drives) if record else ()
 
-    def silent(self, now: float) -> tuple[str, ...]:
-        """Return the full names of bridges that say nothing any more, and of their drives."""
-        return tuple(name for bridge, record in self._bridges.items() if record.silent(now)
-                     for name in (bridge, *record.drives))
+    def doubtful(self, now: float) -> tuple[str, ...]:
+        """Return the full names of bridges that are late, and of the drives of silent ones."""
+        return tuple(name for bridge, record in self._bridges.items() if record.late(now)
+                     for name in (bridge, *(record.drives if record.silent(now) else ())))
 
     def take_anew(self) -> set[str]:
         """

@@ -142,7 +142,7 @@ def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
             name = f'{bridge.name} ' if len(snapshot.bridges) > 1 else ''
             since = clock(snapshot.at - bridge.silent)
             lines.append(f'bridge {name}silent since {since}: its drives may still be running; '
-                         'stop buttons have no effect')
+                         'a stop may not reach them')
     unheard = [name for name, seconds in snapshot.unheard.items() if seconds > _UNHEARD]
     if unheard:
         lines.append(f'{", ".join(unheard[:_NAMED])}{", " + _OTHER if unheard[_NAMED:] else ""}: '

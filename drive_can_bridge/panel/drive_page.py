@@ -22,7 +22,7 @@ from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
     box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
-    StopButtons, Values, words,
+    stop_buttons, Values, words,
 )
 
 _SPANS = {'30 s': 30, '1 min': 60, '10 min': 600}
@@ -318,7 +318,7 @@ class _Content:
                 self._state = words('', 'chip state')
                 self._control = words('')
                 box('space')
-                self._stops = StopButtons(drive, role)
+                stop_buttons(drive, role)
             self._advice = words('', 'advice')
             self._place = words('', 'dim')
         with ui.tabs().props('no-caps').classes('tabs') as tabs:
@@ -349,7 +349,6 @@ class _Content:
 
     def show(self, drive: DriveSnapshot, snapshot: Snapshot) -> None:
         self._look.set(class_of(tone_of(drive)))
-        self._stops.show(drive)
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)
         self._advice.set_text(

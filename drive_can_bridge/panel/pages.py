@@ -37,7 +37,7 @@ from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words, StopButtons,
+    Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words, stop_buttons,
     Values, words,
 )
 
@@ -164,7 +164,7 @@ class _Card:
             self._values = Values()
             with box('foot'):
                 self._place = words('', 'dim')
-                self._stops = StopButtons(drive, role)
+                stop_buttons(drive, role)
 
     def show(self, drive: DriveSnapshot, _: int, *, advice: bool, hidden: bool) -> None:
         self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
@@ -174,7 +174,6 @@ class _Card:
             drive.advice if advice and drive.level is not Level.OK and not drive.silent else '')
         self._values.show(drive)
         self._place.set_text(place_in_words(drive))
-        self._stops.show(drive)
 
 
 class _Row:
@@ -189,7 +188,7 @@ class _Row:
             self._state = words('', 'chip state')
             self._values = [words('', 'number'), words('', 'number')]
             self._place = words('', 'dim')
-            self._stops = StopButtons(drive, role)
+            stop_buttons(drive, role)
 
     def show(self, drive: DriveSnapshot, place: int, *, advice: bool, hidden: bool) -> None:
         self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
@@ -200,7 +199,6 @@ class _Row:
         for label, arrow, shown in zip(self._values, ('→ ', ''), (drive.setpoints, drive.values)):
             label.set_text(arrow + _value(principal(shown)) if shown else '')
         self._place.set_text(place_in_words(drive))
-        self._stops.show(drive)
 
 
 def _value(shown: Shown | None) -> str:

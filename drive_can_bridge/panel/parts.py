@@ -100,25 +100,17 @@ def in_script(value: Any) -> str:
     return json.dumps(value).replace('<', '\\u003c')
 
 
-class StopButtons:
-    """The buttons that stop a drive, those that it has, for an operator."""
+def stop_buttons(drive: DriveSnapshot, role: Role) -> None:
+    """
+    Make the buttons that stop a drive, those that it has, for an operator.
 
-    def __init__(self, drive: DriveSnapshot, role: Role) -> None:
-        self._buttons = []
-        self._off = False
-        if role is Role.OPERATOR:
-            with box('stops'):
-                self._buttons = [
-                    button(_STOPS[stop], 'danger', f'panel.stop({in_script(stop.value)}, '
-                           f'{in_script(drive.name)}, {in_script(drive.label)})')
-                    for stop in stops(drive)]
-
-    def show(self, drive: DriveSnapshot) -> None:
-        """Switch them off while they reach nobody."""
-        if drive.silent is not self._off:
-            self._off = drive.silent
-            for each in self._buttons:
-                each.props(**{'add' if drive.silent else 'remove': 'disabled'})
+    They are never off: its bridge may only seem to be silent, and what does not arrive is said.
+    """
+    if role is Role.OPERATOR:
+        with box('stops'):
+            for stop in stops(drive):
+                button(_STOPS[stop], 'danger', f'panel.stop({in_script(stop.value)}, '
+                       f'{in_script(drive.name)}, {in_script(drive.label)})')
 
 
 class Banner:

@@ -130,8 +130,8 @@ def test_a_silent_bridge_takes_its_drives_along_in_words() -> None:
     assert (drive.state, drive.level, drive.online) == ('unknown', Level.STALE, False)
     assert drive.silent
     assert snapshot.buses[0].state == 'unknown'
-    assert model.silent(NOW + 5.0) == (BRIDGE, '/conveyor')
-    assert model.silent(NOW + 1.0) == ()
+    assert model.doubtful(NOW + 5.0) == (BRIDGE, '/conveyor')
+    assert model.doubtful(NOW + 1.0) == ()
 
 
 def test_a_bridge_with_a_long_period_is_given_time() -> None:
@@ -140,6 +140,30 @@ def test_a_bridge_with_a_long_period_is_given_time() -> None:
         model.diagnosed([drive_status()], AT + 30.0 * number, NOW + 30.0 * number)
     assert model.look(NOW + 100.0, AT).drives[0].online
     assert not model.look(NOW + 110.0, AT).drives[0].online
+
+
+@pytest.mark.parametrize(('told', 'limit'), [
+    (10.0, 16.5), (60.0, 91.5), (0.1, 3.0), (math.nan, 3.0), (1e9, 5401.5)])
+def test_a_bridge_is_believed_how_often_it_tells(told: float, limit: float) -> None:
+    model = model_of([drive_status()])
+    # it is asked before it is called silent
+    assert model.doubtful(NOW + 1.6) == (BRIDGE,)
+    model.paced(BRIDGE, told, NOW + 1.6)
+    model.paced('/nobody', told, NOW + 1.6)
+    assert model.doubtful(NOW + 1.7) == ()
+    assert not model.look(NOW + limit, AT).bridges[0].silent
+    assert model.look(NOW + limit + 0.1, AT).bridges[0].silent
+    # what it does is what counts
+    for second in range(2):
+        model.diagnosed([drive_status()], AT + 5.0 + second, NOW + 5.0 + second)
+    assert model.look(NOW + 9.1, AT).bridges[0].silent
+
+
+def test_an_answer_may_take_its_time_at_first() -> None:
+    model = Model()
+    model.diagnosed([drive_status()], AT, NOW)
+    assert not model.look(NOW + 6.0, AT).bridges[0].silent
+    assert model.look(NOW + 6.1, AT).bridges[0].silent
 
 
 def test_samples_that_stay_away_tell_before_diagnostics_do() -> None:

@@ -190,13 +190,13 @@ def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     browser.shows('conveyor')
     browser.run('window.mark = 1')
     assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
-    browser.shows('silent since .*stop buttons have no effect')
+    browser.shows('silent since .*a stop may not reach them')
     buttons = 'return [...document.querySelectorAll("[data-drive] button")]'
-    assert browser.run(f'{buttons}.every(each=>each.disabled)')
+    assert browser.run(f'{buttons}.every(each=>!each.disabled)')
     site.bridge = site.start_bridge()
     browser.shows('bus main: up')
     browser.gone('silent since')
-    assert browser.run(f'{buttons}.some(each=>!each.disabled)')
+    assert browser.run(f'{buttons}.every(each=>!each.disabled)')
     # all that without loading the page anew
     assert browser.run('return window.mark') == 1
 

@@ -104,17 +104,13 @@ def test_many_are_filtered(page: Any) -> None:
     assert len(left()) == 8
 
 
-def test_buttons_of_a_silent_bridge_are_off(page: Any) -> None:
-    made = overview(seen('online', 'online'))
-
-    def off() -> list[bool]:
-        return ['disabled' in each.props for each in shown(page, 'danger')]
-    assert off() == [False] * 4
-    made.show(seen('online', 'online', silent=True))
-    assert off() == [True] * 4
-    assert all('unknown' in card.classes for card in shown(page, 'card'))
-    made.show(seen('online', 'online'))
-    assert off() == [False] * 4
+@pytest.mark.parametrize(('count', 'kind'), [(2, 'card'), (7, 'drive-row')])
+def test_stops_of_a_silent_bridge_are_there(page: Any, count: int, kind: str) -> None:
+    made = overview(seen(*['online'] * count))
+    for silent in (False, True, False):
+        made.show(seen(*['online'] * count, silent=silent))
+        assert ['disabled' in each.props for each in shown(page, 'danger')] == [False] * 2 * count
+        assert {'unknown' in each.classes for each in shown(page, kind)} == {silent}
 
 
 def test_the_banner_says_so_once(page: Any) -> None:

@@ -59,6 +59,25 @@ def test_where_a_drive_is_and_what_it_has(looking: Looking, client: Client,
                                   for line in looking.look().log]
 
 
+def test_a_bridge_that_tells_seldom_is_not_silent(bridge: StartBridge, client: Client) -> None:
+    bridge({**parameters(lift=LIFT), 'diagnostics_period': 10.0}).online()
+    looking = Looking()
+
+    def silent(seconds: float) -> set[bool]:
+        found, end = set(), clock().now() + seconds
+        while clock().now() < end:
+            clock().wait(clock().now() + 0.5)
+            found |= {each.silent > 0.0 for each in looking.look().bridges}
+        return found
+    assert silent(35.0) == {False}
+    # what was told is true no longer
+    assert client.set('/drive_can_bridge', diagnostics_period=1.0) == [(True, '')]
+    assert silent(5.0) == {False}
+    assert client.set('/drive_can_bridge', diagnostics_period=60.0) == [(True, '')]
+    assert silent(150.0) == {False}
+    looking.source.close()
+
+
 def test_samples_are_asked_for_while_somebody_looks(looking: Looking, client: Client) -> None:
     def listeners() -> int:
         return sum(client.node.count_subscribers(f'/lift/{kind}')

@@ -114,6 +114,7 @@ class MonitorClient:
         self._graph_at = 0.0
         self._calls = NodeCalls(self._node, _CALL_TIMEOUT)
         self._asked: set[str] = set()
+        self._bridges_asked: set[str] = set()   # and have not answered yet
 
     # -- for the view -----------------------------------------------------------------------------
 
@@ -180,7 +181,8 @@ class MonitorClient:
                   else frozenset())
         model.sampled(wanted, now)
         _keep(self._samples, wanted, self._subscribe_samples, _close_all)
-        self._asked &= {*model.drives, *model.bridges} - set(model.silent(now)) - model.take_anew()
+        doubtful = set(model.doubtful(now)) - self._bridges_asked
+        self._asked &= {*model.drives, *model.bridges} - doubtful - model.take_anew()
         for bridge in model.bridges:
             if bridge not in self._asked:
                 self._ask_places(bridge)
@@ -232,17 +234,25 @@ class MonitorClient:
         return Inbox(self._node, Bool, f'{drive}/{parameter}/{bit}', latched_quality(), take)
 
     def _ask_places(self, bridge: str) -> None:
-        """Ask a bridge where its drives are."""
+        """Ask a bridge where its drives are, and how often it tells of them."""
         self._asked.add(bridge)
+        self._bridges_asked.add(bridge)
         drives = self._model.drives_of(bridge)
         names = [f'drives.{drive.rpartition("/")[2]}.{key}' for drive in drives for key in _PLACE]
 
         def take(response: GetParameters.Response | None) -> None:
-            found = iter([] if response is None else response.values)
+            self._bridges_asked.discard(bridge)
+            if response is None:
+                self._asked.discard(bridge)
+                return
+            found = iter(response.values)
+            period = next(found, None)
+            self._model.paced(bridge, math.nan if period is None else _number(period), self._now)
             for drive, (bus, station, protocol, period) in zip(drives, zip(*[found] * 4)):
                 self._model.placed(drive, Place(
                     _text(bus), _text(station), _text(protocol), _number(period)))
-        self._ask(bridge, 'get_parameters', GetParameters.Request(names=names), take)
+        self._ask(bridge, 'get_parameters',
+                  GetParameters.Request(names=['diagnostics_period', *names]), take)
 
     def _ask_names(self, drive: str) -> None:
         """Ask a drive what parameters it has, and then what they are."""
