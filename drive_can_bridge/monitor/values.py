@@ -4,6 +4,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
+import re
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
@@ -18,8 +19,8 @@ _BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
 #: what the bridge uses a parameter for, and so writes itself
 _ROLES = {'cyclic': 'sent cyclically: a setpoint', 'control': 'control word: use ~/enable',
           'map': 'a map: not written while the bridge runs'}
-#: names that say what a profile cannot
-_MOVING = ('setpoint', 'control_word')
+#: names that say what a profile cannot: setpoints, those of CiA 402 (targets) too
+_MOVING = re.compile(r'(setpoint|control_word)$|(^|_)target(_|$)')
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
@@ -149,7 +150,7 @@ class ParameterInfo:
         role = self.facts.get('role')
         if role is not None:
             return _ROLES.get(role, role)
-        if self.name.endswith(_MOVING):     # also while nobody maps it
+        if _MOVING.search(self.name):   # also while nobody maps it
             return 'moves the drive: not written here'
         return 'protected by its profile: not written here' * (
             self.facts.get('protected') == 'true')

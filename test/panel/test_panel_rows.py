@@ -42,6 +42,16 @@ def test_a_name_stays_one_attribute(page: object, name: str) -> None:
     assert [dict(props) for props in marks] == [{'data-parameter': name}]
 
 
+@pytest.mark.parametrize(('name', 'edited'), [
+    ('target', False), ('target_position', False), ('vl_target_velocity', False),
+    ('interpolation_target', False), ('speed_setpoint', False), ('control_word', False),
+    ('setpoint_source', True), ('targets', True), ('retarget_time', True)])
+def test_what_moves_a_drive_has_no_field(page: object, name: str, edited: bool) -> None:
+    from drive_can_bridge.panel.drive_page import _Row
+    row = _Row('/lift', replace(RAMP, name=name), writes=True)
+    assert (row._field is not None) == edited
+
+
 def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: object) -> None:
     from drive_can_bridge.panel.drive_page import _Row
     row = _Row('/lift', RAMP, writes=True)
