@@ -38,6 +38,7 @@ def plain_page(status: int, reason: str) -> str:
 
 #: names of this machine that a browser on it may use
 LOOPBACK_NAMES = frozenset({'localhost', '127.0.0.1', '[::1]'})
+_Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 #: parameter of the address that is printed
 TOKEN = 'token'
 
@@ -86,6 +87,7 @@ class Access:
         self.tokens = {role: secrets.token_urlsafe(24) for role in Role}
         self.cookie_name = f'drive_can_panel_{port}'
         self._anywhere = not is_loopback(host)
+        self._own = _address(host.strip('[]'))
         self._names = set(LOOPBACK_NAMES)
         if self._anywhere:
             names = {host, socket.gethostname(), socket.getfqdn(), f'{socket.gethostname()}.local'}
@@ -108,7 +110,8 @@ class Access:
     def _judge_host(self, fields: Mapping[str, list[str]]) -> Refusal | None:
         hosts = fields.get('host', [])
         name = _host_name(hosts[0]) if len(hosts) == 1 else ''
-        if name in self._names or self._anywhere and _is_address(name):
+        address = _host_address(name)
+        if name in self._names or address and (self._anywhere or address == self._own):
             return None
         return Refusal(403, 'this panel does not answer to that name: use the address that '
                             'drive_can panel has printed')
@@ -156,10 +159,8 @@ def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
 
 def is_loopback(host: str) -> bool:
     """Tell whether nobody but this machine reaches an address to listen on."""
-    try:
-        return ipaddress.ip_address(host.strip('[]')).is_loopback
-    except ValueError:
-        return host.lower() == 'localhost'
+    address = _address(host.strip('[]'))
+    return address.is_loopback if address else host.lower() == 'localhost'
 
 
 def _host_name(host: str) -> str:
@@ -171,14 +172,18 @@ def _host_name(host: str) -> str:
     return name if port.isdecimal() else ''
 
 
-def _is_address(name: str) -> bool:
-    """Tell whether a name is an address: nobody can have it lead elsewhere."""
+def _host_address(name: str) -> _Address | None:
+    """Return the address that a Host is; None where it is a name, which may lead elsewhere."""
     bracketed = name.startswith('[') and name.endswith(']')
+    address = _address(name[1:-1] if bracketed else name)
+    return address if address and bracketed == (address.version == 6) else None
+
+
+def _address(text: str) -> _Address | None:
     try:
-        address = ipaddress.ip_address(name[1:-1] if bracketed else name)
+        return ipaddress.ip_address(text)
     except ValueError:
-        return False
-    return bracketed == (address.version == 6)
+        return None
 
 
 def _cookie(headers: Iterable[str], name: str) -> str:

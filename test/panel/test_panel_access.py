@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The rules of who may come in, request by request."""
 
+from urllib.parse import urlsplit
+
 import pytest
 
 from drive_can_bridge.panel.access import Access, Entry, is_loopback, Refusal, Role
@@ -90,6 +92,29 @@ def test_on_the_network_addresses_are_names_and_others_still_are_not() -> None:
     assert isinstance(judge(access, host='[fe80::1]:8080'), Entry)
     assert refused(judge(access, host='evil.example:8080')) == 403
     assert isinstance(judge(Access(port=PORT, host='robot.lan'), host='robot.lan:8080'), Entry)
+
+
+@pytest.mark.parametrize(('host', 'sent'), [
+    ('127.0.0.2', '127.0.0.2:8080'), ('127.1.2.3', '127.1.2.3'), ('::1', '[::1]:8080'),
+    ('[::1]', '[::1]'), ('0:0:0:0:0:0:0:1', '[::1]:8080'), ('::ffff:127.0.0.1', '[::ffff:7f00:1]'),
+    ('fe80::1', '[fe80::1]:8080'), ('localhost', 'localhost:8080'), ('LOCALHOST', 'localhost')])
+def test_where_it_listens_it_answers(host: str, sent: str) -> None:
+    access = Access(port=PORT, host=host)
+    assert isinstance(judge(access, host=sent), Entry)
+    assert refused(judge(access, host='evil.example:8080')) == 403
+    if is_loopback(host):
+        assert refused(judge(access, host='127.9.9.9:8080')) == 403
+        assert refused(judge(access, host='[fe80::2]:8080')) == 403
+
+
+@pytest.mark.parametrize('host', ['127.0.0.1', '127.0.0.2', 'localhost'])
+def test_the_address_that_is_printed_opens_it(host: str) -> None:
+    pytest.importorskip('uvicorn')
+    from drive_can_bridge.panel.server import address, listen
+    with listen(host, 0) as listener:
+        access = Access(port=listener.getsockname()[1], host=host)
+        printed = urlsplit(address(listener, access.tokens[Role.VIEWER]))
+    assert isinstance(judge(access, host=printed.netloc, query=printed.query, cookie=''), Entry)
 
 
 def test_two_hosts_or_none_are_refused() -> None:
