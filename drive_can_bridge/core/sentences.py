@@ -607,6 +607,16 @@ def may_still_be_running(why: str) -> str:
 
 
 @sentence
+def no_answer_to_stop(seconds: float) -> str:
+    return f'no answer in {seconds:g} s'
+
+
+@sentence
+def nobody_takes(service: str) -> str:
+    return f'nobody offers its ~/{service}'
+
+
+@sentence
 def stop_not_answered() -> str:
     return 'told to stop, but it does not answer'
 

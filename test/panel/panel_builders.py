@@ -205,7 +205,7 @@ class Site(Visitors):
     def ask(self, method: str, path: str, role: str | None = None,
             headers: Mapping[str, str] | None = None, body: bytes | None = None) -> Answer:
         """Send a request; headers may take the place of the usual ones."""
-        connection = HTTPConnection('127.0.0.1', self.port, timeout=30.0)
+        connection = HTTPConnection('127.0.0.1', self.port, timeout=60.0)
         try:
             connection.request(method, path, body, {**self.cookie(role), **(headers or {})})
             response: HTTPResponse = connection.getresponse()

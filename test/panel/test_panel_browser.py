@@ -185,6 +185,18 @@ def test_charts_draw_pause_and_zoom(site: Site, browser: Browser) -> None:
     assert browser.zoom() == [50, 100]
 
 
+def test_a_stop_that_takes_long_is_not_forgotten(site: Site, browser: Browser) -> None:
+    browser.open(site.addresses['operator'])
+    browser.open(f'http://{site.host}/drive/lift')
+    browser.shows('bus main')
+    site.bridge.process.send_signal(signal.SIGSTOP)
+    browser.click('button', 'Disable')
+    browser.shows('lift: no answer to disable yet: may still be running')
+    site.bridge.process.send_signal(signal.SIGCONT)
+    browser.gone('no answer to disable yet')
+    assert 'nobody' not in browser.text
+
+
 def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     browser.open(site.addresses['operator'])
     browser.shows('conveyor')

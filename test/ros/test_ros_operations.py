@@ -7,13 +7,16 @@ import time
 from typing import Any
 
 from clients import Client, wait_until
+import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameterTypes, SetParameters
 import rclpy
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.sentences import nobody_answered, nobody_offers
+from drive_can_bridge.core.sentences import (
+    may_still_be_running, no_answer_to_stop, nobody_offers, nobody_takes,
+)
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT
@@ -113,11 +116,64 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
             operations.stop('/lift', Stop.DISABLE, told.append, now)
             assert operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT - 0.1)
             assert not operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT)
-            assert told[1:] == [Outcome(False, nobody_answered())]
+            assert told[1:] == [Outcome(False, may_still_be_running(nobody_takes('enable')))]
             operations.stop('/conveyor', Stop.DISABLE, told.append, now)
             assert told[-1].text == nobody_offers('/conveyor/enable')
         finally:
             client.node.destroy_service(service)
+
+
+class Busy:
+    """A drive's stop, whose answers are kept back."""
+
+    def __init__(self, client: Client, kind: Any, name: str) -> None:
+        self._node = client.node
+        self.kept: list[tuple[Any, ...]] = []
+        self._service = self._node.create_service(kind, name, self._answer)
+        self._send = self._service.send_response
+        self._service.send_response = lambda *answer: self.kept.append(answer)
+
+    @staticmethod
+    def _answer(_: Any, response: Any) -> Any:
+        response.success, response.message = True, 'stopped'
+        return response
+
+    def answers(self) -> None:
+        """Answer what was asked last."""
+        self._send(*self.kept[-1])
+
+    def close(self) -> None:
+        self._node.destroy_service(self._service)
+
+
+@pytest.mark.parametrize(('stop', 'kind', 'name', 'patience', 'times'), [
+    (Stop.QUICK_STOP, Trigger, 'quick_stop', 10.0, 2),
+    (Stop.DISABLE, SetBool, 'enable', 120.0, 1)])
+def test_a_stop_may_take_as_long_as_that_of_a_command(
+        client: Client, stop: Stop, kind: Any, name: str, patience: float, times: int) -> None:
+    now, told, wanted = 100.0, list[Outcome](), {'/lift': [stop]}
+    busy = Busy(client, kind, f'/lift/{name}')
+    try:
+        with asking(client) as operations:
+            for answered in (True, False):
+                busy.kept.clear()
+                operations.poll(wanted, now)
+                operations.stop('/lift', stop, told.append, now)
+                wait_until(lambda: operations.poll(wanted, now) and busy.kept, what='a stop')
+                # DDS may lose an answer
+                wait_until(lambda: operations.poll(wanted, now + 1.0)
+                           and len(busy.kept) == times, what='a stop, again')
+                assert operations.poll(wanted, now + patience - 0.1)
+                if answered:
+                    busy.answers()
+                    wait_until(lambda: not operations.poll(wanted, now + patience - 0.1),
+                               what='an answer')
+                else:
+                    assert not operations.poll(wanted, now + patience)
+    finally:
+        busy.close()
+    assert told == [Outcome(True, 'stopped'),
+                    Outcome(False, may_still_be_running(no_answer_to_stop(patience)))]
 
 
 def test_disable_asks_for_anything_but_enable(client: Client) -> None:

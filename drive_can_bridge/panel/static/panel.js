@@ -51,6 +51,7 @@ const panel = (() => {
     while (list.children.length > 4) list.firstChild.remove();
     // what went wrong stays until it is read
     if (success && !stays) setTimeout(() => told.remove(), 6000);
+    return told;
   }
 
   async function ask(path, options) {
@@ -68,7 +69,14 @@ const panel = (() => {
     method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(fields)});
 
   async function stop(action, drive, name) {
+    let waiting;
+    const late = setTimeout(() => {
+      waiting = tell(false, `${name}: no answer to ${action.replace('_', ' ')} yet: `
+        + 'may still be running');
+    }, 5000);
     const answer = await send(action, {drive});
+    clearTimeout(late);
+    if (waiting) waiting.remove();
     const text = answer.text || `${action.replace('_', ' ')} done`;
     // of all drives, those that do not stand are named in the answer
     const all = drive === '*';

@@ -23,11 +23,11 @@ from drive_can_bridge.ros.client.search import (
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
-STOP_TIMEOUT, _AGAIN = 10.0, 1.0
+STOP_TIMEOUT, STOP_AGAIN = 10.0, 1.0
 #: s that it may take to hear whether a drive is online
 _ONLINE_TIMEOUT = 5.0
 #: s that anything else may take: it is the bridge that says when it is over
-_CONTROL_TIMEOUT = 120.0
+CONTROL_TIMEOUT = 120.0
 _RUNNING = 'may still be running'
 #: in a pattern, not in a name
 _WILD = frozenset('*?[')
@@ -73,7 +73,8 @@ class _Stopping:
         self._since = now
         self._online: bool | None = None
         self._inbox: Inbox | None = None
-        self._service = Service(client_node, Trigger, f'{node}/quick_stop', STOP_TIMEOUT, _AGAIN)
+        self._service = Service(client_node, Trigger, f'{node}/quick_stop', STOP_TIMEOUT,
+                                STOP_AGAIN)
         self._service.send(Trigger.Request(), self._take, now, 2.0 * OFFER_TIMEOUT)
 
     def _take(self, response: Any) -> None:
@@ -212,7 +213,7 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
             there = ', '.join(node.lstrip('/') for node in bridges[place])
             raise UnknownDrive(f'no drive {word!r}; there are: {there}')
         nodes.update(dict.fromkeys(found))
-    calls = NodeCalls(graph.client_node, _CONTROL_TIMEOUT)
+    calls = NodeCalls(graph.client_node, CONTROL_TIMEOUT)
     answers: dict[str, Answer] = {}
     service = ORDERS[order].service
 

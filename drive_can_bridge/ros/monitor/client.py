@@ -21,7 +21,9 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value, ValueKind
-from drive_can_bridge.core.sentences import nobody_answered, nobody_offers
+from drive_can_bridge.core.sentences import (
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_offers, nobody_takes,
+)
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import is_ros_name, Outcome, Place, Status, Stop
@@ -29,6 +31,7 @@ from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
+from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
 from drive_can_bridge.ros.recognition import bridges_among, drives_among
@@ -37,14 +40,15 @@ _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
           ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
 _LEVELS = {getattr(Log, name): name
            for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
-#: s for a stop, which answers when the drive's status says so, and for a read or write
-STOP_TIMEOUT = 10.0
+#: s for a read or write
 PARAMETER_TIMEOUT = 15.0
 
-#: service and request of each; ``enable`` is asked for its false only
-_STOPS: dict[Stop, tuple[str, Any, Callable[[], Any]]] = {
-    Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request),
-    Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False)),
+#: service and request of each, s that the answer may take (it comes when the drive's status says
+#: so) and after how many it is asked again; ``enable`` is asked for its false only
+_STOPS: dict[Stop, tuple[str, Any, Callable[[], Any], float, float]] = {
+    Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request, STOP_TIMEOUT, STOP_AGAIN),
+    Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False), CONTROL_TIMEOUT,
+                   math.inf),
 }
 _SILENCE = Outcome(False, nobody_answered())
 
@@ -328,8 +332,9 @@ class Operations:
             if not self._stops[gone].busy:
                 self._stops.pop(gone).close()
         for drive, stop in wanted - self._stops.keys():
-            name, kind, _ = _STOPS[stop]
-            self._stops[drive, stop] = Service(self._node, kind, f'{drive}/{name}', STOP_TIMEOUT)
+            name, kind, _, patience, again = _STOPS[stop]
+            self._stops[drive, stop] = Service(self._node, kind, f'{drive}/{name}', patience,
+                                               again)
         for service in self._stops.values():
             if service.busy:
                 service.look(now)
@@ -338,14 +343,19 @@ class Operations:
 
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
         """Stop a drive."""
-        def take(response: Any) -> None:
-            done(_SILENCE if response is None
-                 else Outcome(response.success, printable(response.message)))
+        name, _, request, patience, _ = _STOPS[stop]
         service = self._stops.get((drive, stop))
         if service is None:
-            done(Outcome(False, nobody_offers(f'{drive}/{_STOPS[stop][0]}')))
-        else:
-            service.send(_STOPS[stop][2](), take, now)
+            done(Outcome(False, nobody_offers(f'{drive}/{name}')))
+            return
+
+        def take(response: Any) -> None:
+            if response is not None:
+                done(Outcome(response.success, printable(response.message)))
+            else:
+                done(Outcome(False, may_still_be_running(
+                    no_answer_to_stop(patience) if service.ready else nobody_takes(name))))
+        service.send(request(), take, now)
 
     def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
               now: float) -> None:
