@@ -9,7 +9,8 @@ Start a bridge of its own for each bus of one parameter file: each has a process
 One process serves all buses of its parameter file, and its threads share one interpreter: two
 buses of 1 Mbit/s that are full keep more than a core busy. Here the drives keep their names,
 topics and services; the bridges are called ``drive_can_bridge_BUS``, and each has the diagnostics
-and the ``~/joint_states`` of its own drives only. On Ctrl-C each of them stops its drives.
+and the ``~/joint_states`` of its own drives only. ``drive_can`` and the panel take them together.
+On Ctrl-C each of them stops its drives.
 """
 
 from pathlib import Path

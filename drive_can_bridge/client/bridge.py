@@ -19,7 +19,7 @@ from drive_can_bridge.core.parameters import (
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, taken_apart
-from drive_can_bridge.ros.client.search import find_bridge, Graph
+from drive_can_bridge.ros.client.search import find_drives, Graph
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
 
@@ -178,25 +178,25 @@ class BridgedDrive(Drive):
 #: names in one call
 _BATCH = 200
 _DRIVE_KEYS = ('bus', 'protocol', 'station', 'profile', 'profile_sha256', 'identity', 'restore')
+_PERIOD = 'diagnostics_period'
 _BUS_KEYS = ('interface', 'channel', 'bitrate')
 
 
 class BridgeSource:
     """
-    The drives of a running bridge.
+    The drives of a running bridge, or of all bridges of one namespace.
 
-    :param namespace: where it runs; None: anywhere, if there is only one.
-    :raises WhichBridge: there are several.
+    :param namespace: where they run; None: anywhere, if there is only one.
+    :raises WhichBridge: there are several, and not together.
     :raises NoBridge: there is none, or it does not answer.
     """
 
     def __init__(self, namespace: str | None, clock: Clock) -> None:
         self._graph = Graph(clock)
         try:
-            found = find_bridge(
+            self._bridges = find_drives(
                 self._graph,
                 namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/'))
-            self.bridge, self._names = found.name, found.drives or ()
         except NoBridge as error:
             self._graph.close()
             raise NoBridge(f'{error}: start one, or name its file with --params-file to talk to '
@@ -208,7 +208,7 @@ class BridgeSource:
     @property
     def names(self) -> Sequence[str]:
         """All drives, in the order of the configuration."""
-        return self._names
+        return list(self._bridges)
 
     def parameter_names(self, drive: str) -> Sequence[str]:
         """Return the names of the listed parameters of a drive."""
@@ -217,13 +217,15 @@ class BridgeSource:
 
     def open(self, names: Sequence[str]) -> Drives:
         """Ask for what is known of these drives."""
-        wanted = [name for name in self._names if name in names]
-        period = self._values(['diagnostics_period'])['diagnostics_period']
+        wanted = {name: bridge for name, bridge in self._bridges.items() if name in names}
+        period_of = {bridge: self._values(bridge, [_PERIOD])[_PERIOD]
+                     for bridge in dict.fromkeys(wanted.values())}
         opened = {}
-        for name in wanted:
+        for name, bridge in wanted.items():
             table, roles = self._table(name)
             opened[name] = BridgedDrive(self._graph, self._node_of(name), self._facts(name),
-                                        table, roles, float(period or 1.0), self._identity)
+                                        table, roles, float(period_of[bridge] or 1.0),
+                                        self._identity)
         return Drives(opened, self.close)
 
     def close(self) -> None:
@@ -231,22 +233,23 @@ class BridgeSource:
         self._graph.close()
 
     def _node_of(self, drive: str) -> str:
-        return f'{self.bridge.rpartition("/")[0]}/{drive}'
+        return f'{self._bridges[drive].rpartition("/")[0]}/{drive}'
 
-    def _values(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return parameters of the bridge; None for those that it does not have."""
-        answer = self._graph.call(self.bridge, 'get_parameters',
+    def _values(self, bridge: str, names: Sequence[str]) -> dict[str, Any]:
+        """Return parameters of a bridge; None for those that it does not have."""
+        answer = self._graph.call(bridge, 'get_parameters',
                                   GetParameters.Request(names=list(names)))
         values = [plain(value) for value in answer.values]
         if len(values) != len(names):   # rclpy answers nothing where one name is unknown
-            values = [self._values([name])[name] if len(names) > 1 else None for name in names]
+            values = [self._values(bridge, [name])[name] if len(names) > 1 else None
+                      for name in names]
         return dict(zip(names, values))
 
     def _facts(self, drive: str) -> DriveFacts:
-        prefix = f'drives.{drive}.'
-        values = self._values([prefix + key for key in _DRIVE_KEYS])
+        prefix, bridge = f'drives.{drive}.', self._bridges[drive]
+        values = self._values(bridge, [prefix + key for key in _DRIVE_KEYS])
         bus = str(values[f'{prefix}bus'])
-        place = self._values([f'buses.{bus}.{key}' for key in _BUS_KEYS])
+        place = self._values(bridge, [f'buses.{bus}.{key}' for key in _BUS_KEYS])
         persist = f'{prefix}persist_writes'     # of one family only
         return DriveFacts(
             name=drive, bus=bus, interface=str(place[f'buses.{bus}.interface']),
@@ -255,12 +258,12 @@ class BridgeSource:
             protocol=str(values[f'{prefix}protocol']), station=int(values[f'{prefix}station']),
             profile=str(values[f'{prefix}profile']),
             profile_sha256=str(values[f'{prefix}profile_sha256']),
-            restore=_restore_table(values[f'{prefix}restore']), through=self.bridge,
-            persist_writes=self._values([persist])[persist] is not False)
+            restore=_restore_table(values[f'{prefix}restore']), through=bridge,
+            persist_writes=self._values(bridge, [persist])[persist] is not False)
 
     def _identity(self, drive: str) -> str:
         name = f'drives.{drive}.identity'
-        return str(self._values([name])[name] or '')
+        return str(self._values(self._bridges[drive], [name])[name] or '')
 
     def _table(self, drive: str) -> tuple[dict[str, Parameter], dict[str, Role]]:
         """Return the parameters that a drive lists, and what the bridge uses them for."""

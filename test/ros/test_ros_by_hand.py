@@ -4,6 +4,7 @@
 from collections.abc import Callable
 import json
 import os
+from pathlib import Path
 import re
 from typing import Any
 
@@ -215,3 +216,27 @@ def test_a_fault_is_reset(bridge: StartBridge, run: Run) -> None:
     wait_until(lambda: states(one, 'lift') == ['fault'])
     code, lines, _ = run('reset', 'lift')
     assert (code, states(one, 'lift')) == (0, ['disabled']), lines
+
+
+def test_bridges_of_one_namespace_stand_together(
+        bridge: StartBridge, client: Client, run: Run, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    one, two = (bridge(parameters(**drives), key='/**', arguments=(
+        '-r', '__ns:=/cell', '-r', f'__node:={name}'))
+        for name, drives in (('left', {'hoist': HOIST}), ('right', {'lift': LIFT})))
+    for each in (one, two):
+        each.online()
+    replay('a bridge a bus', run)
+    assert [played.value('ramp_time') for each in (one, two) for played in each.played.values()
+            ] == [1.0, 3.25]
+    hang(client, '/cell/mute')
+    replay('a bridge a bus, and one that does not answer', run)
+    answer(client, '/b/bridge')()
+    replay('a bridge a bus, and one elsewhere', run)
+
+
+def test_drives_of_one_name_are_not_told_apart(client: Client, run: Run) -> None:
+    for name in ('/left', '/right'):
+        answer(client, name, drives='lift')()
+    replay('two with drives of one name', run)

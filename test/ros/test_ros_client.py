@@ -201,8 +201,9 @@ def test_one_that_this_process_has_not_seen_yet_counts(client: Client) -> None:
     source.close()
 
 
-def test_two_of_one_name_are_two(client: Client) -> None:
-    answer(client, '/cell/bridge', others=['/cell/bridge'])()
+@pytest.mark.parametrize('others', [[], ['/cell/other']])
+def test_two_of_one_name_are_two(client: Client, others: list[str]) -> None:
+    answer(client, '/cell/bridge', others=['/cell/bridge', *others])()
     with pytest.raises(WhichBridge, match='^2 bridges are called /cell/bridge'):
         find_source(namespace='cell')
 

@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from drive_can_bridge.ros.client.calls import (
     ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.search import (
-    find_bridge, find_bridges, Graph, nobody, Search)
+    find_bridges, find_drives, Graph, nobody, Search)
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
@@ -197,20 +197,22 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
     :param order: of :data:`ORDERS`.
     :param words: names, patterns or full names; a full name says which bridge is meant.
     :raises UnknownDrive: a word names none.
-    :raises WhichBridge: there are several.
-    :raises NoBridge: there is none.
+    :raises WhichBridge: there are several, and not together.
+    :raises NoBridge: there is none, or it does not answer.
     """
     nodes: dict[str, None] = {}
-    bridges: dict[str | None, tuple[str, ...]] = {}
+    known: dict[str | None, list[str]] = {}
     for word in words:
         place = namespace_of(word) if word.startswith('/') else namespace
-        if place not in bridges:
-            bridges[place] = tuple(
+        if place not in known:
+            known[place] = [
                 node for each in find_bridges(graph, place) for node in each.nodes
-            ) if place and _WILD & {*place} else find_bridge(graph, place).nodes
-        found = [node for node in bridges[place] if matches(word, node)]
+            ] if place and _WILD & {*place} else [
+                f'{namespace_of(bridge)}/{drive}'
+                for drive, bridge in find_drives(graph, place).items()]
+        found = [node for node in known[place] if matches(word, node)]
         if not found:
-            there = ', '.join(node.lstrip('/') for node in bridges[place])
+            there = ', '.join(node.lstrip('/') for node in known[place])
             raise UnknownDrive(f'no drive {word!r}; there are: {there}')
         nodes.update(dict.fromkeys(found))
     calls = NodeCalls(graph.client_node, CONTROL_TIMEOUT)

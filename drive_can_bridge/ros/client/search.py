@@ -248,27 +248,38 @@ class Search:
                         ListParameters.Request(prefixes=['drives']), take_drives, now)
 
 
-def find_bridge(graph: Graph, namespace: str | None) -> Found:
+def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     """
-    Return the one bridge that is meant.
+    Return the drives of the bridges of one namespace, with the full name of the bridge of each.
 
-    :param namespace: where it runs, ``/cell``, '' for the root; None: anywhere.
-    :raises WhichBridge: there are several, whether they answer or not.
+    :param namespace: where they run, ``/cell``, '' for the root; None: anywhere.
+    :raises WhichBridge: there are several, and in several namespaces, or two of one name, or with
+        drives of one name, or one that does not answer.
     :raises NoBridge: there is none, or it does not answer.
     """
     search = Search(graph.client_node, namespace)
 
     def done(now: float) -> bool:
         search.look(now)
-        return len(search.names) > 1 or search.settled or search.over(now)
+        return bool(_which(search.names)) or search.settled or search.over(now)
     graph.wait(done, 2.0 * _LONGEST)
     names = search.names
-    if len(names) > 1:
+    if _which(names):
         raise WhichBridge(_which(names))
-    for each in search.found.values():
-        if each.answered and each.drives:
-            return each
-    raise NoBridge(nobody(namespace, [name for name in names if not search.found[name].answered]))
+    silent = [name for name in names if not search.found[name].answered]
+    if silent and len(names) > 1:
+        raise WhichBridge(f'several bridges are running: {", ".join(names)}, and not every one '
+                          f'answers: {", ".join(silent)}')
+    bridges: dict[str, str] = {}
+    for name in names:
+        for drive in search.found[name].drives or ():
+            if drive in bridges:
+                raise WhichBridge(f'{bridges[drive]} and {name} have a drive {drive} each: start '
+                                  'each in a namespace of its own')
+            bridges[drive] = name
+    if silent or not bridges:
+        raise NoBridge(nobody(namespace, silent))
+    return bridges
 
 
 def find_bridges(graph: Graph, pattern: str) -> list[Found]:
@@ -295,16 +306,15 @@ def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
     where = '' if namespace is None else f' in namespace {namespace or "/"}'
     domain = os.environ.get('ROS_DOMAIN_ID') or '0'
     if silent:
-        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
-                f'{"does" if len(silent) == 1 else "do"} not')
+        return (f'no bridge answers{where} (ROS domain {domain}): '
+                f'{", ".join(silent)} {"does" if len(silent) == 1 else "do"} not')
     return f'no configured bridge is running{where} (ROS domain {domain})'
 
 
 def _which(names: Sequence[str]) -> str:
-    if len(set(names)) == 1:
-        return (f'{len(names)} bridges are called {names[0]}: start each in a namespace of its '
-                'own')
-    if len({namespace_of(name) for name in names}) == 1:
-        return (f'several bridges are running in one namespace: {", ".join(names)}; start each '
-                'in one of its own')
-    return (f'several bridges are running: {", ".join(names)}; choose one with --namespace')
+    """Say why bridges do not stand together; '': they do."""
+    if len({namespace_of(name) for name in names}) > 1:
+        return f'several bridges are running: {", ".join(names)}; choose one with --namespace'
+    twice = next((name for name in names if names.count(name) > 1), '')
+    return twice and (f'{names.count(twice)} bridges are called {twice}: start each in a '
+                      'namespace of its own')
