@@ -8,9 +8,9 @@ Start a bridge of its own for each bus of one parameter file: each has a process
 
 One process serves all buses of its parameter file, and its threads share one interpreter: two
 buses of 1 Mbit/s that are full keep more than a core busy. Here the drives keep their names,
-topics and services; the bridges are called ``drive_can_bridge_BUS``, and each has the diagnostics
-and the ``~/joint_states`` of its own drives only. ``drive_can`` and the panel take them together.
-On Ctrl-C each of them stops its drives.
+topics and services; the bridges are called ``drive_can_bridge_BUS`` (``_`` for ``-``), and each
+has the diagnostics and the ``~/joint_states`` of its own drives only. ``drive_can`` and the panel
+take them together. On Ctrl-C each of them stops its drives.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
 from drive_can_bridge.configuration.load import (
-    configuration_from_file, of_one_bus, write_parameter_file,
+    bridge_names, configuration_from_file, of_one_bus, write_parameter_file,
 )
 
 
@@ -47,8 +47,7 @@ def _bridges(context: LaunchContext) -> list[LifecycleNode]:
     # stays until the machine is restarted: a bridge may be started anew by whoever watches it
     folder = Path(tempfile.mkdtemp(prefix='drive_can_'))
     bridges = []
-    for bus in configuration.buses:
-        name = f'drive_can_bridge_{bus}'
+    for bus, name in bridge_names(configuration.buses).items():
         file = folder / f'{bus}.yaml'
         write_parameter_file(of_one_bus(configuration, bus), file, name)
         bridges.append(LifecycleNode(

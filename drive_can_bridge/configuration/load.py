@@ -7,7 +7,7 @@ node declares, and what may change while it runs.
 """
 
 from array import array
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import is_dataclass, replace
 from functools import partial
 import json
@@ -303,6 +303,17 @@ def of_one_bus(configuration: BridgeConfiguration, name: str) -> BridgeConfigura
         configuration, buses={name: configuration.buses[name]},
         drives={drive.name: drive for drive in configuration.drives.values()
                 if drive.bus == name})
+
+
+def bridge_names(buses: Iterable[str]) -> dict[str, str]:
+    """Return a name for a bridge of each bus; a node, unlike a bus, has no ``-`` in its name."""
+    names: dict[str, str] = {}
+    for bus in sorted(buses, key=lambda bus: '-' in bus):   # the others are called as they are
+        name = f'drive_can_bridge_{bus.replace("-", "_")}'
+        while name in names.values():
+            name += '_'
+        names[bus] = name
+    return names
 
 
 def write_parameter_file(configuration: BridgeConfiguration, path: FilePath,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from drive_can_bridge.configuration.load import (
-    configuration_from_file, of_one_bus, write_parameter_file,
+    bridge_names, configuration_from_file, of_one_bus, write_parameter_file,
 )
 from drive_can_bridge.resources import config_file
 
@@ -45,3 +45,10 @@ def test_each_bus_by_itself(tmp_path: Path) -> None:
         assert one.buses == {bus: both.buses[bus]}
         found.update(one.drives)
     assert found == both.drives
+
+
+def test_bridges_of_buses_have_names_of_nodes_each_its_own() -> None:
+    assert bridge_names(['can-0', 'a-b_c', 'can_0', 'a-b-c', 'left']) == {
+        'can-0': 'drive_can_bridge_can_0_', 'can_0': 'drive_can_bridge_can_0',
+        'a-b_c': 'drive_can_bridge_a_b_c', 'a-b-c': 'drive_can_bridge_a_b_c_',
+        'left': 'drive_can_bridge_left'}

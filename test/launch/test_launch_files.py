@@ -101,11 +101,11 @@ TWO_BUSES = """
   ros__parameters:
     buses:
       left: {interface: virtual, channel: left}
-      right: {interface: virtual, channel: right}
+      right-1: {interface: virtual, channel: right}
     drives:
       conveyor: {bus: left, protocol: datamodel_extended, station: 1, profile: datamodel_example,
                  cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
-      lift: {bus: right, protocol: datamodel_extended, station: 1, profile: datamodel_example,
+      lift: {bus: right-1, protocol: datamodel_extended, station: 1, profile: datamodel_example,
              cyclic_request: [speed_setpoint], cyclic_response: [actual_speed]}
 """
 
@@ -194,7 +194,7 @@ def test_each_bus_has_a_bridge_of_its_own(tmp_path: Path) -> None:
     assert [process.words[:3] for process in launched.processes] == [
         ['--ros-args', '--log-level', 'debug']] * 2
     assert [process._Node__node_name for process in launched.processes] == [
-        'drive_can_bridge_left', 'drive_can_bridge_right']
+        'drive_can_bridge_left', 'drive_can_bridge_right_1']
 
 
 def test_ros2_control_gets_the_bridge_and_its_description(tmp_path: Path) -> None:
