@@ -228,6 +228,8 @@ def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration
                   profile_directories=tuple(values['profile_directories']))
     return BridgeConfiguration(
         warnings=tuple(report(warning for part in found for warning in part.warnings)),
+        standard={key: value for key, value in tree.data.items()
+                  if key not in BridgeConfiguration.__dataclass_fields__},
         **{key: value for key, value in values.items()
            if key in BridgeConfiguration.__dataclass_fields__})
 
@@ -324,7 +326,7 @@ def write_parameter_file(configuration: BridgeConfiguration, path: FilePath,
     :param node: the bridge's name, in whatever namespace.
     :raises OSError: it cannot be written.
     """
-    tree: dict[str, Any] = {}
+    tree: dict[str, Any] = {**configuration.standard}
     for name, value, *_ in declared_parameters(configuration):
         *above, key = name.split('.')
         place = tree

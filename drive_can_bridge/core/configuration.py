@@ -103,6 +103,7 @@ class BridgeConfiguration:
     :param joint_state_rate: Hz of the message with all joints; 0: there is none.
     :param warnings: readable lines about what is allowed but suspicious (bus load over 70 %,
         a key that the adapter does not know).
+    :param standard: parameters of ROS itself that stand beside ours, as they were read.
     """
 
     autostart: bool = True
@@ -112,6 +113,7 @@ class BridgeConfiguration:
     drives: dict[str, DriveConfiguration] = field(default_factory=dict)
     profile_directories: tuple[str, ...] = ('',)
     warnings: tuple[str, ...] = ()
+    standard: dict[str, Any] = field(default_factory=dict)
 
 
 class Quantity(Enum):

@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from drive_can_bridge.configuration.load import (
     bridge_names, configuration_from_file, of_one_bus, write_parameter_file,
@@ -45,6 +46,25 @@ def test_each_bus_by_itself(tmp_path: Path) -> None:
         assert one.buses == {bus: both.buses[bus]}
         found.update(one.drives)
     assert found == both.drives
+
+
+STANDARD = """
+    use_sim_time: false
+    start_type_description_service: true
+    qos_overrides: {/lift/actual.speed: {publisher: {depth: 3, reliability: best_effort}}}
+    qos_overrides./lift/online.publisher.depth: 5
+"""
+
+
+def test_parameters_of_ros_are_carried_over(tmp_path: Path) -> None:
+    file, written = tmp_path / 'both.yaml', tmp_path / 'right.yaml'
+    file.write_text(TWO_BUSES.rstrip() + STANDARD, encoding='utf-8')
+    write_parameter_file(of_one_bus(configuration_from_file(file), 'right'), written)
+    content = yaml.safe_load(written.read_text(encoding='utf-8'))
+    given = yaml.safe_load(STANDARD)
+    assert {name: value for name, value in
+            content['/**/drive_can_bridge']['ros__parameters'].items() if name in given} == given
+    configuration_from_file(written)
 
 
 def test_bridges_of_buses_have_names_of_nodes_each_its_own() -> None:
