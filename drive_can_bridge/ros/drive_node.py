@@ -82,6 +82,7 @@ class DriveNode(DriveListener):
         self._identity = IdentityReader(
             drive.profile, submit=self._submit_quietly, online=lambda: session.online,
             tell=identified, warn=lambda text: self.warn(text, text))
+        self.times_lost = 0
         self.lost_at = 0
         self._stamp = clock.stamp
         self.lost_for: Sentence = NOTHING
@@ -229,6 +230,7 @@ class DriveNode(DriveListener):
             self.samples.forget()
             self.lost_at, self.lost_for = self._stamp(), event.reason
             if self.session.active:
+                self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
             elif not self._may_run:
                 self._tell_stopped()
@@ -236,6 +238,7 @@ class DriveNode(DriveListener):
             self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
             self._online.publish(Bool(data=False))
             self.samples.forget()
+            self.times_lost += 1
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
                       f'no command for {self.session.configuration.command_timeout:g} s: '

@@ -81,7 +81,7 @@ parameters:
   mode: {{number: 33, type: uint16, access: rw, storage: ram}}
   address: {{number: 34, type: uint16, access: rw, storage: ram, protected: true}}
   other_setpoint: {{number: 35, type: int16, access: rw, storage: ram}}
-  target_speed: {{number: 36, type: int16, access: rw, storage: ram}}
+  target_x: {{number: 36, type: int16, access: rw, storage: ram}}
   serial: {{number: 40, type: uint16, access: ro}}
 """
 #: costs nothing, unlike a page

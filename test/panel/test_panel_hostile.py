@@ -19,7 +19,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
 STOP = {'drive': '/lift'}
-PARAMETERS = 'mode', 'address', 'other_setpoint', 'target_speed', 'ramp_time'
+PARAMETERS = 'mode', 'address', 'other_setpoint', 'target_x', 'ramp_time'
 #: everything that there is to be had
 PATHS = ['/', '/log', '/drive/lift', '/panel/panel.js', '/favicon.ico', '/do/backup?drive=/lift',
          '/_nicegui_ws/socket.io/?EIO=4&transport=polling', '/nothing', '/docs', '/openapi.json']
@@ -176,7 +176,7 @@ def test_setpoints_and_control_words_are_no_parameters(house: 'House') -> None:
             ('/lift', 'control_word', '~/enable'), ('/lift', 'speed_setpoint', 'cyclically'),
             ('/conveyor', 'speed_setpoint', 'cyclically'), ('/conveyor', 'address', 'protected'),
             ('/conveyor', 'other_setpoint', 'moves'),
-            ('/conveyor', 'target_speed', 'moves')):
+            ('/conveyor', 'target_x', 'moves')):
         said = house.do('write', 'operator', {'drive': drive, 'name': name, 'value': '1'}).said
         assert (said['success'], why in said['text']) == (False, True)
 

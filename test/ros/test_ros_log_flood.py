@@ -31,6 +31,7 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
             lift.handle_event(StationFound())
             lift.handle_event(Noted(GONE, warning=True))
         lift.handle_event(Noted(DANGER, warning=True, danger=True))
+    assert lift.times_lost == FLIPS
     client.wait_logged(f'lift: {DANGER}', WARN)
     client.wait_logged(f'lift: {GONE} (395 more times in ')
     lines = [line for line in client.logged(0)[before:] if line.startswith('lift')]
