@@ -77,8 +77,11 @@ def run(args: Namespace) -> int:
     try:
         if args.subcommand == STOP:
             return _stop(args, graph)
+        from drive_can_bridge.cli.output import waiting     # a stop has no time for that
         try:
-            return _show(args, control.give(graph, args.subcommand, args.namespace, args.words))
+            with waiting('waiting for the bridge'):
+                answers = control.give(graph, args.subcommand, args.namespace, args.words)
+            return _show(args, answers)
         except (control.UnknownDrive, WhichBridge) as error:
             raise WrongUsage(str(error)) from None
     finally:

@@ -3,7 +3,7 @@
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator
-from contextlib import closing, ExitStack
+from contextlib import AbstractContextManager, closing, ExitStack, nullcontext
 from itertools import chain
 import json
 from pathlib import Path
@@ -101,22 +101,34 @@ def run(args: Namespace) -> int:
         complaints.conclude()
         complain(f'{args.file}: there is no frame in it')
         return FAILED
+    selection = Selection(args.drive, args.only)
     with ExitStack() as stack:
-        sinks, endings = _sinks(args, configuration, stack)
+        sinks, endings = _sinks(args, configuration, selection, stack)
         tracer = Tracer(configuration, _together(sinks))
         if args.summary:
-            endings.append(lambda: _summarise(tracer, as_json=args.json))
+            endings.append(lambda: _summarise(tracer, selection.names, as_json=args.json))
         if first is None:
             _live(args, configuration, tracer)
         else:
-            take = tracer.take
-            for record in chain((first,), records):
-                take(record)
+            with nullcontext() if _prints(args) else _waiting(args.file):
+                take = tracer.take
+                for record in chain((first,), records):
+                    take(record)
             complaints.conclude()
         tracer.finish()
         for ending in endings:
             ending()
     return 0
+
+
+def _prints(args: Namespace) -> bool:
+    """Tell whether it writes lines as it goes."""
+    return not (args.summary or args.plot or args.csv)
+
+
+def _waiting(file: str) -> AbstractContextManager[None]:
+    from drive_can_bridge.cli.output import waiting     # which takes its time
+    return waiting(f'reading {file}')
 
 
 def _written_over(args: Namespace) -> Path | None:
@@ -128,22 +140,21 @@ def _written_over(args: Namespace) -> Path | None:
                  if output.exists() and each.exists() and output.samefile(each)), None)
 
 
-def _sinks(args: Namespace, configuration: BridgeConfiguration, stack: ExitStack,
-           ) -> tuple[list[Sink], list[Callable[[], None]]]:
+def _sinks(args: Namespace, configuration: BridgeConfiguration, selection: Selection,
+           stack: ExitStack) -> tuple[list[Sink], list[Callable[[], None]]]:
     """Return who takes telegrams, and what is to be done at the end."""
     sinks: list[Sink] = []
     endings: list[Callable[[], None]] = []
-    selection = Selection(args.drive, args.only)
     drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]
     if args.plot:       # refuses unknown names, so before a file is replaced
         picture, *wanted = args.plot
-        plotter = Plotter(configuration, wanted)
+        plotter = Plotter(configuration, wanted, drives)
         sinks.append(plotter)
         endings.append(lambda: _draw(plotter, picture))
     if args.csv is not None:
         stream = stack.enter_context(open_text(args.csv, newline=''))
         sinks.append(TableWriter(stream, drives))
-    if not (sinks or args.summary):
+    if _prints(args):
         write = _flushed if args.live else sys.stdout.write
         sinks.append(LineWriter(write, selection, as_json=args.json))
     return sinks, endings
@@ -189,12 +200,12 @@ def _draw(plotter: Plotter, path: str) -> None:
         raise DriveCanError(f'drive_can decode: --plot {path}: {error}') from None
 
 
-def _summarise(tracer: Tracer, *, as_json: bool) -> None:
+def _summarise(tracer: Tracer, wanted: Callable[[str], bool], *, as_json: bool) -> None:
     if as_json:
-        for document in summary_documents(tracer):
+        for document in summary_documents(tracer, wanted):
             print(json.dumps(document))
     else:
-        for line in summary_lines(tracer):
+        for line in summary_lines(tracer, wanted):
             print(line)
 
 

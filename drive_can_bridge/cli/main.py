@@ -122,6 +122,8 @@ def examples(program: str, subcommand: str) -> str:
 
 PROGRAM = 'drive_can'
 
+#: options of the program itself
+_OF_ALL = ('-h', '--help', '--version')
 #: the module of a subcommand, where it is not called so itself
 MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
 #: what runs until a signal comes: that is no failure
@@ -146,7 +148,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     :param clock: what everything waits by; None: that of this machine.
     :return: exit code.
     """
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    arguments = _in_order(sys.argv[1:] if argv is None else argv)
     wanted = _wanted(arguments)
     failed = TROUBLE.get(wanted, FAILED)
     prefix = f'{PROGRAM} {wanted}'.rstrip()
@@ -201,6 +203,15 @@ def _look_after_outputs() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
+
+
+def _in_order(arguments: Sequence[str]) -> list[str]:
+    """Have the subcommand first: its options may stand anywhere, before it too."""
+    words = list(arguments)
+    if words and words[0].startswith('-') and words[0] not in _OF_ALL:
+        place = next((place for place, word in enumerate(words) if word in SUBCOMMANDS), 0)
+        words.insert(0, words.pop(place))
+    return words
 
 
 def _wanted(arguments: list[str]) -> str:

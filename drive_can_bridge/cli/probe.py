@@ -10,7 +10,7 @@ from drive_can_bridge.cli.command import (
     add_params_file, agree_to_hazard, complain, FAILED, print_json,
 )
 from drive_can_bridge.cli.drives import chosen, split_words
-from drive_can_bridge.cli.output import print_table
+from drive_can_bridge.cli.output import print_table, waiting
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -174,7 +174,8 @@ def run(args: Namespace) -> int:
     results: list[tuple[Prober, list[Finding]]] = []
     for bus in dict.fromkeys(drive.bus for drive in drives):
         together = [prober for prober in probers if prober.drive.bus == bus]
-        results += _probe_bus(configuration, bus, together, args)
+        with waiting('listening for another master, then asking'):
+            results += _probe_bus(configuration, bus, together, args)
     for prober, _ in results:
         for note in prober.notes:
             complain(f'warning: {prober.drive.name}: {note}')

@@ -21,7 +21,7 @@ from typing import Any
 from drive_can_bridge.cli.command import (
     above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, print_json, WrongUsage,
 )
-from drive_can_bridge.cli.output import may_overwrite, write_atomically
+from drive_can_bridge.cli.output import may_overwrite, waiting, write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable, ConfigurationError, TransportError
@@ -331,8 +331,9 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
         port = open_port(bus, args.clock)
         try:
             survey = Survey(bus, port, args.clock.now)
-            survey.listen(args.listen)
-            asked = [] if args.passive else _ask(args, survey)
+            with waiting('listening' if args.passive else 'listening, then asking'):
+                survey.listen(args.listen)
+                asked = [] if args.passive else _ask(args, survey)
         finally:
             port.close()
     if survey.master:

@@ -306,6 +306,8 @@ WORDS = {
     'setpoint_missing':
         "mode '{name}' has its setpoint in {index:04X}h.{subindex:02X}h, which is missing, "
         'allowed is to add it',
+    'setpoint_limit':
+        '{name!r} is the setpoint of {mode}, which is no limit; allowed in what bounds the drive',
     'setpoint_type': '{type}, the setpoint of {name} is {wanted}',
     'time_too_short': '{seconds:g} s is too short, allowed is 0, or at least 0.001 s',
     'period_of_sync':

@@ -430,11 +430,13 @@ class Plotter:
     """
     Collects curves for a picture.
 
-    :param wanted: ``DRIVE.NAME``; none: the actual values of all drives.
+    :param wanted: ``DRIVE.NAME``; none: the actual values of these drives:
+    :param drives: all, or some.
     :raises DriveCanError: a name that no drive has, or too many of them.
     """
 
-    def __init__(self, configuration: BridgeConfiguration, wanted: Sequence[str]) -> None:
+    def __init__(self, configuration: BridgeConfiguration, wanted: Sequence[str],
+                 drives: Sequence[DriveConfiguration]) -> None:
         self._curves: dict[tuple[str, str], Curve] = {}
         self._lanes: dict[tuple[str, str], Lanes] = {}
         self._marks: dict[str, Marks] = {}
@@ -450,7 +452,7 @@ class Plotter:
                 raise DriveCanError(f"--plot {text}: {drive_name} has no '{name}'")
             self._add(drive, name)
         if not wanted:
-            for drive in configuration.drives.values():
+            for drive in drives:
                 for parameter in drive.cyclic_response:
                     self._add(drive, parameter.name)
 

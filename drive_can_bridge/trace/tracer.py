@@ -261,9 +261,10 @@ _BUS_COLUMNS = ('bus', 'seconds', 'frames', 'load % (mean, busiest second)', 'er
                 'frames of others')
 
 
-def summary_lines(tracer: Tracer) -> Iterator[str]:
-    """Yield the summary as text: a table of drives, a table of buses."""
-    drives = [(name, *_drive_cells(observed)) for name, observed in tracer.observed().items()]
+def summary_lines(tracer: Tracer, wanted: Callable[[str], bool]) -> Iterator[str]:
+    """Yield the summary as text: a table of the drives that are wanted, a table of buses."""
+    drives = [(name, *_drive_cells(observed)) for name, observed in tracer.observed().items()
+              if wanted(name)]
     buses = [(bus.name, *_bus_cells(bus)) for bus in tracer.buses.values()]
     if drives:
         yield from column_lines(_DRIVE_COLUMNS, drives, numbers=_DRIVE_COLUMNS[1:])
@@ -271,9 +272,9 @@ def summary_lines(tracer: Tracer) -> Iterator[str]:
     yield from column_lines(_BUS_COLUMNS, buses, numbers=_BUS_COLUMNS[1:])
 
 
-def summary_documents(tracer: Tracer) -> Iterator[dict[str, Any]]:
-    """Yield the summary as JSON documents: one for each drive, one for each bus."""
-    for name, observed in tracer.observed().items():
+def summary_documents(tracer: Tracer, wanted: Callable[[str], bool]) -> Iterator[dict[str, Any]]:
+    """Yield the summary as JSON documents: one for each such drive, one for each bus."""
+    for name, observed in filter(lambda each: wanted(each[0]), tracer.observed().items()):
         yield {'drive': name, 'exchanges': observed.exchanges, 'missed': observed.missed,
                **_times('period', observed.period), **_times('latency', observed.latency),
                'requests': observed.requests, 'unanswered': observed.unanswered,

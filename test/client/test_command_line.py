@@ -123,6 +123,21 @@ def test_wrong_usage_is_told_before_a_bridge_is_looked_for(
     assert code == 2
 
 
+def test_options_may_stand_before_the_subcommand(tmp_path: Path,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'wrong.yaml'
+    file.write_text('/**/drive_can_bridge: {ros__parameters: {bus: 1}}\n')
+    assert main(['validate', '--json', str(file)]) == 1
+    told = capsys.readouterr()
+    assert main(['--json', 'validate', str(file)]) == 1
+    assert capsys.readouterr() == told and told.out.startswith('{"level": "error"')
+    for words in (['--json'], ['--jsom', 'validate', 'x'], ['-p', 'robot.yaml']):
+        with pytest.raises(SystemExit, match='2'):
+            main(words)
+    with pytest.raises(SystemExit, match='0'):
+        main(['--version', 'validate'])
+
+
 @pytest.mark.parametrize(('word', 'hint'), [
     ('valdate', ', did you mean validate?'), ('stpo', ', did you mean stop?'), ('x', '')])
 def test_a_subcommand_that_is_not_there(word: str, hint: str,

@@ -115,6 +115,28 @@ def test_summary_of_a_bus_that_the_file_does_not_have(
     assert capsys.readouterr().out.splitlines()[-1].split()[::3] == ['can7', '–']
 
 
+def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
+                                   capsys: pytest.CaptureFixture[str]) -> None:
+    text = file.read_text()
+    file.write_text(text + text[text.index('      conveyor'):].replace(
+        'conveyor', 'lift').replace('station: 1', 'station: 2'))
+    assert drive_can('decode', trace, '--summary', '--json', '--drive', 'l*',
+                     '--params-file', file) == 0
+    assert [(each.get('drive'), each.get('bus')) for each in map(
+        json.loads, capsys.readouterr().out.splitlines())] == [('lift', None), (None, 'main')]
+    assert drive_can('decode', trace, '--summary', '--drive', 'l*', '--params-file', file) == 0
+    assert 'conveyor' not in capsys.readouterr().out
+    pytest.importorskip('matplotlib')
+    picture = tmp_path / 'values.svg'
+    for chosen, code, told in (
+            ('conveyor', 0, ''), ('lift', 1, 'none of these values is in the trace\n'),
+            ('x*', 1, 'none of these values is in the trace\n')):
+        assert drive_can('decode', trace, '--plot', picture, '--drive', chosen,
+                         '--params-file', file) == code
+        assert capsys.readouterr().err.endswith(told)
+    assert 'conveyor.actual_speed' in picture.read_text()
+
+
 def test_csv(file: Path, trace: Path, tmp_path: Path) -> None:
     table = tmp_path / 'values.csv'
     assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 0

@@ -251,6 +251,9 @@ class Cia402(Family):
             if all(each.listed for each in drive.cyclic_request):
                 yield Complaint('cyclic_request', (
                     says('setpoint_missing', name=name, index=mode.index, subindex=mode.subindex)))
+        elif setpoint.limit:
+            yield Complaint(f'profile.parameters.{setpoint.name}.limit', (
+                says('setpoint_limit', name=setpoint.name, mode=name)))
         elif setpoint.type is not mode.type:
             yield Complaint(f'profile.parameters.{setpoint.name}.type', (
                 says('setpoint_type', type=setpoint.type.value, name=name,

@@ -38,6 +38,9 @@ def test_the_mode_and_its_setpoint() -> None:
     narrow = parameter('target_velocity', None, index=0x60FF, subindex=0, type=INT16)
     assert wrong(request=(narrow,)) == {'profile.parameters.target_velocity.type': says(
         'setpoint_type', type='int16', name='csv', wanted='int32')}
+    bound = replace(VELOCITY_TARGET, limit=True, neutral=0.0)
+    assert wrong(request=(bound,)) == {'profile.parameters.target_velocity.limit': says(
+        'setpoint_limit', name='target_velocity', mode='csv')}
 
 
 @pytest.mark.parametrize('mode', ['csp', 'pp'])

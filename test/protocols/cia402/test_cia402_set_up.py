@@ -10,6 +10,7 @@ from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.canopen.sdo import describe
+from drive_can_bridge.protocols.cia402.bring_up import interpolation_time
 from drive_can_bridge.protocols.cia402.states import State
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)
@@ -136,6 +137,11 @@ class TestConfigure:
         assert '605#23031A0210007760' in sent
         sample = axis.talk.samples()[-1]
         assert sample[1:] == (1000, 0, 0)
+
+    def test_a_first_pdo_that_is_not_needed_is_made_invalid(self) -> None:
+        axis = meet(objects={TPDO: bytes.fromhex('85010000')}, response_pdos=(2,))
+        assert '00180185010080' in written(axis)
+        assert axis.session.online
 
 
 def fixed(*places: tuple[int, int]) -> dict[tuple[int, int], int]:
@@ -313,6 +319,10 @@ class TestMode:
         assert axis.session.online
         assert notes(axis) == [
             says('object_refused', what='60C2h.01h', why=describe(0x06090032))]
+
+    def test_a_time_has_8_bits(self) -> None:
+        assert interpolation_time(0.255) == (255, -3)
+        assert interpolation_time(0.256) is None
 
     def test_a_period_that_it_cannot_say(self) -> None:
         axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'}, period=1 / 300)
