@@ -14,6 +14,7 @@ from drive_can_bridge.cli.command import (
     complain, FAILED, namespace, print_json, say, WrongUsage,
 )
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
+from drive_can_bridge.core.text import is_pattern
 from drive_can_bridge.process.locks import bridges, Present, short
 from drive_can_bridge.resources import what_is_missing
 
@@ -27,8 +28,6 @@ _WORDS = {
     'disable': ('DRIVE …', '+', 'disable drives', 'Calls ~/enable with false.'),
     'reset': ('DRIVE …', '+', 'reset the faults of drives', 'Calls ~/reset_fault.'),
 }
-#: in a pattern, not in a name
-_WILD = frozenset('*?[')
 _UP_TO_WILD = re.compile(r'[^*?[]*')
 
 
@@ -98,7 +97,7 @@ def _check(args: Namespace) -> None:
         raise WrongUsage('goes through the running bridge: leave --params-file away')
     if args.subcommand in ('enable', 'reset'):
         for word in args.words:
-            if _WILD & set(word):
+            if is_pattern(word):
                 raise WrongUsage(f'{word!r}: takes full names, no patterns')
 
 
@@ -136,7 +135,7 @@ def _may_mean(word: str, place: str) -> bool:
     literal = _UP_TO_WILD.match(word)[0]    # type: ignore[index]  # matches anything
     if literal.startswith(place):
         return '/' not in literal[len(place):]
-    return literal != word and place.startswith(literal)
+    return is_pattern(word) and place.startswith(literal)
 
 
 def _of_host(present: Present, domain: int) -> str:

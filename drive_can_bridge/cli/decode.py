@@ -15,7 +15,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record
-from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.text import is_pattern, printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.resources import command_that_brings
 from drive_can_bridge.trace.files import (
@@ -77,8 +77,8 @@ def run(args: Namespace) -> int:
     if (args.file is None) is not args.live or args.plot == []:
         raise WrongUsage('give a trace file, or --live')
     configuration = configuration_from_file(args.params_file)
-    unknown = [name for name in args.drive if not any(c in name for c in '*?[')
-               and name not in configuration.drives]
+    unknown = [name for name in args.drive
+               if not is_pattern(name) and name not in configuration.drives]
     if unknown:
         raise WrongUsage(f'--drive {unknown[0]}: no such drive; drives: '
                          f'{", ".join(configuration.drives) or "none"}')

@@ -164,7 +164,6 @@ _HEAD = """\
 _UNKNOWN = {'datamodel_extended': 'drive', 'datamodel_standard': 'drive_std'}
 #: families whose stations are Node-IDs
 _ON_CANOPEN = ('cia402', 'canopen_pkw')
-_SURER = (Certainty.CERTAIN, Certainty.LIKELY)
 
 
 def tables_beside(path: Path) -> list[Path]:
@@ -196,8 +195,8 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
             f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
             f'        bitrate: {bus.bitrate}', '    drives:']
     drives: dict[str, list[str]] = {}
-    for sighting, keys in sorted(zip(sightings, settings), key=lambda each: _SURER.index(
-            each[0].certainty)):
+    for sighting, keys in sorted(      # the surest first
+            zip(sightings, settings), key=lambda each: each[0].certainty is Certainty.LIKELY):
         if sighting.protocol in _KNOWN:
             kind, profile, request, response = _KNOWN[sighting.protocol]
         else:

@@ -101,14 +101,13 @@ class FaultWatch:
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:
         """Look at a sample; None stands for what the drive refused."""
-        found: dict[int | None, int | None] = {**dict(enumerate(raws))}
-        status = found.get(self._bit_place)
         if self._session.control is not None:
             shows = self._session.shows_fault
-        elif status is not None:
-            shows = bool(status & self._mask)
         else:
-            return
+            status = _at(self._bit_place, raws)
+            if status is None:
+                return
+            shows = bool(status & self._mask)
         if not shows:
             self._gone()
             return
@@ -119,10 +118,11 @@ class FaultWatch:
             self._wanted = False
             self._request = ReadRequest((self._parameter,))
             self._session.services.submit(self._request, now)
-        raw = found.get(self._place)
-        # some drives say what it is a moment later
-        if not self.text and raw is not None and (raw or raw in self._names):
-            self._known(raw)
+        if not self.text:
+            raw = _at(self._place, raws)
+            # some drives say what it is a moment later
+            if raw is not None and (raw or raw in self._names):
+                self._known(raw)
 
     def _known(self, raw: int) -> None:
         name = self._names.get(raw, '')
@@ -145,3 +145,8 @@ class FaultWatch:
         obeyed = self._session.interlock.obeyed     # in a group not its own
         if obeyed is not None:
             obeyed.fault_text = text
+
+
+def _at(place: int | None, raws: Sequence[int | None]) -> int | None:
+    """Return what stands at a place of a sample, if it has that."""
+    return raws[place] if place is not None and place < len(raws) else None

@@ -103,6 +103,15 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     return matches[0] if matches else None
 
 
+#: what makes a shell pattern of a name
+_WILD = frozenset('*?[')
+
+
+def is_pattern(text: str) -> bool:
+    """Tell whether a text is a shell pattern, and no name."""
+    return not _WILD.isdisjoint(text)
+
+
 def counted(number: int, one: str, many: str = '') -> str:
     """Return a number of things; without ``many`` an s makes it the plural."""
     return f'{number} {one if number == 1 else many or one + "s"}'

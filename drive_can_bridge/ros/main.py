@@ -96,8 +96,7 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
         with _quiet_rcl():
             rest = remove_ros_args(arguments)[1:]
     except Exception as error:  # noqa: BLE001  it parses them all, files included
-        print(f'drive_can_bridge: {_parse_error(error, arguments)}', file=sys.stderr)
-        return 1
+        return _complain(f'drive_can_bridge: {_parse_error(error, arguments)}')
     if rest:
         if rest[0] in ('-h', '--help'):
             print(USAGE)
@@ -110,8 +109,7 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
         with _quiet_rcl():
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # noqa: BLE001  rcl's parse errors come as several types
-        print(f'drive_can_bridge: {_parse_error(error, arguments)}', file=sys.stderr)
-        return 1
+        return _complain(f'drive_can_bridge: {_parse_error(error, arguments)}')
     try:
         return _run(watcher, clock, arguments)
     except ExternalShutdownException:
@@ -136,8 +134,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
     try:
         bridge = BridgeNode(spinner, watcher.fatal, clock, files=_parameter_files(arguments))
     except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
-        print(f'drive_can_bridge: {in_words(error)}', file=sys.stderr)
-        return 1
+        return _complain(f'drive_can_bridge: {in_words(error)}')
     if bridge.is_empty:
         bridge.log.fatal(_nothing_configured(bridge, arguments))
         bridge.destroy_node()

@@ -430,8 +430,7 @@ class Plotter:
     """
     Collects curves for a picture.
 
-    :param wanted: ``DRIVE.NAME``; none: the actual values of these drives:
-    :param drives: all, or some.
+    :param wanted: ``DRIVE.NAME``; none: the actual values of ``drives``.
     :raises DriveCanError: a name that no drive has, or too many of them.
     """
 

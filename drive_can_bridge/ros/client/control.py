@@ -16,6 +16,7 @@ from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core.text import is_pattern
 from drive_can_bridge.ros.client.calls import (
     ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.search import (
@@ -29,8 +30,6 @@ _ONLINE_TIMEOUT = 5.0
 #: s that anything else may take: it is the bridge that says when it is over
 CONTROL_TIMEOUT = 120.0
 _RUNNING = 'may still be running'
-#: in a pattern, not in a name
-_WILD = frozenset('*?[')
 
 
 class Answer(NamedTuple):
@@ -207,7 +206,7 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
         if place not in known:
             known[place] = [
                 node for each in find_bridges(graph, place) for node in each.nodes
-            ] if place and _WILD & {*place} else [
+            ] if place and is_pattern(place) else [
                 f'{namespace_of(bridge)}/{drive}'
                 for drive, bridge in find_drives(graph, place).items()]
         found = [node for node in known[place] if matches(word, node)]

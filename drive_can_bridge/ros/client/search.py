@@ -248,6 +248,17 @@ class Search:
                         ListParameters.Request(prefixes=['drives']), take_drives, now)
 
 
+def _search(graph: Graph, namespace: str | None, enough: Callable[[list[str]], bool]) -> Search:
+    """Search until all is known, or the names of the bridges are enough."""
+    search = Search(graph.client_node, namespace)
+
+    def done(now: float) -> bool:
+        search.look(now)
+        return enough(search.names) or search.settled or search.over(now)
+    graph.wait(done, 2.0 * _LONGEST)
+    return search
+
+
 def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     """
     Return the drives of the bridges of one namespace, with the full name of the bridge of each.
@@ -257,15 +268,11 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
         drives of one name, or one that does not answer.
     :raises NoBridge: there is none, or it does not answer.
     """
-    search = Search(graph.client_node, namespace)
-
-    def done(now: float) -> bool:
-        search.look(now)
-        return bool(_which(search.names)) or search.settled or search.over(now)
-    graph.wait(done, 2.0 * _LONGEST)
+    search = _search(graph, namespace, lambda names: bool(_which(names)))
     names = search.names
-    if _which(names):
-        raise WhichBridge(_which(names))
+    which = _which(names)
+    if which:
+        raise WhichBridge(which)
     silent = [name for name in names if not search.found[name].answered]
     if silent and len(names) > 1:
         raise WhichBridge(f'several bridges are running: {", ".join(names)}, and not every one '
@@ -288,13 +295,7 @@ def find_bridges(graph: Graph, pattern: str) -> list[Found]:
 
     :raises NoBridge: there is none, or one that does not answer.
     """
-    search = Search(graph.client_node, None)
-
-    def done(now: float) -> bool:
-        search.look(now)
-        return search.settled or search.over(now)
-    graph.wait(done, 2.0 * _LONGEST)
-    found = [each for each in search.found.values()
+    found = [each for each in _search(graph, None, lambda _: False).found.values()
              if fnmatchcase(namespace_of(each.name), pattern)]
     if not found or not all(each.answered for each in found):
         raise NoBridge(nobody(pattern, [each.name for each in found if not each.answered]))
@@ -306,8 +307,8 @@ def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
     where = '' if namespace is None else f' in namespace {namespace or "/"}'
     domain = os.environ.get('ROS_DOMAIN_ID') or '0'
     if silent:
-        return (f'no bridge answers{where} (ROS domain {domain}): '
-                f'{", ".join(silent)} {"does" if len(silent) == 1 else "do"} not')
+        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
+                f'{"does" if len(silent) == 1 else "do"} not')
     return f'no configured bridge is running{where} (ROS domain {domain})'
 
 
