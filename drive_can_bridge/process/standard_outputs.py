@@ -38,26 +38,38 @@ class Taking:
     Whether somebody takes what a thread writes; a context manager around each single write.
 
     That a thread has not begun to write says nothing: on a busy machine it has to wait for its
-    turn. A write that does not end does.
+    turn. A write that does not end does, unless the whole process stood still meanwhile. So the
+    time is that which somebody has seen pass.
 
     :param now: the steady time.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
-        self._since: float | None = None
+        self._write: object | None = None
 
     def __enter__(self) -> None:
-        self._since = self._now()
+        self._write = object()
 
     def __exit__(self, *_: object) -> None:
-        self._since = None
+        self._write = None
 
-    @property
-    def nobody(self) -> bool:
-        """What is being written has not been taken for so long that it never will be."""
-        since = self._since
-        return since is not None and self._now() - since > PATIENCE
+    def watch(self) -> Callable[[], bool]:
+        """
+        Return what, asked every :data:`MOMENT`, tells that nobody takes what is being written.
+
+        It has not been taken for so long that it never will be.
+        """
+        watched, seen, looked = self._write, 0.0, self._now()
+
+        def nobody() -> bool:
+            nonlocal watched, seen, looked
+            now, write = self._now(), self._write
+            passed, looked = min(now - looked, 2.0 * MOMENT), now
+            seen = seen + passed if write is watched else 0.0
+            watched = write
+            return write is not None and seen > PATIENCE
+        return nobody
 
 
 #: bytes that wait for a reader at most
@@ -130,10 +142,11 @@ class Output:
         """
         if self._real < 0:
             return True
+        nobody = self._taking.watch()
         with self._changed:
             while not self._changed.wait_for(
                     lambda: not (self._size or self._dropped or self._unread()), MOMENT):
-                if self._taking.nobody or deadline is not None and self._now() > deadline:
+                if nobody() or deadline is not None and self._now() > deadline:
                     return False
         return True
 

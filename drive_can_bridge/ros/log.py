@@ -348,7 +348,8 @@ class Log:
         self._limit.sum_up(all_of_it=True)
         self._closed = True
         self._lines.put(_END, always=True)
-        while self._thread.is_alive() and not self._taking.nobody:
+        nobody = self._taking.watch()
+        while self._thread.is_alive() and not nobody():
             self._thread.join(MOMENT)
 
     def _put(self, level: Level, text: str) -> None:

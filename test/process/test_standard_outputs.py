@@ -15,7 +15,7 @@ import time
 from clocks import HandClock
 import pytest
 
-from drive_can_bridge.process.standard_outputs import Output, PATIENCE
+from drive_can_bridge.process.standard_outputs import MOMENT, Output, PATIENCE, Taking
 
 pytestmark = pytest.mark.usefixtures('threads')
 
@@ -149,6 +149,22 @@ def test_last_words_wait_until_they_are_taken_unless_nobody_takes_them(
         assert not output.flush()
         assert hand.now - begun > PATIENCE
         os.close(read)      # who would read it all has gone: the writing thread ends, too
+
+
+def test_a_process_that_stood_still_says_nothing_about_its_reader(hand: Time) -> None:
+    taking = Taking(hand.clock.now)
+    with taking:
+        nobody = taking.watch()
+        for _ in range(3):      # SIGSTOP, a virtual machine that was moved, ...
+            hand.now += 100.0 * PATIENCE
+            assert not nobody()
+    with taking:                # the next write
+        for _ in range(int(PATIENCE / MOMENT)):
+            assert not nobody()
+            hand.now += MOMENT
+        hand.now += MOMENT
+        assert nobody()
+    assert not nobody()         # taken after all
 
 
 #: writes to both outputs, which nobody reads until it has said on another descriptor that it could
