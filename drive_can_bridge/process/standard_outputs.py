@@ -42,10 +42,12 @@ class Taking:
     time is that which somebody has seen pass.
 
     :param now: the steady time.
+    :param patience: s after which nobody does.
     """
 
-    def __init__(self, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float], patience: float = PATIENCE) -> None:
         self._now = now
+        self._patience = patience
         self._write: object | None = None
 
     def __enter__(self) -> None:
@@ -68,7 +70,7 @@ class Taking:
             passed, looked = min(now - looked, 2.0 * MOMENT), now
             seen = seen + passed if write is watched else 0.0
             watched = write
-            return write is not None and seen > PATIENCE
+            return write is not None and seen > self._patience
         return nobody
 
 

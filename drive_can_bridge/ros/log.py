@@ -48,6 +48,9 @@ BURST, RATE = 100, 1.0
 BURST_OF_ALL, RATE_OF_ALL = 500, 20.0
 #: lines of a speaker that are remembered
 TOPICS_MAX = 256
+#: s after which a logger does not come back. For its first line rclpy looks for the caller in all
+#: modules: that alone takes a second or two on a slow machine
+PATIENCE = 10.0
 #: lines that may wait
 LINES_MAX = 1000
 
@@ -317,7 +320,7 @@ class Log:
         self._limit = LogLimit(self._put, self._wake, clock.now)
         self._dropped = 0
         self._closed = False
-        self._taking = Taking(clock.now)
+        self._taking = Taking(clock.now, PATIENCE)
         self._thread = clock.worker(self._run, 'log')
         self._thread.start()
 

@@ -1,21 +1,19 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The log's own thread: nobody waits for it, and nothing is left out in silence."""
 
-import itertools
 from pathlib import Path
 import tempfile
 import threading
 from typing import Any
 
-from clocks import HandClock, REAL
+from clocks import REAL
 import pytest
 from rclpy.logging import get_logging_directory
 from waiting import wait_for
 from world import World
 
 from drive_can_bridge.core.sentences import log_too_fast
-from drive_can_bridge.process.standard_outputs import PATIENCE
-from drive_can_bridge.ros.log import LINES_MAX, Log
+from drive_can_bridge.ros.log import LINES_MAX, Log, PATIENCE
 
 
 class Logger:
@@ -79,17 +77,19 @@ def test_the_last_words_are_written_however_long_that_takes(bench: World) -> Non
     assert logger.lines[-1] == ('fatal', 'defect')
 
 
-@pytest.mark.usefixtures('threads')
-def test_the_end_does_not_wait_for_ever() -> None:
-    logger = Logger()
-    logger.open.clear()
-    looks = itertools.count()
-    log = Log(logger, HandClock(lambda: 0.1 * PATIENCE * next(looks)))
+def test_the_end_does_not_wait_for_ever(bench: World) -> None:
+    class DeafLogger(Logger):
+        def __getattr__(self, level: str) -> Any:
+            bench.clock.wait(bench.clock.now() + 10.0 * PATIENCE)
+            return super().__getattr__(level)
+    logger = DeafLogger()
+    log = Log(logger, bench.clock)
     for number in range(LINES_MAX + 2):
         log.info(str(number))
+    begun = bench.clock.now()
     log.close()
+    assert PATIENCE < bench.clock.now() - begun < 1.1 * PATIENCE
     assert not logger.lines
-    logger.open.set()
 
 
 def test_its_thread_sums_up_what_repeats_by_itself(bench: World) -> None:
