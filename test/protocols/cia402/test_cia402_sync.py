@@ -4,6 +4,7 @@
 from typing import Any
 
 from literal_drives import ServoDrive
+import pytest
 from servo_builders import Axis, OBJECTS, servo
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -147,8 +148,10 @@ class TestRounds:
         one.live(0.02)
         assert one.rounds() == [['201', '202', '203', '080']]
 
-    def test_or_brings_a_whole_round_forward(self) -> None:
-        one = bus(period=0.2)
+    # s; the longest wait is 0.02 s
+    @pytest.mark.parametrize(('period', 'since_the_last'), [(0.2, 0.1), (0.05, 0.01)])
+    def test_or_brings_a_whole_round_forward(self, period: float, since_the_last: float) -> None:
+        one = bus(period=period)
         one.start()
         one.live(2.0)
         for place in (0, 1, 2):
@@ -156,8 +159,8 @@ class TestRounds:
         one.live(2.0)
         one.rounds()
         while one.rounds() == []:
-            one.live(0.01)
-        one.live(0.1)
+            one.live(0.005)
+        one.live(since_the_last)
         at = one.now
         one.rounds()
         one.asks(1, ControlAction.DISABLE)
