@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 import io
+from itertools import cycle
 import json
 from pathlib import Path
 from typing import Any
@@ -92,15 +93,17 @@ ELEVEN = configured('datamodel_standard.yaml', 'conveyor')
 
 
 def scripted(answers: Mapping[str, str], request: int, response: int) -> Device:
-    """Answer requests by their bytes; others get nothing."""
-    table = {bytes.fromhex(key): bytes.fromhex(value) for key, value in answers.items()}
+    """Answer requests by their bytes, with one answer or several in turn; others get nothing."""
+    table = {bytes.fromhex(key): cycle(map(bytes.fromhex, value.split()))
+             for key, value in answers.items()}
 
     def device(frame: Frame) -> list[Frame]:
         if frame.identifier == SDO:
             return []
         assert frame.identifier == request
-        data = table.get(frame.data)
-        return [] if data is None else [Frame(response, data, frame.extended)]
+        if frame.data not in table:
+            return []
+        return [Frame(response, next(table[frame.data]), frame.extended)]
     return device
 
 
@@ -141,6 +144,9 @@ def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
     ({}, 'no answer to parameter tasks'),
     # error 0, an unknown number: no byte tells anything
     ({'0262000000000000': '0272000000000000'}, 'no array read was refused with an error number'),
+    # error 4 in one word, then in the other
+    ({'0262000000000000': '0272000004000000 0272000000000400'},
+     'no array read was refused with an error number'),
     # error 4 in the low word, and a value in the high one
     ({'0262000000000000': '0272000000000400', '0212000000000000': '0212000004000000'},
      'answers contradict each other'),
@@ -162,6 +168,13 @@ def test_cannord_undecided_order(answers: dict[str, str], reason: str) -> None:
 def test_cannord_undecided_index(answers: dict[str, str]) -> None:
     found = Bench(scripted(answers, 0x264, 0x265)).probe(bare(INVERTER))
     assert found['index_byte'].value is None
+
+
+def test_cannord_a_value_may_change_between_two_reads() -> None:
+    found = Bench(scripted({
+        '6660FF0000000000': '6670FF0000000300', '666000FF00000000':
+        '664000FF00006700 664000FF00006800'}, 0x264, 0x265)).probe(bare(INVERTER))
+    assert found['index_byte'].value == 'low'
 
 
 # reads of 455 and refusals of 9999 as the protocol notes write them down, for node 5
@@ -257,6 +270,18 @@ def test_pkw_word_order(currents: tuple[str, str], order: str | None) -> None:
             answers[f'{head}00000000'] = f'{head}{current}'
     found = Bench(scripted({**READS['word_le'], **answers}, 0x505, 0x485)).probe(STARTER)
     assert found['word_order'].value == order
+
+
+def test_pkw_limits_of_the_profile_make_one_value_enough() -> None:
+    current = next(each for each in STARTER.profile.parameters.values() if each.type.bits == 32)
+    limited = replace(STARTER, profile=replace(STARTER.profile, parameters={
+        **STARTER.profile.parameters, current.name: replace(current, maximum=1000.0)}))
+    answers = {}
+    for function in '26', 'A6':
+        head = f'{(current.number or 0).to_bytes(2, "little").hex()}00{function}'
+        answers[f'{head}00000000'] = f'{head}01003412'  # 701.96 A, or 3,053,977.61 A
+    found = Bench(scripted({**READS['word_le'], **answers}, 0x505, 0x485)).probe(limited)
+    assert found['word_order'].value == 'high_first'
 
 
 # the maps of the seed's examples, 29 bits, station 1: Reg.122 = 50, Reg.126 = 209, 210
