@@ -277,6 +277,11 @@ def test_a_group_shares_its_load(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(['validate', str(tmp_path / 'f.yaml')]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[-3:] for line in lines] == [['load', '5.7', '%']] * 2
+    # all frames are as long as one member wants: 3 * 135 bits in 20 ms are 16.2 %
+    load(tmp_path, second(together(), '[actual]', '[actual, second]'), PROFILE)
+    assert main(['validate', str(tmp_path / 'f.yaml')]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[-3:] for line in lines] == [['load', '8.1', '%']] * 2
     load(tmp_path, FILE, PROFILE)
     assert main(['validate', str(tmp_path / 'f.yaml')]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -1,10 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """However slowly a drive answers its stop, it is over when the session says."""
 
+from dataclasses import replace
 from functools import partial
 
 from builders import (
-    ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, SPEED, STATUS,
+    ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, RAM, SPEED, STATUS,
 )
 from literal_drives import ExtendedDrive, Registers, StandardDrive
 import pytest
@@ -12,6 +13,7 @@ from timeline import Timeline
 
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Storage
 
 MAY_RUN = 'it may still be running'
 
@@ -32,11 +34,13 @@ class Stubborn(Registers):
             super().__setitem__(number, raw)
 
 
+@pytest.mark.parametrize('storage', [RAM, None])
 @pytest.mark.parametrize('protocol', ['datamodel_standard', 'datamodel_extended'])
-def test_a_stop_that_does_not_take_ends_in_time(protocol: str) -> None:
+def test_a_stop_that_does_not_take_ends_in_time(protocol: str, storage: Storage | None) -> None:
     registers = Stubborn(REGISTERS)
     device = (StandardDrive if protocol == 'datamodel_standard' else ExtendedDrive)(registers)
-    talk = Conversation(drive(protocol, request=REQUEST, response=(ACTUAL, CURRENT, STATUS),
+    request = [replace(each, storage=storage) for each in REQUEST]
+    talk = Conversation(drive(protocol, request=request, response=(ACTUAL, CURRENT, STATUS),
                               command_timeout=0.0))
     delay = 0.001
 

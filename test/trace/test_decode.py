@@ -60,12 +60,17 @@ def starter(*response: Any, **options: Any) -> DriveConfiguration:
                  table=(COMMAND, *response), request=(), response=response, **options)
 
 
+PLAIN = [parameter('setpoint', 50), parameter('limit', 51)]
+OTHER = parameter('other', 52)
 WITH_POSITION = axis(response=(VELOCITY, POSITION), response_pdos=(1, 3))
 POLLED = drive('datamodel_standard')
 DRIVES = {
     'conveyor': drive(),
     'conveyor_with_time': drive(parameter_timeout=0.1),
+    'conveyor_without_storage': drive(table=(*PLAIN, OTHER), request=PLAIN),
     'polled': POLLED,
+    'polled_without_storage': drive(
+        'datamodel_standard', table=(*PLAIN, OTHER), request=PLAIN),
     'mixer': inverter(),
     'mixer_with_five': drive('cannord', name='mixer', station=100, table=(*FIVE, *ACTUAL_FIVE),
                              request=FIVE, response=ACTUAL_FIVE, extra_setpoints=True),

@@ -124,9 +124,9 @@ class Cannord(Family):
         """Return the load of each drive; those of a group share one exchange a period."""
         found = {drive.name: self.bits_per_second(drive) for drive in drives}
         for group in groups(_placeable(drives)):
-            for drive in group:
-                # a broadcast and one exchange for all of them
-                found[drive.name] *= 1.5 / len(group)
+            # a broadcast and one exchange for all of them, as long as the longest lists want
+            most = max(map(self.bits_per_second, group))
+            found.update({drive.name: 1.5 * most / len(group) for drive in group})
         return [found[drive.name] for drive in drives]
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:

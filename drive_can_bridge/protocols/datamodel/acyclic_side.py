@@ -24,7 +24,8 @@ from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, Words, Write)
+    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, STOP_EEPROM_WAIT, Words,
+    Write)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
@@ -152,12 +153,14 @@ class AcyclicSide:
 
         :param setpoints: as for :meth:`begin_stop`.
         """
-        answer, count = self.stop.answer_time, len(self._stop_writes(setpoints))
-        if not self.transactor.anonymous:
-            return (STOP_ATTEMPTS * count + 1) * answer
-        silence = self.transactor.silence
-        asked_before = self._session.retry.timeout + silence
-        return asked_before + STOP_ATTEMPTS * (count * answer + silence) + answer + silence
+        told, answer = self._stop_writes(setpoints), self.stop.answer_time
+        worn = sum(each.parameter.storage is not Storage.RAM for each in told)
+        longest = ((STOP_ATTEMPTS * len(told) + 1) * answer
+                   + (STOP_ATTEMPTS * worn + 1) * STOP_EEPROM_WAIT)
+        if self.transactor.anonymous:   # each silence, and that of what was asked before
+            silence = self.transactor.silence
+            longest += self._session.retry.timeout + (STOP_ATTEMPTS + 2) * silence
+        return longest
 
     def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """

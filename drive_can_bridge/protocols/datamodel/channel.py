@@ -40,7 +40,7 @@ from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
-#: s that a stop waits for an EEPROM at most: it takes 20 ms
+#: s that a stop waits for an EEPROM at most, whatever the gap may be: it takes 20 ms
 STOP_EEPROM_WAIT = 0.025
 
 
@@ -141,7 +141,8 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._eeprom_gap = eeprom_gap
         self._quarantine = quarantine
         self._eeprom_free_at = -math.inf
-        self._stop_wait_until = -math.inf   # whatever the EEPROM's gap may be
+        self._stop_free_at = -math.inf      # for what confirms a stop, or tells it again
+        self._stop_wait_until = -math.inf   # for the EEPROM, what tells it first
         self._first: tuple[Write, Left] | None = None
         self._urgent: deque[tuple[Write, Left]] = deque()
 
@@ -201,8 +202,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
     def ready_at(self, step: Step, *, stop: bool) -> float:
         # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
         # the next has to go there, too. Setpoints and control words do not wait.
-        free_at = self._eeprom_free_at
-        return max(self.free_at, min(free_at, self._stop_wait_until) if stop else free_at)
+        return max(self.free_at, self._stop_free_at if stop else self._eeprom_free_at)
 
     # -- writes that are no exchange --------------------------------------------------------------
 
@@ -210,15 +210,21 @@ class ParameterTransactor(Transactor[Step, Reply]):
         """Send a write now."""
         self.wrote_at, self.free_at = now, now + SPACING
         if write.eeprom:
-            self._eeprom_free_at = now + self._eeprom_gap
+            self._wear(now)
 
         def left(sent: bool, then: float) -> None:
             if write.eeprom:    # the pause begins when the frame is on its way
-                self._eeprom_free_at = max(self._eeprom_free_at, then + self._eeprom_gap)
+                self._wear(then)
             if sent and self._sent is not None:
                 self._sent.note(write.chunk, write.words)
             told(sent, then)
         self._emit(self._codec.encode_write(write.number, write.words), left)
+
+    def _wear(self, now: float) -> None:
+        """Have what follows wait for the EEPROM."""
+        gap = self._eeprom_gap
+        self._eeprom_free_at = max(self._eeprom_free_at, now + gap)
+        self._stop_free_at = max(self._stop_free_at, now + min(gap, STOP_EEPROM_WAIT))
 
     def write_first(self, write: Write, left: Left, now: float) -> None:
         """

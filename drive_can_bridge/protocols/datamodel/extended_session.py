@@ -172,7 +172,10 @@ class ExtendedSession(Session):
                 if now - self._rewritten_at > REWRITE_PAUSE_MAX:
                     self._pause = LOOK_PERIOD
                 if exchange.cycling and not exchange.leaving:
-                    if self.online:
+                    transactor = self._side.transactor
+                    # a look that was under way when the stop left shows nothing of it
+                    if (self.online and self._answers.book.stop_shown
+                            and transactor.asked_at > transactor.wrote_at):
                         self.duty.happened(Happened.ANSWERED)
                 elif exchange.leaving and self.setpoints.held:
                     pass    # a stop takes its course

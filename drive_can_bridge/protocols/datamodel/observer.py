@@ -42,6 +42,9 @@ class _Traffic:
             observer, drive.parameter_timeout, self._content, plan=plan,
             setpoints={Chunk((parameter.number or 0) + self._offset) for parameter in setpoints})
         self._gap = WriteGap(drive.options.eeprom_write_gap)
+        # what is sent cyclically is taken to be volatile, as the bridge takes it
+        self._volatile = {(parameter.number or 0) + self._offset
+                          for parameter in drive.cyclic_request}
 
     def take(self, request: ReadRequest | Write, now: float) -> None:
         """Take a request; nobody answers a write."""
@@ -51,7 +54,8 @@ class _Traffic:
             return
         chunk = Chunk(request.number, len(request.words))
         wrong = ''
-        if any(parameter.storage is not Storage.RAM for parameter in self._named(chunk)):
+        if any(parameter.storage is not Storage.RAM and number not in self._volatile
+               for number, parameter in zip(chunk.addresses, self._named(chunk))):
             wrong = self._gap.written(now)
             self._observed.fast_writes += bool(wrong)
         self._requests.ask(None, chunk, now, request.words, wrong=wrong)

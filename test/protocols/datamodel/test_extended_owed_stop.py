@@ -294,9 +294,12 @@ def test_what_is_kept_in_ram_is_stopped_before_what_may_be_an_eeprom() -> None:
     talk.until(11.0 + TICK)
     talk.hears(ENABLED, 11.002)
     sent = [(11.003, text) for text in talk.hears(OTHER_REQUEST, 11.003)]
-    sent += talk.until(11.1)
-    assert [text for _, text in sent if text.startswith('003')][:3] == [
-        LIMIT_ZERO, '00300341#0000000000000000', SPEED_ZERO]
+    sent += talk.until(12.0)
+    word = '00300341#0000000000000000'
+    assert [text for _, text in sent if text.startswith('003')] == [
+        LIMIT_ZERO, word, SPEED_ZERO] * 3
+    for (before, text), (after, _) in zip(sent, sent[1:]):  # nobody answers while it writes
+        assert after - before >= (0.02 if text in (word, SPEED_ZERO) else 0.0) - TICK
 
 
 def test_maps_are_rewritten_after_the_stop() -> None:
@@ -423,6 +426,34 @@ def test_neutral_by_command_is_a_stop() -> None:
 
 
 # -- the drive falls silent -----------------------------------------------------------------------
+
+
+def test_look_at_the_maps_that_the_stop_has_overtaken_shows_nothing_of_it() -> None:
+    talk = running()
+    look(talk)
+    talk.commands(0, 0.0, 11.003)
+    assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
+    assert talk.until(11.02 + TICK) == [(11.02, NEUTRAL)]
+    assert talk.hears(RESPONSE_MAP, 11.021) == []
+    assert talk.session.duty.unshown
+    sent = [text for _, text in talk.until(13.0)]
+    assert [text for text in sent if text.startswith('003003')] == [
+        SPEED_ZERO, LIMIT_ZERO] * 3
+    assert warnings(talk) == [UNHEARD]
+
+
+def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -> None:
+    talk = online(control=CONTROL)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle in range(1, 50):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
+    talk.until(11.0 + TICK)
+    assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
+    assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
+    assert talk.asks(ControlAction.DISABLE, 11.005) == ['00300341#0000000000000000']
+    talk.hears(RESPONSE_MAP, 11.006)
+    assert talk.session.duty.unshown
 
 
 def left_alone() -> Conversation:

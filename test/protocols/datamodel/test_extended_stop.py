@@ -250,6 +250,8 @@ def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> 
     times = [now for now, text in found if text == DISABLE]
     assert len(times) == 3     # nobody confirms it
     assert all(b - a >= min(gap, 0.025) - TICK for a, b in zip(times, times[1:]))
+    asked = [now for now, text in found if text == ASK_WORD]
+    assert all(b - a >= min(gap, 0.025) - TICK for a, b in zip(times, asked, strict=True))
     cycles = [now for now, text in found if text == NEUTRAL]
     assert len(cycles) == 3
     assert all(b - a >= period - TICK for a, b in zip(cycles, cycles[1:]))
