@@ -118,8 +118,12 @@ class SdoTransactor(Transactor[Ask, Reply]):
         return sdo.decode(Direction.RESPONSE, answer, segments=self._collected is not None)
 
     def answers(self, answer: bytes, step: Ask) -> bool:
-        """Tell whether a response may be that to a transfer that was given up."""
-        return _belongs(sdo.decode(Direction.RESPONSE, answer, segments=False), step)
+        """
+        Tell whether a response may be that to a transfer that was given up.
+
+        :param answer: well-formed for one who expects segments.
+        """
+        return _belongs(sdo.decode(Direction.RESPONSE, answer), step)
 
     def _take_segment(self, found: Message, now: float) -> Reply | bool:
         if self._collected is None or found.toggle != self._toggle:
