@@ -42,6 +42,10 @@ def end(axis: Axis) -> list[str]:
     return axis.take()
 
 
+def by_sdo(axis: Axis) -> list[str]:
+    return [text for text in axis.take() if text.startswith('605#')]
+
+
 def doubts(axis: Axis) -> list[str]:
     return [note.text for note in axis.talk.events(Noted) if note.danger]
 
@@ -229,6 +233,50 @@ def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
     assert talk.session.next_timer() == float('inf')
 
 
+class TestTheAnswerBeforeIsToCome:
+    """The bus is back, the drive is told to stop, and does not answer yet."""
+
+    TIMEOUT = 0.3
+
+    @classmethod
+    def told(cls) -> Axis:
+        axis = running(parameter_timeout=cls.TIMEOUT)
+        axis.deliver(axis.talk.bus_down(axis.now))
+        axis.talk.events()
+        axis.deaf = True
+        axis.deliver(axis.talk.bus_up(axis.now))
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.live(0.01)
+        return axis
+
+    def test_the_end_waits_for_nothing_and_believes_the_second_answer(self) -> None:
+        axis = self.told()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.says('585#6040600000000000')
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.says('585#6040600000000000')
+        assert by_sdo(axis) == ['605#23FF600000000000']
+        axis.says('585#60FF600000000000')
+        axis.says('585#6016100100000000')
+        assert axis.session.stopped
+        assert doubts(axis) == []
+
+    def test_the_late_one_proves_nothing(self) -> None:
+        axis = self.told()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.says('585#6040600000000000')
+        axis.live(1.0)
+        assert axis.session.stopped
+        assert by_sdo(axis)[:7] == [*[DISABLE_BY_SDO] * 4, *['605#23FF600000000000'] * 3]
+        assert len(doubts(axis)) == 1
+
+    def test_a_drive_that_restarts_is_told_at_once(self) -> None:
+        axis = self.told()
+        axis.says('705#00')
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+
+
 class TestSegments:
     """A user reads the device name, 1008h, in segments; the drive says 24 bytes, then seven."""
 
@@ -243,7 +291,7 @@ class TestSegments:
         axis.drive.takes = drive_without(axis, 0x605)  # type: ignore[method-assign]
         axis.deliver(axis.talk.submits(read(NAME), axis.now))
         axis.says(TestSegments.BEGUN)
-        assert [text for text in axis.take() if text.startswith('605#')] == [
+        assert by_sdo(axis) == [
             '605#4008100000000000', '605#6000000000000000']
         return axis
 
@@ -255,7 +303,7 @@ class TestSegments:
         axis.live(0.02)
         assert not any(text.startswith('605#') for text in axis.take())
         axis.says(self.SEGMENT)
-        assert [text for text in axis.take() if text.startswith('605#')] == [
+        assert by_sdo(axis) == [
             self.BROKEN_OFF, DISABLE_BY_SDO]
 
     def test_but_for_a_moment_only(self) -> None:
@@ -263,7 +311,7 @@ class TestSegments:
         axis.talk.now = axis.now
         axis.session.time_lost(axis.now)
         axis.live(0.051)
-        assert [text for text in axis.take() if text.startswith('605#')] == [
+        assert by_sdo(axis) == [
             '605#8008100000000405', DISABLE_BY_SDO]
 
     def test_at_the_end_it_does_not_wait_at_all(self) -> None:
@@ -271,7 +319,7 @@ class TestSegments:
         axis.talk.now = axis.now
         axis.session.time_lost(axis.now)
         axis.deliver(axis.talk.deactivate(axis.now))
-        assert [text for text in axis.take() if text.startswith('605#')] == [
+        assert by_sdo(axis) == [
             self.BROKEN_OFF, DISABLE_BY_SDO]
 
 
