@@ -182,10 +182,17 @@ class TestStopsInQuarantine:
     def test_a_stop_goes_at_once_and_one_answer_is_not_believed(self) -> None:
         line = self.forgotten()
         assert line.asks('A', now=1.01, priority=Priority.STOP) == ['A']
-        assert line.answer('to the first, or second', 1.02) == ['A']
+        assert line.answer('first', 1.02) == ['A']
         assert line.results == []
-        assert line.answer('to the second, or third', 1.03) == []
-        assert line.results == [['to the second, or third']]
+        assert line.answer('second', 1.03) == []
+        assert line.results == [['second']]
+
+    def test_the_answer_that_is_left_over_is_not_said_to_be_late(self) -> None:
+        line = self.forgotten()
+        line.asks('A', now=1.01, priority=Priority.STOP)
+        line.answer('first', 1.02)
+        line.answer('second', 1.03)
+        assert line.channel.late(1.04) == 0.0
 
     def test_it_has_all_its_attempts_besides(self) -> None:
         line = self.forgotten()
