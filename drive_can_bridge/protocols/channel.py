@@ -22,6 +22,11 @@ late answer could be mistaken for, for as long as such an answer may come. The a
 do not wait for each other where answers say what they answer: the late one is as good. Where they
 do not, nothing at all is asked, and whatever arrives meanwhile begins the silence
 anew.
+
+*Stops* wait for no quarantine where answers say what they answer. One to the same question may
+still be on its way then, and proves nothing of the stop. So as many answers as may be late ones
+are not believed; after each, the step is done again at once, which makes no difference to a drive
+that has heard it. A question is answered once at most: the next answer is to the stop.
 """
 
 from collections import deque
@@ -55,9 +60,10 @@ class Quarantine:
     Questions that a late answer cannot be mistaken for have keys of their own.
     """
 
-    __slots__ = ('_until',)
+    __slots__ = ('_begun', '_until')
 
     def __init__(self) -> None:
+        self._begun: deque[tuple[float, Hashable]] = deque(maxlen=REMEMBERED)
         # until when; and whether somebody has yet to listen at its end
         self._until: dict[Hashable, tuple[float, bool]] = {}
 
@@ -66,10 +72,15 @@ class Quarantine:
         if len(self._until) >= REMEMBERED:
             self._forget(until)
         self._until[key] = max(self.ready_at(key), until), True
+        self._begun.append((until, key))
 
     def ready_at(self, key: Hashable) -> float:
         """Return when the question may be asked."""
         return self._until[key][0] if key in self._until else -math.inf
+
+    def late(self, key: Hashable, now: float) -> int:
+        """Return how many answers to the question may still come, at most."""
+        return sum(each == key and now < until + LATE_MAX for until, each in self._begun)
 
     def holds(self, key: Hashable, now: float, late: float) -> bool:
         """
@@ -180,6 +191,7 @@ class Channel(Generic[StepT, ReplyT]):
         self._users_next = False
         self._serving: _Queue[StepT, ReplyT] | None = None  # whose step is under way
         self._hurried = False  # and it has to make room
+        self._doubtful = 0  # so many answers to a stop may be late ones to what was asked before
         self._deadline = math.inf  # of the exchange under way, as it was at first
         self._quarantine = Quarantine()
         #: what was given up without an answer, and when
@@ -278,6 +290,9 @@ class Channel(Generic[StepT, ReplyT]):
         if isinstance(reply, bool):
             return reply
         self.now = now
+        if self._serving is self._stop and self._doubtful:
+            self._doubtful -= 1
+            self._hurried, reply = True, self._transactor.silent
         self._end(reply)
         self.advance(now)
         return True
@@ -359,6 +374,9 @@ class Channel(Generic[StepT, ReplyT]):
         if now < ready_at or key is not None and (
                 self._quarantine.holds(key, now, now - ready_at)):
             return False
+        if queue is self._stop and not queue.repeated:
+            self._doubtful = 0 if transactor.anonymous else (
+                self._quarantine.late(transactor.key(step), now))
         self._serving = queue
         queue.attempts_left -= 1
         transactor.begin(step, now)
@@ -390,7 +408,9 @@ class Channel(Generic[StepT, ReplyT]):
     def _key(self, queue: _Queue[StepT, ReplyT], step: StepT) -> Hashable | None:
         """Return which quarantine, if it has begun, concerns the step of a queue."""
         transactor = self._transactor
-        return transactor.key(step) if transactor.anonymous or not queue.repeated else None
+        if not transactor.anonymous and (queue.repeated or queue is self._stop):
+            return None
+        return transactor.key(step)
 
     def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT,
                   key: Hashable | None) -> float:
@@ -436,15 +456,15 @@ class Channel(Generic[StepT, ReplyT]):
         if step is None:
             return
         silent = transactor.unanswered(step, reply)
+        since = self.now if silent and not hurried else max(self.now, self._deadline)
         if silent:
-            self._given_up.append((self.now, step))
+            self._given_up.append((since, step))
         # what answers a repetition may be the answer to the attempt before
         if silent or queue.repeated and not transactor.anonymous:
             key = transactor.key(step)
             if key is not None:
-                since = self.now if silent else self._deadline
                 self._quarantine.begin(key, since + transactor.silence)
-        if silent and hurried:  # it had to make room: that was no attempt
+        if silent and hurried:  # it had to make room, or is not believed: that was no attempt
             queue.attempts_left += 1
         if silent and queue.attempts_left > 0:
             queue.repeated = True

@@ -18,6 +18,7 @@ class Postman(Transactor[str, 'str | None']):
 
     busy = False
     deadline = math.inf
+    silent = None
 
     def __init__(self) -> None:
         self.sent: list[str] = []
@@ -166,3 +167,89 @@ def test_quarantine_that_nobody_listened_through_is_prolonged() -> None:
     line.channel.time_lost(1.2002)      # just at its end
     assert line.asks('A', now=1.2002) == []
     assert line.at(1.2103) == ['A']
+
+
+class TestStopsInQuarantine:
+    """A word may be answered until two time-outs after it was asked; stops are words, too."""
+
+    @staticmethod
+    def forgotten() -> Line:
+        line = Line()
+        line.asks('A', now=1.0)
+        line.channel.clear()
+        return line
+
+    def test_a_stop_goes_at_once_and_one_answer_is_not_believed(self) -> None:
+        line = self.forgotten()
+        assert line.asks('A', now=1.01, priority=Priority.STOP) == ['A']
+        assert line.answer('first', 1.02) == ['A']
+        assert line.results == []
+        assert line.answer('second', 1.03) == []
+        assert line.results == [['second']]
+
+    def test_the_answer_that_is_left_over_is_not_said_to_be_late(self) -> None:
+        line = self.forgotten()
+        line.asks('A', now=1.01, priority=Priority.STOP)
+        line.answer('first', 1.02)
+        line.answer('second', 1.03)
+        assert line.channel.late(1.04) == 0.0
+
+    def test_it_has_all_its_attempts_besides(self) -> None:
+        line = self.forgotten()
+        line.asks('a', now=1.01)
+        line.channel.clear()
+        assert line.asks('a', now=1.02, priority=Priority.STOP) == ['a']
+        assert line.answer('', 1.03) == ['a']
+        assert line.at(1.1301) == ['a']
+        assert line.at(1.2302) == []
+        assert line.results == [[None]]
+
+    def test_each_attempt_before_it_may_be_answered_late(self) -> None:
+        line = Line()
+        line.asks('a', now=1.0)
+        assert line.at(1.1) == ['a']
+        assert line.at(1.2) == []
+        assert line.asks('a', now=1.21, priority=Priority.STOP) == ['a']
+        assert line.answer('', 1.22) == ['a']
+        assert line.answer('', 1.23) == ['a']
+        assert line.results == [[None]]
+        assert line.answer('there', 1.24) == []
+        assert line.results == [[None], ['there']]
+
+    def test_a_late_answer_to_its_own_attempt_is_as_good(self) -> None:
+        line = Line()
+        assert line.asks('a', now=1.0, priority=Priority.STOP) == ['a']
+        assert line.at(1.1) == ['a']
+        assert line.answer('there', 1.11) == []
+        assert line.results == [['there']]
+
+    def test_answers_to_others_are_no_matter(self) -> None:
+        line = self.forgotten()
+        assert line.asks('B', now=1.01, priority=Priority.STOP) == ['B']
+        assert line.answer('there', 1.02) == []
+        assert line.results == [['there']]
+
+    def test_what_was_asked_long_ago_is_no_matter(self) -> None:
+        line = self.forgotten()
+        assert line.asks('A', now=2.0, priority=Priority.STOP) == ['A']
+        assert line.answer('there', 2.01) == []
+        assert line.results == [['there']]
+
+    def test_what_follows_is_in_quarantine_for_the_answers_to_come(self) -> None:
+        """The answer that was not believed may have been the late one: then two are to come."""
+        line = self.forgotten()
+        line.asks('A', now=1.01, priority=Priority.STOP)
+        line.answer('', 1.02)
+        line.answer('', 1.03)
+        assert line.asks('A', now=1.04) == []
+        assert line.channel.next_timer() == pytest.approx(1.22)
+
+    def test_where_answers_do_not_say_what_they_answer_a_stop_waits(self) -> None:
+        line = Line()
+        line.postman.anonymous = True
+        line.asks('A', now=1.0)
+        line.channel.clear()
+        assert line.asks('A', now=1.01, priority=Priority.STOP) == []
+        assert line.at(1.2001) == ['A']
+        assert line.answer('there', 1.21) == []
+        assert line.results == [['there']]

@@ -21,7 +21,7 @@ from drive_can_bridge.protocols.transactor import Transactor
 
 #: bytes of an object that are read at most
 LENGTH_MAX = 256
-_TIMED_OUT, _TOO_LONG = 0x05040000, 0x05040005
+_TIMED_OUT, _TOO_LONG, _BROKEN_OFF = 0x05040000, 0x05040005, 0x08000000
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
     """
     Does one transfer at a time.
 
+    What takes segments is broken off by an abort where it is not gone on with: a drive that waits
+    for the request of the next one may take no other request, not even that to stop.
+
     :param outbox: takes the frames.
     """
 
@@ -76,6 +79,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._outbox = outbox
         self._toggle = 0
         self._collected: bytearray | None = None    # of an object that takes segments
+        self._abandoned = False                     # no further one is asked for
 
     def begin(self, step: Ask, now: float) -> None:
         self._collected = None
@@ -102,8 +106,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
             raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
         if found.kind is Kind.UPLOAD_BEGUN:
             self._collected, self._toggle = bytearray(), 0
-            self._ask_segment(now)
-            return True
+            return self._ask_segment(now)
         self.finish()
         if found.kind is Kind.ABORT:
             return Reply(abort=found.number)
@@ -118,8 +121,12 @@ class SdoTransactor(Transactor[Ask, Reply]):
         return sdo.decode(Direction.RESPONSE, answer, segments=self._collected is not None)
 
     def answers(self, answer: bytes, step: Ask) -> bool:
-        """Tell whether a response may be that to a transfer that was given up."""
-        return _belongs(sdo.decode(Direction.RESPONSE, answer, segments=False), step)
+        """
+        Tell whether a response may be that to a transfer that was given up.
+
+        :param answer: well-formed for one who expects segments.
+        """
+        return _belongs(sdo.decode(Direction.RESPONSE, answer), step)
 
     def _take_segment(self, found: Message, now: float) -> Reply | bool:
         if self._collected is None or found.toggle != self._toggle:
@@ -131,16 +138,19 @@ class SdoTransactor(Transactor[Ask, Reply]):
                 self._give_up(_TOO_LONG)
                 self.finish()
                 return Reply(abort=_TOO_LONG)
-            self._ask_segment(now)
-            return True
+            return self._ask_segment(now)
         data = bytes(self._collected)
         self.finish()
         return Reply(data)
 
-    def _ask_segment(self, now: float) -> None:
+    def _ask_segment(self, now: float) -> Reply | bool:
+        if self._abandoned:
+            self.forget()
+            return SILENT
         self.deadline = now + self.retry.timeout
         self._outbox.put(sdo.request(self._node, Message(
             Kind.SEGMENT_WANTED, None, toggle=self._toggle)))
+        return True
 
     def _give_up(self, code: int) -> None:
         step = self.step
@@ -155,7 +165,12 @@ class SdoTransactor(Transactor[Ask, Reply]):
 
     def finish(self) -> None:
         super().finish()
-        self._collected = None
+        self._collected, self._abandoned = None, False
+
+    def forget(self) -> None:
+        if self._collected is not None:
+            self._give_up(_BROKEN_OFF)
+        super().forget()
 
     def attempts(self, step: Ask) -> int:
         if step.attempts is not None or step.pause:
@@ -166,6 +181,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         return reply is SILENT
 
     def abandon(self, until: float) -> None:
+        self._abandoned = self.busy
         self.deadline = min(self.deadline, until)
 
     def key(self, step: Ask) -> Hashable | None:

@@ -137,6 +137,22 @@ def test_a_drive_that_gives_up_in_the_middle_of_its_segments(axis: Axis) -> None
     assert '605#8008100000000405' in axis.take()
 
 
+def test_an_answer_to_no_segment_is_rejected_in_the_middle_of_them(axis: Axis) -> None:
+    """That of a download in segments; a read before was given up, and may be answered late."""
+    takes = axis.drive.takes
+    axis.drive.takes = lambda sent: [] if (     # type: ignore[method-assign]
+        sent.identifier == 0x605) else takes(sent)
+    axis.deliver(axis.talk.submits(read(LONG, NAME), axis.now))
+    axis.live(0.35)
+    axis.says('585#4108100009000000')
+    axis.says('585#2000000000000000')
+    assert axis.session.statistics.rejected == 1
+    axis.says('585#0053657276696365')
+    axis.says('585#1D64000000000000')
+    completed, = axis.talk.events(RequestCompleted)
+    assert text_of(completed.outcomes[1]) == says('too_long', length=8)
+
+
 def test_together_or_not_at_all(axis: Axis) -> None:
     fits = 'an SDO carries one object'
     assert outcomes(axis, write((BYTE, 1), (WORD, 1), atomic=True)) == [

@@ -1,15 +1,20 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Whatever was told to run is told to stop: by cycles, by SDO, at the end and after losses."""
 
-from builders import Conversation
+from collections.abc import Callable
+
+from builders import Conversation, parameter, read, RO
 import pytest
 from saying import says
-from servo_builders import Axis, servo
+from servo_builders import Axis, servo, TABLE
 
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import ParameterType
 
 WATCH_OFF = '605#2316100100000000'
 DISABLE_BY_SDO = '605#2B40600007000000'
+NAME = parameter('device_name', None, index=0x1008, type=ParameterType.UINT32, access=RO)
 
 
 def running(**options: object) -> Axis:
@@ -22,6 +27,12 @@ def running(**options: object) -> Axis:
     return axis
 
 
+def drive_without(axis: Axis, identifier: int) -> Callable[[Frame], list[Frame]]:
+    """Return a drive that takes no notice of some frames."""
+    takes = axis.drive.takes
+    return lambda sent: [] if sent.identifier == identifier else takes(sent)
+
+
 def end(axis: Axis) -> list[str]:
     """End the activation; return the frames from then on."""
     axis.take()
@@ -29,6 +40,10 @@ def end(axis: Axis) -> list[str]:
     axis.live(5.0)
     assert axis.session.stopped
     return axis.take()
+
+
+def by_sdo(axis: Axis) -> list[str]:
+    return [text for text in axis.take() if text.startswith('605#')]
 
 
 def doubts(axis: Axis) -> list[str]:
@@ -216,6 +231,96 @@ def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
     talk.deactivate(10.0)
     assert talk.session.stopped
     assert talk.session.next_timer() == float('inf')
+
+
+class TestTheAnswerBeforeIsToCome:
+    """The bus is back, the drive is told to stop, and does not answer yet."""
+
+    TIMEOUT = 0.3
+
+    @classmethod
+    def told(cls) -> Axis:
+        axis = running(parameter_timeout=cls.TIMEOUT)
+        axis.deliver(axis.talk.bus_down(axis.now))
+        axis.talk.events()
+        axis.deaf = True
+        axis.deliver(axis.talk.bus_up(axis.now))
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.live(0.01)
+        return axis
+
+    def test_the_end_waits_for_nothing_and_believes_the_second_answer(self) -> None:
+        axis = self.told()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.says('585#6040600000000000')
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+        axis.says('585#6040600000000000')
+        assert by_sdo(axis) == ['605#23FF600000000000']
+        axis.says('585#60FF600000000000')
+        axis.says('585#6016100100000000')
+        assert axis.session.stopped
+        assert doubts(axis) == []
+
+    def test_the_late_one_proves_nothing(self) -> None:
+        axis = self.told()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.says('585#6040600000000000')
+        axis.live(1.0)
+        assert axis.session.stopped
+        assert by_sdo(axis)[:7] == [*[DISABLE_BY_SDO] * 4, *['605#23FF600000000000'] * 3]
+        assert len(doubts(axis)) == 1
+
+    def test_a_drive_that_restarts_is_told_at_once(self) -> None:
+        axis = self.told()
+        axis.says('705#00')
+        assert by_sdo(axis) == [DISABLE_BY_SDO]
+
+
+class TestSegments:
+    """A user reads the device name, 1008h, in segments; the drive says 24 bytes, then seven."""
+
+    BEGUN, SEGMENT = '585#4108100018000000', '585#0053657276696365'
+    #: abort of 1008h by the client, 08000000h
+    BROKEN_OFF = '605#8008100000000008'
+
+    @staticmethod
+    def amidst() -> Axis:
+        """Be in the middle of it."""
+        axis = running(table=(*TABLE, NAME))
+        axis.drive.takes = drive_without(axis, 0x605)  # type: ignore[method-assign]
+        axis.deliver(axis.talk.submits(read(NAME), axis.now))
+        axis.says(TestSegments.BEGUN)
+        assert by_sdo(axis) == [
+            '605#4008100000000000', '605#6000000000000000']
+        return axis
+
+    def test_a_stop_waits_for_the_segment_under_way_and_breaks_off(self) -> None:
+        axis = self.amidst()
+        axis.talk.now = axis.now
+        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.sent())
+        axis.live(0.02)
+        assert not any(text.startswith('605#') for text in axis.take())
+        axis.says(self.SEGMENT)
+        assert by_sdo(axis) == [
+            self.BROKEN_OFF, DISABLE_BY_SDO]
+
+    def test_but_for_a_moment_only(self) -> None:
+        axis = self.amidst()
+        axis.talk.now = axis.now
+        axis.session.time_lost(axis.now)
+        axis.live(0.051)
+        assert by_sdo(axis) == [
+            '605#8008100000000405', DISABLE_BY_SDO]
+
+    def test_at_the_end_it_does_not_wait_at_all(self) -> None:
+        axis = self.amidst()
+        axis.talk.now = axis.now
+        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        assert by_sdo(axis) == [
+            self.BROKEN_OFF, DISABLE_BY_SDO]
 
 
 class TestNmt:
