@@ -9,6 +9,7 @@ that everything else about it can be checked in the same run.
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 import math
+import pathlib
 from typing import Any, Protocol
 
 from drive_can_bridge.configuration.problems import Path, Tree
@@ -61,6 +62,7 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
         values = complete('bus', entry)
         keywords = _check_adapter(tree, path, values, adapters)
         _check_keys(tree, path, entry, keywords)
+        _check_trace_directory(tree, path, values)
         if 'interface' not in entry or 'channel' not in entry:
             continue
         bus = BusConfiguration(name=name, **values, options={
@@ -106,6 +108,16 @@ def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str
             tree.suspicious((*path, key), says('adapter_does_not_name',
                                                interface=entry['interface'],
                                                near=hint(key, keywords)))
+
+
+def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> None:
+    """Look whether the place of traces can be named, if there will be any."""
+    if values['trace_seconds'] > 0.0:
+        try:
+            pathlib.Path(values['trace_directory']).expanduser()
+        except RuntimeError:
+            tree.wrong((*path, 'trace_directory'),
+                       says('no_home', value=values['trace_directory']))
 
 
 def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration]) -> None:

@@ -46,6 +46,7 @@ WORDS = {
         '{name} cannot change while the node runs; change the parameter file and restart',
     'unknown': '{name!r} is unknown, {hint}',
     'no_directory': '{name!r} is no directory',
+    'no_home': '{value!r} begins with an unknown home directory, allowed is a path without ~',
     # -- files
     'not_yaml': 'not valid YAML: {what}',
     'indented_like_no_key':

@@ -20,6 +20,7 @@ back in time: no bus, one that opens, a reader that has died, an adapter that sl
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import chain, zip_longest
 import math
@@ -272,11 +273,15 @@ class BusExchange:
 
         :return: False when it could not be completed in time (a bus that blocks).
         """
+        self.begin_stop()
+        return self._wait_for_stop()
+
+    def begin_stop(self) -> None:
+        """Begin to stop every drive safely; its threads go on with it."""
         with self.lock:
             if self.active:
                 self._begin_stop(self._clock())
         self._wake.ring()
-        return self._wait_for_stop()
 
     def _begin_stop(self, now: float) -> None:
         lost = now - self._last_pass >= LOST_TIME   # nobody has noticed yet
@@ -552,10 +557,21 @@ def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
             reason = f'{type(error).__name__}: {error}'
         failures[exchange.bus.name] = reason
 
-    threads = [clock.worker(partial(stop, exchange), f'stop {exchange.bus.name}')
-               for exchange in exchanges if exchange.active or not exchange.stopped]
-    for thread in threads:
-        thread.start()
+    threads = []
+    left = []
+    for exchange in exchanges:
+        if exchange.active or not exchange.stopped:
+            thread = clock.worker(partial(stop, exchange), f'stop {exchange.bus.name}')
+            try:
+                thread.start()
+                threads.append(thread)
+            except RuntimeError:    # the system has no more threads for us
+                left.append(exchange)
+    for exchange in left:   # no drive runs on while another one's stop is waited for
+        with suppress(Exception):   # told when it is waited for
+            exchange.begin_stop()
+    for exchange in left:
+        stop(exchange)
     for thread in threads:
         thread.join()
     return failures

@@ -311,7 +311,12 @@ class BridgeNode(LifecycleNode):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Get back to a state from which configure works."""
-        return self._transition('error processing', self._clean_up)
+        def stop_and_clean_up() -> None:
+            try:
+                self._stop_drives()     # activate may have failed when some had begun
+            finally:
+                self._clean_up()
+        return self._transition('error processing', stop_and_clean_up)
 
     def _transition(self, name: str, action: Callable[[], None]) -> TransitionCallbackReturn:
         # rclpy swallows exceptions in these callbacks; here they become one line and a failure

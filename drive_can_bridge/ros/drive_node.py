@@ -24,7 +24,8 @@ from drive_can_bridge.core.events import (
     StationLost)
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
-from drive_can_bridge.core.sentences import answer_late, bridge_inactive, NOTHING, Sentence
+from drive_can_bridge.core.sentences import (
+    answer_late, bridge_inactive, internal_error, NOTHING, Sentence)
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -149,11 +150,8 @@ class DriveNode(DriveListener):
 
         :return: all calls are answered, and the node may go.
         """
-        while self._asked:
-            request, completed = self._asked.popitem()
-            completed(ControlCompleted(request, False, bridge_inactive())
-                      if isinstance(request, ControlRequest)
-                      else (Failure(bridge_inactive()),) * len(request))
+        for request in list(self._asked):
+            self._refuse(request, bridge_inactive())
         return not self.calls
 
     @property
@@ -217,8 +215,11 @@ class DriveNode(DriveListener):
             self._cannot_publish(error)
 
     def _handle_event(self, event: Event) -> None:
-        if isinstance(event, RequestCompleted):
-            self._asked.pop(event.request)(event.outcomes)
+        if isinstance(event, (RequestCompleted, ControlCompleted)):
+            completed = self._asked.pop(event.request, None)
+            # else asked for at another member of a group, or answered for a defect
+            if completed is not None:
+                completed(event.outcomes if isinstance(event, RequestCompleted) else event)
         elif isinstance(event, StationFound):
             self._may_run = False
             self._online.publish(Bool(data=True))
@@ -247,10 +248,6 @@ class DriveNode(DriveListener):
             self._log.error(f'mapping differs, no cyclic frame is sent: {event.text}')
         elif isinstance(event, MappingWritten):
             self._log.warning(f'maps of the drive rewritten: {event.text}')
-        elif isinstance(event, ControlCompleted):
-            completed = self._asked.pop(event.request, None)
-            if completed is not None:   # asked for at this member of a group
-                completed(event)
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
             self.warn('rejected', f'frame rejected: {event.text}')
@@ -287,9 +284,16 @@ class DriveNode(DriveListener):
         self._asked[request] = completed    # its outcome may come before the next line
         try:
             self.exchange.submit(self.session, request)
-        except BaseException:
-            self._asked.pop(request, None)
-            raise
+        except Exception as error:  # noqa: BLE001  told as the drive's; whoever asks is not left out
+            self._refuse(request, internal_error(type(error).__name__, str(error)))
+
+    def _refuse(self, request: Request | ControlRequest, reason: Sentence) -> None:
+        """Tell whoever asked that nothing comes of it, unless there was an answer."""
+        completed = self._asked.pop(request, None)
+        if completed is not None:
+            completed(ControlCompleted(request, False, reason)
+                      if isinstance(request, ControlRequest)
+                      else (Failure(reason),) * len(request))
 
     def _submit_quietly(self, request: ReadRequest, completed: Completed) -> None:
         """Submit a request of our own, whose answer is for the executor."""

@@ -16,7 +16,6 @@ import gc
 import os
 from pathlib import Path
 import sys
-import tempfile
 from typing import TYPE_CHECKING
 
 from drive_can_bridge.clock import Clock, SteadyClock
@@ -213,20 +212,20 @@ def _quiet_rcl() -> Iterator[None]:
     """Hold back what rcl itself writes to standard error; show it only if all went well."""
     sys.stderr.flush()
     saved = os.dup(2)
-    with tempfile.TemporaryFile() as held:
-        os.dup2(held.fileno(), 2)
+    # a file would need a disk that can be written, and not every Python has memfd_create
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)     # nobody reads meanwhile: what is too much is lost
+    os.dup2(writing, 2)
+    os.close(writing)
+    with open(reading, 'rb') as held:
         try:
             yield
-        except BaseException:
-            os.dup2(saved, 2)
+        finally:
+            os.dup2(saved, 2)   # the last end to write to is closed
             os.close(saved)
-            raise
-        os.dup2(saved, 2)
-        os.close(saved)
-        held.seek(0)
         text = held.read().decode(errors='replace')
-        if text:
-            sys.stderr.write(text)
+    if text:
+        sys.stderr.write(text)
 
 
 if __name__ == '__main__':

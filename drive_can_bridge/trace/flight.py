@@ -234,16 +234,21 @@ class FlightRecorder:
         with self._lock:
             now = self._clock.now()
             wanted = found.wanted
-            if wanted is None and now - found.last >= SPACING:
-                self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
-                return
             if wanted is not None and wanted.at <= now:
                 wanted.done.append(done)
                 return
-            other = (f'the last, {now - found.last:.0f} s ago, is '
-                     f'{found.last_path or "not written"}' if wanted is None else
-                     f'that of {wanted.reason} follows in {wanted.at - now + AFTERMATH:.0f} s')
-        done('', f'bus {bus}: one trace in {SPACING:g} s at most; {other}')
+            if self._closing:   # the thread may have ended
+                refusal = 'the recording has ended'
+            elif wanted is None and now - found.last >= SPACING:
+                self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
+                return
+            else:
+                other = (f'the last, {now - found.last:.0f} s ago, is '
+                         f'{found.last_path or "not written"}' if wanted is None else
+                         f'that of {wanted.reason} follows in '
+                         f'{wanted.at - now + AFTERMATH:.0f} s')
+                refusal = f'one trace in {SPACING:g} s at most; {other}'
+        done('', f'bus {bus}: {refusal}')
 
     def close(self) -> None:
         """Write what is still wanted, and end the thread."""

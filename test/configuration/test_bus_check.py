@@ -38,6 +38,9 @@ CASES = [
     ('bitrate: 125000', 'reconnect_period: 0',
      [at('f.yaml:8: buses.main.reconnect_period', 'out_of_range', value=0,
          allowed='a number of 0.01 to 3600')]),
+    ('bitrate: 125000', 'trace_seconds: 1\n        trace_directory: ~no_such_user/traces',
+     [at('f.yaml:9: buses.main.trace_directory', 'no_home', value='~no_such_user/traces')]),
+    ('bitrate: 125000', 'trace_directory: ~no_such_user/traces', []),   # nothing is recorded
     ('bitrate: 125000', 'fd: true',
      ['f.yaml:8: buses.main.fd: set by the bridge itself, allowed is to leave it out']),
     ('bitrate: 125000', 'can_filters: []',

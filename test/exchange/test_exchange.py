@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The exchange of one bus, without a bus: routing, time, stops, and who is told what."""
 
+from dataclasses import replace
+import threading
 import time
 
 from builders import CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write
@@ -12,6 +14,7 @@ from saying import says
 from waiting import wait_for
 import world
 
+from drive_can_bridge.clock import SystemThread
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (
@@ -456,6 +459,34 @@ def test_a_stop_that_somebody_else_has_begun_is_waited_for() -> None:
     assert bench.link.take() == [NEUTRAL] * 6   # nobody answers; and not begun anew
     assert stop_all([bench.exchange], HandClock(bench.clock)) == {}
     assert bench.link.take() == []
+
+
+@pytest.mark.usefixtures('threads')
+@pytest.mark.parametrize('started', [0, 1])
+def test_buses_are_stopped_though_no_more_threads_can_be_started(
+        started: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    benches = [Bench(drive(rearm_immediate=True)) for _ in range(3)]
+    for name, bench in zip(('one', 'two', 'three'), benches):
+        bench.exchange.bus = replace(bench.exchange.bus, name=name)
+        bench.online()
+        bench.notes[0].commands.append((0, 100.0))
+        assert bench.at(10.02) == ['003FFFF0#03E8000000000000']
+        bench.step = 0.001
+    benches[1].link.refusing = True
+    running: list[bool] = []    # the third, while the second one's stop is waited for
+    monkeypatch.setattr(benches[1].exchange, '_sleep',
+                        lambda _: running.append(benches[2].exchange.active))
+    clock = HandClock(benches[0].clock)
+    threads = iter(range(3))
+
+    def start(thread: SystemThread) -> None:
+        if next(threads) >= started:
+            raise RuntimeError("can't start new thread")
+        threading.Thread.start(thread)
+    monkeypatch.setattr(SystemThread, 'start', start)
+    assert stop_all([bench.exchange for bench in benches], clock) == {'two': 'the bus blocks'}
+    assert [bench.link.take() for bench in benches] == [[NEUTRAL] * 6, [], [NEUTRAL] * 6]
+    assert running and not any(running)
 
 
 def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:

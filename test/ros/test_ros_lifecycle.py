@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool
 from waiting import clock, pause
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.ros.diagnostics import Attendance
 
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
@@ -174,6 +175,25 @@ def test_stopping_sends_neutral_cycles(bridge: StartBridge, client: Client,
         for _ in range(20):
             client.state()
         assert not recorder.requests()
+
+
+def test_drives_that_run_when_activate_fails_are_stopped(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = waiting(bridge)
+    assert client.transition(CONFIGURE)
+    with one.record() as recorder:
+        def fail(_: Attendance) -> None:
+            one.online()
+            for value in (0.0, 100.0):
+                client.publish('/conveyor/command/speed_setpoint', Float64(data=value))
+            wait_until(lambda: recorder.words()[:1] == (1000,))
+            raise RuntimeError("can't start new thread")
+        monkeypatch.setattr(Attendance, 'begin', fail)
+        assert not client.transition(ACTIVATE)
+        client.wait_logged("activate failed: RuntimeError: can't start new thread", ERROR)
+        recorder.catch_up()
+        assert [words[0] for words in recorder.cycles()[-4:]] == [1000, 0, 0, 0]
+    assert client.state() == 'unconfigured'
 
 
 def test_cleanup_frees_the_bus(bridge: StartBridge, client: Client) -> None:

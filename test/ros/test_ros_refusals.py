@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 import re
 import sys
+import tempfile
 from typing import Any
 
 from bridges import CONVEYOR, parameters
@@ -18,7 +19,7 @@ import pytest
 import yaml
 
 from drive_can_bridge.core.complaints import says
-from drive_can_bridge.ros.main import main
+from drive_can_bridge.ros.main import _quiet_rcl, main
 
 #: how rclpy writes a line
 LOGGED = re.compile(r'\[(ERROR|FATAL)\] \[[0-9.]+\] \[[\w.]+\]: (.*)')
@@ -157,6 +158,37 @@ def test_ros_arguments_that_rcl_refuses(run: Run, arguments: list[str], word: st
     assert code == 1
     assert line.startswith('drive_can_bridge: ')
     assert word in line
+
+
+def test_no_place_for_temporary_files_is_needed(run: Run, monkeypatch: pytest.MonkeyPatch,
+                                                tmp_path: Path) -> None:
+    with monkeypatch.context() as patch:    # pytest does need one
+        patch.setattr(tempfile, 'tempdir', str(tmp_path / 'read_only'))
+        told = run('--ros-args', '-r', '__ns:=/refused')
+    assert problem(told) == says('nothing_configured', node=NODE)
+
+
+def test_what_rcl_itself_writes_is_shown_if_all_went_well(capfd: pytest.CaptureFixture[str],
+                                                          ) -> None:
+    with _quiet_rcl():
+        os.write(2, b'a word\n')
+        assert capfd.readouterr().err == ''
+    assert capfd.readouterr().err == 'a word\n'
+    with pytest.raises(ZeroDivisionError), _quiet_rcl():
+        os.write(2, b'a word\n')
+        raise ZeroDivisionError
+    os.write(2, b'the next\n')
+    assert capfd.readouterr().err == 'the next\n'
+
+
+def test_more_than_can_be_held_back_holds_up_nobody(capfd: pytest.CaptureFixture[str]) -> None:
+    with _quiet_rcl():
+        assert os.get_blocking(2) is False
+        with pytest.raises(BlockingIOError):
+            while True:
+                os.write(2, b'x' * 1024)
+    assert os.get_blocking(2) is True
+    assert len(capfd.readouterr().err) >= 4096
 
 
 @pytest.mark.parametrize('arguments', [['bridge.yaml'], ['--params-file', 'x.yaml'],

@@ -5,11 +5,13 @@ from typing import Any
 
 from bridges import Bridge, LIFT, parameters, Recorder, StartBridge
 from clients import Client, ERROR, wait_until, WARN
+from lifecycle_msgs.msg import Transition
 import pytest
 from std_msgs.msg import Bool, Float64
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.exchange.exchange import BusExchange
 
 LIFTS = parameters(lift=LIFT)
@@ -128,3 +130,32 @@ def test_a_drive_that_is_stopped_for_a_defect_says_so(
     defect = session.defect
     assert client.set('/lift', ramp_time=1.0) == [(False, defect)]
     one.online()
+
+
+@pytest.mark.parametrize('taken', [False, True])
+@pytest.mark.parametrize('service', ['set_parameters', 'quick_stop'])
+def test_who_asks_for_what_meets_a_defect_is_answered_once(
+        bridge: StartBridge, client: Client, service: str, taken: bool,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    one = run(bridge, client)
+    drive, submit = one.node.drives['lift'], DriveServices.submit
+
+    def fail(services: DriveServices, request: Any, now: float) -> None:
+        monkeypatch.undo()
+        if taken:   # the stop for the defect answers it
+            submit(services, request, now)
+        raise KeyError('a defect')
+    monkeypatch.setattr(DriveServices, 'submit', fail)
+    if service == 'quick_stop':
+        answer = client.call('/lift/quick_stop', Trigger)
+        told = answer.success, answer.message
+    else:
+        told, = client.set('/lift', ramp_time=1.0)
+    assert told == (False, sentences.internal_error('KeyError', "'a defect'"))
+    wait_until(lambda: drive.session.stopped)
+    one.online()
+    assert client.set('/lift', ramp_time=1.0) == [(True, '')]
+    assert drive.calls == 0
+    assert client.transition(Transition.TRANSITION_DEACTIVATE)
+    assert client.transition(Transition.TRANSITION_CLEANUP)
+    wait_until(lambda: '/lift' not in client.nodes())

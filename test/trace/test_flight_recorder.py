@@ -84,6 +84,7 @@ TOLD = {
     'trace': 'bus main: trace of conveyor offline, 2 frames of the last 10 s: {}',
     'last': 'bus main: one trace in 10 s at most; the last, 1 s ago, is {}',
     'next': 'bus main: one trace in 10 s at most; that of lift fault follows in 10 s',
+    'end': 'bus main: the recording has ended',
     'silence': 'bus main: not a single frame in the last 10 s',
     'no place': 'bus main: no trace of asked: Not a directory: ',
 }
@@ -243,6 +244,13 @@ def test_nothing_heard_nothing_written(bench: World, tmp_path: Path) -> None:
         assert not list(tmp_path.iterdir())
         made.hear()
         assert made.save()[0]
+
+
+def test_who_asks_for_a_trace_at_the_end_is_answered(bench: World, tmp_path: Path) -> None:
+    with recording(tmp_path) as made:
+        made.hear()
+    assert made.save() == ('', TOLD['end'])
+    assert not made.traces
 
 
 def test_first_and_newest_are_kept(bench: World, monkeypatch: pytest.MonkeyPatch,
