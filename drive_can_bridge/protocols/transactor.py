@@ -59,6 +59,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
             raise RuntimeError('an exchange is under way')
         self.step, self.busy, self.deadline, self._reply = step, True, until, False
 
+    @abstractmethod
     def receive(self, answer: Any, now: float) -> ReplyT | bool:
         """
         Take an answer, in the form that the family gives it.
@@ -67,7 +68,6 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
             asked for this answer.
         :raises RemoteProtocolError: it is malformed, or belongs to something else.
         """
-        return False
 
     def end(self, step: StepT, reply: ReplyT, now: float) -> None:
         """End the exchange for a step, if it is still under way, by what is no answer."""
