@@ -336,6 +336,9 @@ THINGS = st.lists(st.tuples(
 @example(things=[('run', 0.0), ('trip', 0.03), ('back', 1.3)])
 @example(things=[('run', 0.0), ('hand', 1.3)])
 @example(things=[('run', 0.0), ('power', 1.3), ('back', 0.4), ('run', 0.1)])
+# told to run as soon as it is there again, before anybody could notice
+@example(things=[('power', 0.011), ('back', 0.0), ('run', 0.0)])
+@example(things=[('run', 0.014), ('disable', 0.03), ('power', 0.0), ('back', 0.0), ('run', 0.0)])
 # told to run while it is without power, unseen, and when it is there
 @example(things=[('power', 0.4), ('enable', 0.001), ('back', 0.0)])
 @example(things=[('power', 0.011), ('enable', 0.07), ('enable', 0.15), ('enable', 0.15),

@@ -74,10 +74,10 @@ class AcyclicSide:
         at_end = status if self.transactor.anonymous or self.status_slot is None else None
         status = status if self.status_slot is None else None
         wears = word is not None and word.storage is not Storage.RAM
-        polled = self.transactor.anonymous     # else setpoints go by cycles
+        polled = self.transactor.anonymous     # else setpoints go by cycles, all at once
         self.output = AcyclicOutput(
             session.control, Judged(stop_spacing(drive.period), wears),
-            len(drive.cyclic_request) if polled else 0, slot=self.control_slot if polled else None,
+            len(drive.cyclic_request) if polled else 1, slot=self.control_slot if polled else None,
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
             ControlByNumber(session, session.control, self.channel, self.transactor, self.numbers,

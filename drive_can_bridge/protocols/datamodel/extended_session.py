@@ -63,6 +63,8 @@ REWRITE_PAUSE_MAX = 60.0
 SILENT_LOOKS = 3
 #: s until a position that a setpoint cannot carry is read again
 POSITION_PAUSE = 0.1
+#: all setpoints go by cycles: what the output of acyclic writes knows them as
+_CYCLE = 0
 
 
 class ExtendedSession(Session):
@@ -377,6 +379,8 @@ class ExtendedSession(Session):
         if self.control is not None and slot is not None:
             self.interlock.status(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
+        if self._answers.book.stop_shown and self._side.output.has(_CYCLE):
+            self.see_to_control_word(now)
         self.interlock.measured(raws)
         self.report.note(ProcessDataReceived(raws, received_at))
         self._channel.release(now)
@@ -396,9 +400,20 @@ class ExtendedSession(Session):
             return
         writer = self._side.control_writer
         exchange = self._exchange
-        if writer is not None and (self.online or exchange.cycling and not exchange.leaving):
+        if (writer is not None and self._side.control_slot is None
+                and (self.online or exchange.cycling and not exchange.leaving)
+                and not self._lacks_neutral(now)):
             writer.update(now)
         exchange.hurry(now, setpoints=True)
+
+    def _lacks_neutral(self, now: float) -> bool:
+        """Tell whether a word that starts the drive waits for the answer to a neutral cycle."""
+        output = self._side.output
+        lacks = output.holds_word(again=output.word_due(now))
+        if lacks and output.told(_CYCLE) is None:
+            output.written(_CYCLE, 0, now)
+            self._exchange.hand_out_neutral(now)
+        return lacks
 
     # -- state ------------------------------------------------------------------------------------
 

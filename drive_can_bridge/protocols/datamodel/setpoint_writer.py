@@ -59,6 +59,7 @@ class ControlByNumber:
     def begin(self, now: float) -> None:
         """Handle a drive that was found: it gets its word, and its status is looked at."""
         self._output.forget_word()
+        self._output.start_over()
         self._look(now)
 
     def end(self) -> None:

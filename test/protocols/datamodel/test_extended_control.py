@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, GAIN, INT16, LIMIT, parameter, RAMP,
+    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, parameter, RAMP,
     read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
@@ -13,7 +13,7 @@ from extended_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, FrameRejected, Noted, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
 
@@ -145,8 +145,9 @@ def test_disable_is_written_whenever_the_drive_is_found() -> None:
 def test_enable_is_written_on_change() -> None:
     talk = beside()
     exchange(talk, 10.02)
-    assert talk.asks(ControlAction.ENABLE, 10.025) == [ENABLE]
-    assert at_once(talk, 10.04, READY) == [NEUTRAL]
+    assert talk.asks(ControlAction.ENABLE, 10.025) == []
+    # behind the answer to a neutral cycle: what it was told before, it may have lost
+    assert at_once(talk, 10.04, READY) == [NEUTRAL, ENABLE]
     assert at_once(talk, 10.06, ENABLED) == [NEUTRAL]
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.asks(ControlAction.QUICK_STOP, 10.07) == [QUICK_STOP]
@@ -170,9 +171,9 @@ def test_word_that_got_lost_is_written_again() -> None:
     """Nothing acknowledges a write; the status tells that the drive took no notice."""
     talk = beside()
     exchange(talk, 10.02, READY)
-    assert talk.asks(ControlAction.ENABLE, 10.025) == [ENABLE]     # lost
-    # after 0.2 s, and then after 0.4 s
-    assert cycles(talk, 2, 40, READY) == [(12, ENABLE), (32, ENABLE)]
+    talk.asks(ControlAction.ENABLE, 10.025)
+    # lost; after 0.2 s, and then after 0.4 s, each behind one more neutral cycle
+    assert cycles(talk, 2, 40, READY) == [(2, ENABLE), (13, ENABLE), (34, ENABLE)]
     assert cycles(talk, 41, 60, ENABLED) == []
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.asks(ControlAction.DISABLE, 11.205) == [DISABLE]   # lost
@@ -233,9 +234,10 @@ def test_written_word_waits_for_the_cyclic_response() -> None:
     exchange(talk, 10.02)
     talk.until(10.04 + TICK)
     assert talk.asks(ControlAction.ENABLE, 10.041) == []
-    assert talk.hears(READY, 10.042) == [ENABLE]
+    assert talk.hears(READY, 10.042) == []        # to a cycle of before
+    assert at_once(talk, 10.06, READY) == [NEUTRAL, ENABLE]
     assert talk.control_outcomes() == []          # that status was older than the word
-    assert at_once(talk, 10.06, ENABLED) == [NEUTRAL]
+    assert at_once(talk, 10.08, ENABLED) == [NEUTRAL]
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
@@ -302,20 +304,19 @@ def test_loss_writes_disable() -> None:
 
 def test_differing_map_writes_disable() -> None:
     talk = online(control=CONTROL, period=0.1)
-    talk.asks(ControlAction.ENABLE, 10.01)
+    talk.asks(ControlAction.ENABLE, 10.085)
     for cycle in range(1, 10):
         talk.until(10.0 + 0.1 * cycle + TICK)
-        talk.hears(ENABLED if cycle > 1 else READY, 10.002 + 0.1 * cycle)
+        talk.hears(ENABLED if cycle > 2 else READY, 10.002 + 0.1 * cycle)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    talk.until(11.0 + TICK)
-    assert ASK_REQUEST_MAP in talk.hears(ENABLED, 11.002)
+    assert (11.0, ASK_REQUEST_MAP) in talk.until(11.0 + TICK)
     assert talk.hears('102007A4#0000000000000000', 11.003) == [DISABLE]
 
 
 def test_drive_that_reports_nothing() -> None:
     talk = beside(control=SILENT_CONTROL, period=10.0)
     talk.asks(ControlAction.ENABLE, 10.01)
-    talk.until(10.02)
+    assert at_once(talk, 10.01, ANSWER) == [NEUTRAL, ENABLE]
     (action, success, text), = talk.control_outcomes()
     assert (action, success) == ('enable', True)
     assert text == says('state_not_reported')
@@ -333,11 +334,12 @@ def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
 def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
     talk = beside(missed_limit=25)
     talk.asks(ControlAction.ENABLE, 10.003)
-    assert at_once(talk, 10.02, READY) == [NEUTRAL, ENABLE]
-    assert at_once(talk, 10.04, ENABLED) == [NEUTRAL]
+    assert at_once(talk, 10.02, READY) == [NEUTRAL]     # ready since it was disabled
+    assert at_once(talk, 10.04, READY) == [NEUTRAL, ENABLE]
+    assert at_once(talk, 10.06, ENABLED) == [NEUTRAL]
     # with the loss, then as nobody confirms it; and, with all setpoints, anew after 25 more
     assert [round(now, 3) for now, text in talk.until(11.5) if text == DISABLE] == [
-        10.56, 10.561, 10.662, 10.763, 11.06, 11.163, 11.266]
+        10.58, 10.581, 10.682, 10.783, 11.08, 11.183, 11.286]
 
 
 # -- a status word without a slot -----------------------------------------------------------------
@@ -383,7 +385,7 @@ def test_status_is_read_twice_a_second_and_often_while_something_is_pending() ->
     assert len(calm) in (6, 7)
     talk.asks(ControlAction.ENABLE, 13.001)
     busy = looks(talk, 13.4, '0001')
-    assert len(busy) in (7, 8, 9)
+    assert len(busy) in (8, 9, 10)
     looks(talk, 13.6, '0003')
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert len(looks(talk, 15.6, '0003')) in (4, 5)
@@ -449,10 +451,12 @@ def test_no_status_is_read_behind_the_disable_of_a_lost_drive() -> None:
 def test_no_status_is_looked_at_behind_a_word_that_leaves_when_the_end_has_begun() -> None:
     talk = apart()
     looks(talk, 10.6, '0001')
-    talk.session.services.submit(ControlRequest(ControlAction.ENABLE), 10.601)
+    talk.asks(ControlAction.ENABLE, 10.601)
+    talk.until(10.62 + TICK)
+    talk.session.receive_frame(frame(ANSWER), 10.622)
     assert ENABLE in map(str, talk.session.take_frames())
-    talk.session.deactivate(10.602)
-    talk.session.frames_left(10.603)
+    talk.session.deactivate(10.623)
+    talk.session.frames_left(10.624)
     sent = talk.sent() + [
         text for _, text in talk.served(11.0, lambda text: {
             NEUTRAL: ANSWER, ASK_WORD: '10200341#0000000000000000',
@@ -478,12 +482,13 @@ def test_status_that_was_asked_for_before_a_stop_left_confirms_nothing(
     talk = apart(period=10.0)
     assert talk.until(10.004) == [(10.003, ASK_STATUS)]
     talk.hears('10200D31#0001000000000000', 10.005)
-    assert talk.asks(ControlAction.ENABLE, 10.1) == [ENABLE]
-    assert talk.until(10.11) == [(10.101, ASK_STATUS)]
+    talk.asks(ControlAction.ENABLE, 10.1)
+    assert at_once(talk, 10.1, ANSWER) == [NEUTRAL, ENABLE]
+    assert talk.until(10.11) == [(10.103, ASK_STATUS)]
     stop = DISABLE if action is ControlAction.DISABLE else QUICK_STOP
     assert talk.asks(action, 10.12) == [stop]
     talk.control_outcomes()
-    talk.hears('10200D31#0001000000000000', 10.121)         # answers what was asked at 10.101
+    talk.hears('10200D31#0001000000000000', 10.121)         # answers what was asked at 10.103
     assert talk.control_outcomes() == []
     assert ASK_STATUS in [text for _, text in talk.until(10.13)]
     talk.hears('10200D31#0001000000000000', 10.131)
