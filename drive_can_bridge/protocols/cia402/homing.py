@@ -108,7 +108,6 @@ class Homing:
         behind = self._fresh and not self._machine.word_due
         self._fresh = not self._machine.word_due
         if step is Step.LOWERING and behind:
-            self._lowered = not status & states.BIT_12
             self._go(Step.ENTERING)
             self._change(states.HOMING_MODE, self._entered)
         elif step is Step.RUNNING:
@@ -141,6 +140,7 @@ class Homing:
         if failure:
             self._end(failure)
             return
+        self._lowered = False       # what bit 12 was before, it was in another mode
         self._rules.homing_bits = states.START
         self._go(Step.RUNNING)
 

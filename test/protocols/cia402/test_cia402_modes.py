@@ -258,3 +258,21 @@ class TestHoming:
         axis.live(0.5)
         assert axis.talk.control_outcomes() == [('home', True, 'homed')]
         assert drive.found == 1
+
+    def test_nor_do_they_where_bit_12_falls_late(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        drive.homing = 30
+        runs_down = drive.runs_down
+
+        def keeps() -> None:
+            runs_down()
+            if drive.number(0x6060) == 6 and (drive._left > 25 or not drive._left):
+                drive.bits = 0x1400
+            elif drive.number(0x6060) == 6:
+                drive.bits = 0
+            drive.becomes(drive.state)
+        drive.runs_down = keeps     # type: ignore[method-assign]
+        assert home(axis, 0.2) == []
+        axis.live(0.5)
+        assert axis.talk.control_outcomes() == [('home', True, 'homed')]
+        assert drive.found == 1
