@@ -525,6 +525,11 @@ def homing_failed() -> str:
 
 
 @sentence
+def homing_moves_on() -> str:
+    return 'the axis does not stand'
+
+
+@sentence
 def mode_refused(mode: int) -> str:
     return f'the drive does not change to mode {mode}'
 

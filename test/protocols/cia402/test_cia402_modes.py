@@ -276,3 +276,63 @@ class TestHoming:
         axis.live(0.5)
         assert axis.talk.control_outcomes() == [('home', True, 'homed')]
         assert drive.found == 1
+
+
+class Moves(PositionDrive):
+    """
+    Turns while it looks for its reference, and brakes behind that.
+
+    :ivar brakes: SYNCs that it takes; each with two increments.
+    """
+
+    brakes = 15
+
+    def runs_down(self) -> None:
+        super().runs_down()
+        if self.number(0x6060) != 6 or self.state != self.ENABLED:
+            return
+        if not self._left:
+            self.brakes -= 1
+        if self.brakes > 0:
+            self.objects[0x6064, 0] = (self.number(0x6064) + 2).to_bytes(4, 'little')
+
+
+@pytest.mark.parametrize('homing', [-1, -2])
+class TestHomingThatEndsOnTheWay:
+
+    def meet(self, mode: str, homing: int, **options: Any) -> tuple[Axis, Moves]:
+        axis = Axis(mode, homing=True, homing_timeout=0.4, control_timeout=0.5, **options)
+        drive = axis.drive = Moves(5, OBJECTS)
+        axis.enabled()
+        drive.homing = homing
+        return axis, drive
+
+    @pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('ip', 7), ('pp', 1)])
+    def test_it_is_latched_where_it_has_come_to_stand(
+            self, homing: int, mode: str, number: int) -> None:
+        axis, drive = self.meet(mode, homing)
+        (_, success, _), = home(axis, 1.0)
+        assert not success
+        sent, stands = axis.take(), drive.objects[0x6064, 0].hex().upper()
+        there = sent.index('605#2F60600006000000')
+        back = sent.index(f'605#2F606000{number:02X}000000')
+        held = [text[8:16] for text in sent[there:] if text.startswith('205#')]
+        assert len(set(held)) > 10, 'it turned'
+        assert {text[8:16] for text in sent[back:] if text.startswith('205#')} == {stands}
+        assert [text[8:16] for text in sent[:back] if text.startswith('205#')][-1] == stands
+        assert drive.state == drive.ENABLED
+
+    @pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('ip', 7)])
+    def test_it_is_disabled_if_it_does_not_stand(
+            self, homing: int, mode: str, number: int) -> None:
+        axis, drive = self.meet(mode, homing)
+        drive.brakes = 1000
+        (_, success, text), = home(axis, 1.5)
+        assert not success
+        assert text.fields['parts'][1] == says('homing_moves_on')  # type: ignore[attr-defined]
+        assert drive.state == drive.READY
+        assert drive.told[-3:] == [0x0F, 0x07, 0x06]
+        sent = axis.take()
+        back = sent.index(f'605#2F606000{number:02X}000000')
+        assert [text[4:8] for text in sent[:back] if text.startswith('205#')][-1] == '0700'
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
