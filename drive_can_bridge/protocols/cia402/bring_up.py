@@ -102,6 +102,7 @@ class BringUp:
         self._received, self._sent = request_pdos(drive), response_pdos(drive)
         self._synchronous: bool = drive.options.transmission == 'sync'
         self._told: set[str] = set()
+        self._found = NOTHING           # what was told of a drive that runs
         self.watch: int | None = None
         self.options: dict[int, int] = {}
         self.nmt_at = -math.inf
@@ -170,7 +171,7 @@ class BringUp:
         :param reply: its status word.
         :return: the last one.
         """
-        looks, word = 0, -1
+        looks, word, refusal = 0, -1, NOTHING
         while True:
             if reply.data is None:
                 raise _differs(sentences.object_refused(
@@ -180,12 +181,13 @@ class BringUp:
             reacting = state is State.FAULT_REACTION    # it stops by itself, whatever it is told
             if not reacting and state not in _RUNNING:
                 break
+            found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
             if looks * LOOK_PERIOD >= self._drive.control_timeout:
-                tell = sentences.found_braking if reacting else sentences.found_running
-                raise _End(Outcome(Found.RUNS, tell(state.value)))
-            if not looks:
-                tell = sentences.found_braking if reacting else sentences.found_enabled
-                self._session.report.note(Noted(tell(state.value), warning=True))
+                runs = found if reacting else sentences.found_running(state.value)
+                raise _End(Outcome(Found.RUNS, sentences.together((runs, refusal))))
+            if not looks and found != self._found:
+                self._found = found
+                self._session.report.note(Noted(found, warning=True))
             wanted = DISABLE_WORDS[self._options.disable_word]
             if state is State.QUICK_STOP_ACTIVE:    # which takes its course
                 wanted = states.DISABLE_VOLTAGE
@@ -193,10 +195,11 @@ class BringUp:
                 state is State.QUICK_STOP_ACTIVE and (yield from self._brakes(raw)))
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
-                yield from self._must(states.CONTROL_WORD, 0, word, 2)
+                refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)
             looks += 1
             yield Ask(pause=LOOK_PERIOD)
             reply = yield from self._transfer(Ask(states.STATUS_WORD))
+        self._found = NOTHING
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
         return raw

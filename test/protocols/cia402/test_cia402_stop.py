@@ -11,6 +11,7 @@ from servo_builders import Axis, servo, TABLE
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.protocols.canopen.sdo import describe
 
 WATCH_OFF = '605#2316100100000000'
 DISABLE_BY_SDO = '605#2B40600007000000'
@@ -149,6 +150,31 @@ class TestFoundEnabled:
         assert axis.session.state is DriveState.OFFLINE
         assert doubts(axis) == [says('may_still_be_running', why=says(
             'found_running', state='operation enabled'))]
+
+    def test_nor_one_that_refuses_the_word_until_it_takes_it(self) -> None:
+        axis = self.meet(control_timeout=0.5)
+        axis.drive.fixed = {(0x6040, 0): 0x08000022}
+        axis.start()
+        axis.live(5.0)
+        sent = axis.take()
+        assert not any(text.startswith(('000#', '205#')) for text in sent)
+        assert sent.count(DISABLE_BY_SDO) > 10
+        assert axis.session.state is DriveState.OFFLINE
+        assert axis.session.offline_advice.fields['parts'] == [
+            says('found_running', state='operation enabled'),
+            says('object_refused', what='6040h.00h', why=describe(0x08000022))]
+        found = says('found_enabled', state='operation enabled')
+        notes = axis.talk.events(Noted)
+        assert [note.text.code for note in notes if note.danger] == ['may_still_be_running']
+        assert [note.text for note in notes].count(found) == 1
+        axis.drive.fixed.clear()
+        axis.live(2.0)
+        assert axis.session.online
+        for each in axis.drive.restarts():
+            axis.drive.becomes(axis.drive.ENABLED)
+            axis.says(str(each))
+        axis.live(0.5)
+        assert [note.text for note in axis.talk.events(Noted)].count(found) == 1
 
 
 class TestLosses:
