@@ -236,6 +236,10 @@ class BringUp:
 
     def _start(self) -> Procedure:
         """Have the node take PDOs, or wait until somebody else does."""
+        if self._node.ceased:       # without them it would be online again, and not watched
+            self._session.report.advice = sentences.no_heartbeat(self._node.heartbeat_timeout)
+            while self._node.ceased:
+                yield Ask(pause=LOOK_PERIOD)
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
             yield Ask(pause=START_PAUSE)

@@ -215,6 +215,28 @@ class TestLosses:
         lost, = axis.talk.events(StationLost)
         assert lost.reason == says('no_heartbeat', timeout=0.35)
 
+    def test_it_stays_offline_until_there_are_heartbeats_again(self) -> None:
+        axis = Axis(objects={(0x1017, 0): b'\x64\0'}, heartbeat_producer=0.0).enabled()
+        for again in (True, False):
+            axis.drive.objects[0x1017, 0] = b'\0\0'
+            axis.live(5.0)
+            lost, = axis.talk.events(StationLost)
+            assert lost.reason == says('no_heartbeat', timeout=0.35)
+            assert axis.session.state is DriveState.OFFLINE
+            assert axis.session.offline_advice == says('no_heartbeat', timeout=0.35)
+            axis.drive.objects[0x1017, 0] = b'\x64\0'
+            axis.live(0.5)
+            assert axis.session.state is DriveState.DISABLED, again
+
+    def test_one_that_never_had_any_is_online_and_says_so(self) -> None:
+        axis = Axis(heartbeat_producer=0.0)
+        axis.start()
+        assert axis.session.warning == says('heartbeat_missing')
+        axis.says('705#00')
+        axis.live(1.5)
+        assert axis.session.online
+        assert axis.session.warning == says('heartbeat_missing')
+
     def test_a_node_that_is_not_operational_any_more(self) -> None:
         axis = running()
         axis.live(0.2)
