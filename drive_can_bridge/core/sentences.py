@@ -632,6 +632,11 @@ def stop_failed(what: Sequence[str]) -> str:
 
 
 @sentence
+def still_in_state(state: str) -> str:
+    return f'it is still in state {state}'
+
+
+@sentence
 def stop_not_possible() -> str:
     return 'could not be told to stop'
 

@@ -96,6 +96,46 @@ class TestTheEnd:
         assert sent.count('77F#05') >= 4
         assert '77F#05' not in sent[sent.index(WATCH_OFF):]
 
+    @staticmethod
+    def back(**options: object) -> Axis:
+        """Be enabled, silent for a while, and not set up again."""
+        axis = running(control_timeout=1.0, **options)
+        axis.drive.ramp = 1000
+        axis.mute = True
+        axis.live(0.5)
+        axis.mute = False
+        assert axis.session.owed
+        assert axis.drive.state == axis.drive.ENABLED
+        doubts(axis)
+        return axis
+
+    def test_by_sdo_it_is_waited_for_as_well(self) -> None:
+        axis = self.back()
+        axis.take()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.5)
+        assert not axis.session.stopped
+        assert WATCH_OFF not in axis.take()
+        axis.drive.becomes(axis.drive.ON)
+        axis.live(0.1)
+        assert axis.session.stopped
+        assert axis.take()[-1] == WATCH_OFF
+        assert doubts(axis) == []
+
+    @pytest.mark.parametrize(('fixed', 'why'), [
+        ({}, says('still_in_state', state='operation enabled')),
+        ({(0x6040, 0): 0x08000022}, None)])
+    def test_one_that_does_not_stop_by_sdo_watches_the_bridge(
+            self, fixed: dict[tuple[int, int], int], why: str | None) -> None:
+        axis = self.back()
+        axis.drive.fixed = fixed
+        sent = end(axis)
+        assert DISABLE_BY_SDO in sent
+        assert WATCH_OFF not in sent        # so that it stops by itself
+        told, = doubts(axis)
+        assert why is None or told == says('may_still_be_running', why=says(
+            'stop_failed', what=[why]))
+
     def test_in_the_middle_of_the_set_up(self) -> None:
         axis = Axis()
         axis.deliver(axis.talk.bus_up(axis.now))
@@ -306,6 +346,7 @@ class TestTheAnswerBeforeIsToCome:
         axis.says('585#6040600000000000')
         assert by_sdo(axis) == ['605#23FF600000000000']
         axis.says('585#60FF600000000000')
+        axis.says('585#4B41600050020000')       # switch on disabled
         axis.says('585#6016100100000000')
         assert axis.session.stopped
         assert doubts(axis) == []
