@@ -10,6 +10,7 @@ from servo_builders import Axis, OBJECTS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.cia402.states import State
 
@@ -93,6 +94,28 @@ class TestHandover:
         axis.live(0.06)
         assert drive.targets == [2000, 5000]
         assert axis.words() == ['0F00', '3F00', '0F00', '3F00', '0F00']
+
+    def test_a_target_whose_edge_was_lost_is_handed_over_when_it_is_the_newest_again(self) -> None:
+        axis, drive = meet()
+        takes, lost = drive.takes, []
+
+        def loses(sent: Frame) -> list[Frame]:
+            if sent.identifier == 0x205 and sent.data[0] == 0x3F and not lost:
+                lost.append(sent)
+                return []
+            return takes(sent)
+        drive.takes = loses     # type: ignore[method-assign]
+        axis.commands(1000.0, 2000.0)
+        while not lost:
+            axis.live(0.005)
+        axis.commands(3000.0)
+        while not drive.targets:
+            axis.live(0.005)
+        axis.commands(2000.0)
+        axis.live(0.1)
+        assert [text[8:] for text in axis.take() if text.startswith('205#3F')] == [
+            'D0070000', 'B80B0000', 'D0070000']
+        assert len(drive.targets) == 2, 'bit 4 fell between them'
 
     def test_a_drive_that_acknowledges_late(self) -> None:
         axis, drive = meet()
