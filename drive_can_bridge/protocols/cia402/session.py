@@ -463,7 +463,7 @@ class Cia402Session(Session):
     def _look_at_error(self) -> Generator[Ask, Reply, None]:
         """Read 603Fh: why the drive is not enabled."""
         reply = yield Ask(states.ERROR_CODE)
-        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
+        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')
 
     @property
     def mode_lacking(self) -> Sentence:
