@@ -525,6 +525,11 @@ def homing_failed() -> str:
 
 
 @sentence
+def homing_moves_on() -> str:
+    return 'the axis does not stand'
+
+
+@sentence
 def mode_refused(mode: int) -> str:
     return f'the drive does not change to mode {mode}'
 
@@ -624,6 +629,11 @@ def stop_not_answered() -> str:
 @sentence
 def stop_failed(what: Sequence[str]) -> str:
     return f'told to stop, but {"; ".join(what)}'
+
+
+@sentence
+def still_in_state(state: str) -> str:
+    return f'it is still in state {state}'
 
 
 @sentence

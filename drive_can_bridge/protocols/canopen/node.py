@@ -167,11 +167,15 @@ class Node:
         return NOTHING if emergency is None else sentences.emergency_lasts(emergency.text)
 
     @property
+    def ceased(self) -> bool:
+        """There were heartbeats, not only a boot-up frame, and there are none any more."""
+        return self.heartbeat_lost and self.heartbeat_timeout > 0.0 and self._interval is not None
+
+    @property
     def missing(self) -> Sentence:
         """What the node should say, but does not; '' if nothing."""
-        if self.heartbeat_timeout <= 0.0 or self.state is not None:
-            return NOTHING
-        return sentences.heartbeat_missing()
+        never = self.state is None or self.heartbeat_lost and self._interval is None
+        return sentences.heartbeat_missing() if never and self.heartbeat_timeout > 0 else NOTHING
 
     def facts(self) -> dict[str, str]:
         """Return its state and its errors in words, for diagnostics."""

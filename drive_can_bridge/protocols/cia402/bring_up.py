@@ -102,6 +102,7 @@ class BringUp:
         self._received, self._sent = request_pdos(drive), response_pdos(drive)
         self._synchronous: bool = drive.options.transmission == 'sync'
         self._told: set[str] = set()
+        self._found = NOTHING           # what was told of a drive that runs
         self.watch: int | None = None
         self.options: dict[int, int] = {}
         self.nmt_at = -math.inf
@@ -134,13 +135,18 @@ class BringUp:
             raise _End(Outcome(Found.SILENT))
         return reply
 
-    def _read(self, index: int, subindex: int = 0, *, signed: bool = False,
+    def _read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
               ) -> Generator[Ask, Reply, 'int | None']:
-        """Read a number; None: the drive refuses, which mostly means that it has none."""
+        """
+        Read a number; None: the drive refuses, which mostly means that it has none.
+
+        :param length: its bytes, where the drive does not tell.
+        """
         reply = yield from self._transfer(Ask(index, subindex))
         if reply.data is None:
             return None
-        return int.from_bytes(reply.data, 'little', signed=signed)
+        data = reply.data if reply.sized else reply.data[:length]
+        return int.from_bytes(data, 'little', signed=signed)
 
     def _put(self, index: int, subindex: int, value: int, length: int,
              ) -> Generator[Ask, Reply, Sentence]:
@@ -170,22 +176,23 @@ class BringUp:
         :param reply: its status word.
         :return: the last one.
         """
-        looks, word = 0, -1
+        looks, word, refusal = 0, -1, NOTHING
         while True:
             if reply.data is None:
                 raise _differs(sentences.object_refused(
                     _place(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
-            raw = int.from_bytes(reply.data, 'little')
+            raw = int.from_bytes(reply.data[:2], 'little')
             state = states.state_of(raw)
             reacting = state is State.FAULT_REACTION    # it stops by itself, whatever it is told
             if not reacting and state not in _RUNNING:
                 break
+            found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
             if looks * LOOK_PERIOD >= self._drive.control_timeout:
-                tell = sentences.found_braking if reacting else sentences.found_running
-                raise _End(Outcome(Found.RUNS, tell(state.value)))
-            if not looks:
-                tell = sentences.found_braking if reacting else sentences.found_enabled
-                self._session.report.note(Noted(tell(state.value), warning=True))
+                runs = found if reacting else sentences.found_running(state.value)
+                raise _End(Outcome(Found.RUNS, sentences.together((runs, refusal))))
+            if not looks and found != self._found:
+                self._found = found
+                self._session.report.note(Noted(found, warning=True))
             wanted = DISABLE_WORDS[self._options.disable_word]
             if state is State.QUICK_STOP_ACTIVE:    # which takes its course
                 wanted = states.DISABLE_VOLTAGE
@@ -193,10 +200,11 @@ class BringUp:
                 state is State.QUICK_STOP_ACTIVE and (yield from self._brakes(raw)))
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
-                yield from self._must(states.CONTROL_WORD, 0, word, 2)
+                refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)
             looks += 1
             yield Ask(pause=LOOK_PERIOD)
             reply = yield from self._transfer(Ask(states.STATUS_WORD))
+        self._found = NOTHING
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
         return raw
@@ -204,7 +212,7 @@ class BringUp:
     def _brakes(self, status: int) -> Generator[Ask, Reply, bool]:
         """Tell whether a quick stop takes its course: one that ends by itself does until then."""
         self._rules.quick_stop_option = yield from self._read(
-            states.QUICK_STOP_OPTION, signed=True)
+            states.QUICK_STOP_OPTION, 0, 2, signed=True)
         if not self._rules.stays:
             return True
         return not status & states.TARGET_REACHED and (
@@ -213,7 +221,7 @@ class BringUp:
     def _learn(self) -> Procedure:
         """Read what the drive does at a stop."""
         for index in (states.QUICK_STOP_OPTION, states.SHUTDOWN_OPTION, states.DISABLE_OPTION):
-            value = yield from self._read(index, signed=True)
+            value = yield from self._read(index, 0, 2, signed=True)
             if value is None:
                 self.options.pop(index, None)
             else:
@@ -226,13 +234,17 @@ class BringUp:
         node.heartbeat_timeout = self._options.heartbeat_timeout
         if not interval:
             return
-        if (yield from self._read(PRODUCER)) != interval and (
+        if (yield from self._read(PRODUCER, 0, 2)) != interval and (
                 yield from self._put(PRODUCER, 0, interval, 2)):
             node.heartbeat_timeout = 0.0
             self.tell(sentences.no_heartbeat_producer())
 
     def _start(self) -> Procedure:
         """Have the node take PDOs, or wait until somebody else does."""
+        if self._node.ceased:       # without them it would be online again, and not watched
+            self._session.report.advice = sentences.no_heartbeat(self._node.heartbeat_timeout)
+            while self._node.ceased:
+                yield Ask(pause=LOOK_PERIOD)
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
             yield Ask(pause=START_PAUSE)
@@ -282,7 +294,7 @@ class BringUp:
     def _interpolation_time(self) -> Procedure:
         """Write 60C2h, where the drive has it."""
         index, period = states.INTERPOLATION_TIME, self._drive.period
-        value = yield from self._read(index, 1)
+        value = yield from self._read(index, 1, 1)
         if value is None:
             return
         fitting = interpolation_time(period)
@@ -290,7 +302,7 @@ class BringUp:
             self.tell(sentences.interpolation_time_left(period))
             return
         count, power = fitting
-        if (value, (yield from self._read(index, 2, signed=True))) == fitting:
+        if (value, (yield from self._read(index, 2, 1, signed=True))) == fitting:
             return
         refusal = (yield from self._put(index, 2, power, 1)) or (
             yield from self._put(index, 1, count, 1))
@@ -309,13 +321,13 @@ class BringUp:
         if interval > 0.0:
             slot = yield from (self._write_watch if mapping == 'configure' else
                                self._read_watch)(interval)
-        option = (yield from self._read(states.ABORT_CONNECTION_OPTION)) \
+        option = (yield from self._read(states.ABORT_CONNECTION_OPTION, 0, 2)) \
             if slot is not None else 0
         if option == 0:
             self.tell(sentences.nothing_stops())
 
     def _watchers(self) -> Generator[Ask, Reply, list[int]]:
-        count = yield from self._read(CONSUMER)
+        count = yield from self._read(CONSUMER, 0, 1)
         found = []
         for subindex in range(1, (count or 0) + 1):
             found.append((yield from self._read(CONSUMER, subindex)) or 0)
@@ -395,7 +407,7 @@ class BringUp:
             self._may_write(sentences.object_differs(
                 _place(SYNC_PERIOD), f'{period} us', f'{wanted} us'))
             yield from self._must(SYNC_PERIOD, 0, wanted, 4)
-        counter = yield from self._read(SYNC_COUNTER)
+        counter = yield from self._read(SYNC_COUNTER, 0, 1)
         if (counter or 0) > 1:
             raise _differs(sentences.object_differs(_place(SYNC_COUNTER), str(counter), '0'))
 
@@ -430,7 +442,7 @@ class BringUp:
             raise _differs(sentences.no_such_pdo('TPDO' if transmit else 'RPDO', wanted.number))
         if identifier & ~pdo.NO_REMOTE != wanted.identifier:
             return _difference(at, pdo.COB_ID, identifier, wanted.identifier), identifier
-        kind = yield from self._read(at, pdo.TRANSMISSION)
+        kind = yield from self._read(at, pdo.TRANSMISSION, 1)
         types = self._types(transmit=transmit)
         judged = transmit or self._options.mapping == 'configure'
         if judged and kind not in (types if written or transmit else types[:1]):
@@ -440,7 +452,7 @@ class BringUp:
             return difference, identifier
         if transmit and self._options.mapping == 'configure' and not written:
             for subindex, value in self._timers():
-                time = yield from self._read(at, subindex)
+                time = yield from self._read(at, subindex, 2)
                 if time is not None and time != value:
                     return _difference(at, subindex, time, value), identifier
         return NOTHING, identifier
@@ -448,7 +460,7 @@ class BringUp:
     def _other_content(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
         """Return in what a PDO holds something else."""
         entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
-        count = yield from self._read(mapping)
+        count = yield from self._read(mapping, 0, 1)
         if count != len(entries):
             return _difference(mapping, 0, count or 0, len(entries))
         for place, entry in enumerate(entries, 1):
@@ -486,7 +498,7 @@ class BringUp:
         if refusal and not fixed:
             raise _differs(refusal)
         for subindex, value in self._timers() if transmit else ():
-            found = yield from self._read(at, subindex)
+            found = yield from self._read(at, subindex, 2)
             if found == value or found is None and not value:
                 continue
             refusal = yield from self._put(at, subindex, value, 2)

@@ -40,6 +40,7 @@ class Handover:
         self._rules, self._timeout, self._report = rules, timeout, report
         self._waits_since, self._told = math.inf, False
         self._handed: int | None = None     # the drive was given this one
+        self._doubted = False               # or another one, if that frame was lost
         self._rising = False                # bit 4 has yet to travel
         self._before = 0                    # the bits that travel until then
 
@@ -59,7 +60,7 @@ class Handover:
         elif rules.mode_bits & states.NEW_SETPOINT:
             if acknowledged or not setpoint.armed:
                 rules.mode_bits = 0
-        elif setpoint.armed and setpoint.raw != self._handed and not acknowledged:
+        elif setpoint.armed and self._new and not acknowledged:
             self._before = rules.mode_bits
             rules.mode_bits, self._rising = states.NEW_SETPOINT | states.AT_ONCE, True
         if not setpoint.armed and self._handed is not None:
@@ -71,7 +72,7 @@ class Handover:
         setpoint = self._setpoint
         high = not self._rising and bool(self._rules.mode_bits & states.NEW_SETPOINT)
         waits = setpoint.armed and (not acknowledged if high else (
-            acknowledged and setpoint.raw != self._handed))
+            acknowledged and self._new))
         if not waits:
             self._waits_since = math.inf
             self._told = self._told and not (high and acknowledged)
@@ -82,7 +83,16 @@ class Handover:
             self._report.note(Noted(
                 sentences.target_not_acknowledged(self._timeout, int(high)), warning=True))
 
+    @property
+    def _new(self) -> bool:
+        """The target is not known to be the one that the drive has."""
+        return self._doubted or self._setpoint.raw != self._handed
+
     def carried(self, word: int, setpoints: list[int]) -> None:
         """Record a telegram that was made: the edge hands over what is in it."""
-        if self._rising and word & states.NEW_SETPOINT:
-            self._handed, self._rising = setpoints[self._place], False
+        target = setpoints[self._place]
+        if word & states.NEW_SETPOINT:
+            if self._rising:
+                self._handed, self._rising, self._doubted = target, False, False
+            elif target != self._handed:
+                self._doubted = True

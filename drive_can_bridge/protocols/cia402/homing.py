@@ -54,6 +54,7 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = Step.NONE
         self._deadline = math.inf
+        self._before: list[int] = []    # where held axes were a sample ago
         self._now = -math.inf           # of the last sample
         self._fresh = self._lowered = False
         self._failure = NOTHING
@@ -87,9 +88,17 @@ class Homing:
 
     def handle_timer(self, now: float) -> None:
         """End what lasts too long."""
-        if now >= self._deadline:
-            self._deadline = math.inf
+        if now < self._deadline:
+            return
+        if self._step is not Step.LATCHING:
+            self._now = now
             self._end(sentences.homing_timed_out(self._timeout, self._step.value))
+            return
+        self._deadline = math.inf
+        failure = sentences.together((self._failure, sentences.homing_moves_on()))
+        self._machine.drop(failure)     # in its mode it would jump back
+        self._answer(False, failure)
+        self._session.control_changed(now)
 
     def stop(self) -> None:
         """Forget it: the channel was cleared, or the drive is lost."""
@@ -108,14 +117,12 @@ class Homing:
         behind = self._fresh and not self._machine.word_due
         self._fresh = not self._machine.word_due
         if step is Step.LOWERING and behind:
-            self._lowered = not status & states.BIT_12
             self._go(Step.ENTERING)
             self._change(states.HOMING_MODE, self._entered)
         elif step is Step.RUNNING:
             self._look(status, behind)
         elif step is Step.LATCHING:
-            self._session.setpoints.measure(raws, driven=False)
-            self._go(Step.HOLDING)
+            self._latch(raws, behind)
         elif step is Step.HOLDING and behind:
             self._go(Step.LEAVING)
             self._change(self._mode, self._left)
@@ -141,14 +148,27 @@ class Homing:
         if failure:
             self._end(failure)
             return
+        self._lowered = False       # what bit 12 was before, it was in another mode
         self._rules.homing_bits = states.START
         self._go(Step.RUNNING)
 
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
-        self._failure, self._deadline = failure, math.inf
+        self._failure = failure
+        self._deadline = self._now + (
+            self._session.configuration.control_timeout if failure else math.inf)
         self._rules.homing_bits = 0
         self._go(Step.LATCHING)
+
+    def _latch(self, raws: Sequence[int], behind: bool) -> None:
+        """Take where the axis is, as soon as it stands: unless it is homed, it has to brake."""
+        setpoints = self._session.setpoints
+        before, self._before = self._before, [raws[each.place] for each in setpoints.held]
+        setpoints.measure(raws, driven=False)
+        # not by bit 10: behind a homing that was ended it says no more than that
+        if not self._failure or behind and self._before == before:
+            self._deadline = math.inf
+            self._go(Step.HOLDING)
 
     def _left(self, failure: Sentence) -> None:
         if self._step is not Step.LEAVING:

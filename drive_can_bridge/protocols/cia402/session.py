@@ -47,13 +47,13 @@ from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
-    cells, MAP, SdoAccess, write_until_answered)
+    cells, MAP, SdoAccess, StopProcedure, write_until_answered)
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import (
-    ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain)
+    ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
 
 #: s until a drive that differs, or runs on, is looked at again
 LOOK_AGAIN = 1.0
@@ -150,6 +150,7 @@ class Cia402Session(Session):
         self.look_after(self._course, self._heartbeats, self._homing, self.exchange,
                         channel=self._channel)
         self._stop_until = -math.inf
+        self._runs_on = False       # what its stop by SDO has come to
         self._forget_state()
 
     def _forget_state(self) -> None:
@@ -183,6 +184,7 @@ class Cia402Session(Session):
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
+        self._runs_on = False
         if self.exchange.cycling:
             self.exchange.stop_soon(now)
         elif self.owed:
@@ -461,7 +463,7 @@ class Cia402Session(Session):
     def _look_at_error(self) -> Generator[Ask, Reply, None]:
         """Read 603Fh: why the drive is not enabled."""
         reply = yield Ask(states.ERROR_CODE)
-        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data, 'little')
+        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')
 
     @property
     def mode_lacking(self) -> Sentence:
@@ -513,7 +515,28 @@ class Cia402Session(Session):
         self._channel.make_room(now)
         writes = [each._replace(raw=self._machine.word) if each.is_word else each
                   for each in self._stop.writes()]
-        self._stop.begin(write_until_answered(writes, self._stop.answer_time), now, again=again)
+        self._stop.begin(self._see_it_stop(writes), now, again=again)
+
+    def _see_it_stop(self, writes: list[StopWrite]) -> StopProcedure:
+        """Tell it to stop, and in the end look whether it has, as long as frames would go on."""
+        failed = yield from write_until_answered(writes, self._stop.answer_time)
+        if not failed and self.stage is Stage.STOPPING:
+            state = yield from self._state_in_the_end()
+            if state in states.MOVING:
+                failed = [sentences.still_in_state(state.value)]
+        self._runs_on = bool(failed)
+        return failed
+
+    def _state_in_the_end(self) -> Generator[Ask, Reply, State]:
+        state = State.UNKNOWN
+        while True:
+            reply = yield Ask(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
+            if reply.data is not None:
+                state = state_of(int.from_bytes(reply.data, 'little'))
+            known = reply.abort is not None or reply.data is not None
+            if known and state not in states.MOVING or self._channel.now >= self._stop_until:
+                return state
+            yield Ask(pause=LOOK_PERIOD)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Ask, Reply]:
         reply = yield Ask(states.STATUS_WORD, timeout=timeout, attempts=1)
@@ -544,7 +567,7 @@ class Cia402Session(Session):
 
     def _release(self, now: float) -> None:
         """Come to the end, as soon as the drive does not watch the bridge any more."""
-        if self.owed:      # then it is to stop by itself
+        if self.owed or self._runs_on:      # then it is to stop by itself
             self.stop_left()
             return
         self._channel.run(self._bring_up.release(self._stop.answer_time),

@@ -10,6 +10,7 @@ from servo_builders import Axis, OBJECTS
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.cia402.states import State
 
@@ -93,6 +94,28 @@ class TestHandover:
         axis.live(0.06)
         assert drive.targets == [2000, 5000]
         assert axis.words() == ['0F00', '3F00', '0F00', '3F00', '0F00']
+
+    def test_a_target_whose_edge_was_lost_is_handed_over_when_it_is_the_newest_again(self) -> None:
+        axis, drive = meet()
+        takes, lost = drive.takes, []
+
+        def loses(sent: Frame) -> list[Frame]:
+            if sent.identifier == 0x205 and sent.data[0] == 0x3F and not lost:
+                lost.append(sent)
+                return []
+            return takes(sent)
+        drive.takes = loses     # type: ignore[method-assign]
+        axis.commands(1000.0, 2000.0)
+        while not lost:
+            axis.live(0.005)
+        axis.commands(3000.0)
+        while not drive.targets:
+            axis.live(0.005)
+        axis.commands(2000.0)
+        axis.live(0.1)
+        assert [text[8:] for text in axis.take() if text.startswith('205#3F')] == [
+            'D0070000', 'B80B0000', 'D0070000']
+        assert len(drive.targets) == 2, 'bit 4 fell between them'
 
     def test_a_drive_that_acknowledges_late(self) -> None:
         axis, drive = meet()
@@ -258,3 +281,81 @@ class TestHoming:
         axis.live(0.5)
         assert axis.talk.control_outcomes() == [('home', True, 'homed')]
         assert drive.found == 1
+
+    def test_nor_do_they_where_bit_12_falls_late(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True)
+        drive.homing = 30
+        runs_down = drive.runs_down
+
+        def keeps() -> None:
+            runs_down()
+            if drive.number(0x6060) == 6 and (drive._left > 25 or not drive._left):
+                drive.bits = 0x1400
+            elif drive.number(0x6060) == 6:
+                drive.bits = 0
+            drive.becomes(drive.state)
+        drive.runs_down = keeps     # type: ignore[method-assign]
+        assert home(axis, 0.2) == []
+        axis.live(0.5)
+        assert axis.talk.control_outcomes() == [('home', True, 'homed')]
+        assert drive.found == 1
+
+
+class Moves(PositionDrive):
+    """
+    Turns while it looks for its reference, and brakes behind that.
+
+    :ivar brakes: SYNCs that it takes; each with two increments.
+    """
+
+    brakes = 15
+
+    def runs_down(self) -> None:
+        super().runs_down()
+        if self.number(0x6060) != 6 or self.state != self.ENABLED:
+            return
+        if not self._left:
+            self.brakes -= 1
+        if self.brakes > 0:
+            self.objects[0x6064, 0] = (self.number(0x6064) + 2).to_bytes(4, 'little')
+
+
+@pytest.mark.parametrize('homing', [-1, -2])
+class TestHomingThatEndsOnTheWay:
+
+    def meet(self, mode: str, homing: int, **options: Any) -> tuple[Axis, Moves]:
+        axis = Axis(mode, homing=True, homing_timeout=0.4, control_timeout=0.5, **options)
+        drive = axis.drive = Moves(5, OBJECTS)
+        axis.enabled()
+        drive.homing = homing
+        return axis, drive
+
+    @pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('ip', 7), ('pp', 1)])
+    def test_it_is_latched_where_it_has_come_to_stand(
+            self, homing: int, mode: str, number: int) -> None:
+        axis, drive = self.meet(mode, homing)
+        (_, success, _), = home(axis, 1.0)
+        assert not success
+        sent, stands = axis.take(), drive.objects[0x6064, 0].hex().upper()
+        there = sent.index('605#2F60600006000000')
+        back = sent.index(f'605#2F606000{number:02X}000000')
+        held = [text[8:16] for text in sent[there:] if text.startswith('205#')]
+        assert len(set(held)) > 10, 'it turned'
+        assert {text[8:16] for text in sent[back:] if text.startswith('205#')} == {stands}
+        assert [text[8:16] for text in sent[:back] if text.startswith('205#')][-1] == stands
+        assert drive.state == drive.ENABLED
+
+    @pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('ip', 7)])
+    def test_it_is_disabled_if_it_does_not_stand(
+            self, homing: int, mode: str, number: int) -> None:
+        axis, drive = self.meet(mode, homing)
+        drive.brakes = 1000
+        (_, success, text), = home(axis, 1.5)
+        assert not success
+        assert text.fields['parts'][1] == says('homing_moves_on')  # type: ignore[attr-defined]
+        assert drive.state == drive.READY
+        assert drive.told[-3:] == [0x0F, 0x07, 0x06]
+        sent = axis.take()
+        back = sent.index(f'605#2F606000{number:02X}000000')
+        assert [text[4:8] for text in sent[:back] if text.startswith('205#')][-1] == '0700'
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]

@@ -70,6 +70,25 @@ class TestConfigure:
         assert axis.session.online
         assert written(axis) == ['17100064000000', '60600009000000', '16100158027F00']
 
+    @pytest.mark.parametrize('padding', [b'\0', b'\xFF'])
+    def test_nor_where_the_drive_does_not_tell_how_long_it_is(self, padding: bytes) -> None:
+        axis = Axis(objects={
+            **FITS, (0x1017, 0): b'\x64\0', (0x1019, 0): b'\0', (0x60C2, 1): b'\x0A',
+            (0x60C2, 2): b'\xFD', (0x605A, 0): b'\xFE\xFF', (0x6007, 0): bytes(2)})
+        sdo = axis.drive._sdo
+
+        def untold(data: bytes) -> bytes:
+            found = sdo(data)
+            count = 4 - (found[0] >> 2 & 3)
+            return found if found[0] >> 5 != 2 else (
+                b'\x42' + found[1:4 + count] + (4 - count) * padding)
+        axis.drive._sdo = untold        # type: ignore[method-assign]
+        axis.start()
+        assert axis.session.online, axis.session.offline_advice
+        assert written(axis) == ['60600009000000', '16100158027F00']
+        assert '(605Ah = -2)' in axis.session.facts()['stops_by']
+        assert says('nothing_stops') in notes(axis)
+
     def test_a_fixed_mapping_that_fits(self) -> None:
         axis = Axis(objects=FITS)
         axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)

@@ -11,6 +11,7 @@ from servo_builders import Axis, servo, TABLE
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.protocols.canopen.sdo import describe
 
 WATCH_OFF = '605#2316100100000000'
 DISABLE_BY_SDO = '605#2B40600007000000'
@@ -95,6 +96,46 @@ class TestTheEnd:
         assert sent.count('77F#05') >= 4
         assert '77F#05' not in sent[sent.index(WATCH_OFF):]
 
+    @staticmethod
+    def back(**options: object) -> Axis:
+        """Be enabled, silent for a while, and not set up again."""
+        axis = running(control_timeout=1.0, **options)
+        axis.drive.ramp = 1000
+        axis.mute = True
+        axis.live(0.5)
+        axis.mute = False
+        assert axis.session.owed
+        assert axis.drive.state == axis.drive.ENABLED
+        doubts(axis)
+        return axis
+
+    def test_by_sdo_it_is_waited_for_as_well(self) -> None:
+        axis = self.back()
+        axis.take()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.5)
+        assert not axis.session.stopped
+        assert WATCH_OFF not in axis.take()
+        axis.drive.becomes(axis.drive.ON)
+        axis.live(0.1)
+        assert axis.session.stopped
+        assert axis.take()[-1] == WATCH_OFF
+        assert doubts(axis) == []
+
+    @pytest.mark.parametrize(('fixed', 'why'), [
+        ({}, says('still_in_state', state='operation enabled')),
+        ({(0x6040, 0): 0x08000022}, None)])
+    def test_one_that_does_not_stop_by_sdo_watches_the_bridge(
+            self, fixed: dict[tuple[int, int], int], why: str | None) -> None:
+        axis = self.back()
+        axis.drive.fixed = fixed
+        sent = end(axis)
+        assert DISABLE_BY_SDO in sent
+        assert WATCH_OFF not in sent        # so that it stops by itself
+        told, = doubts(axis)
+        assert why is None or told == says('may_still_be_running', why=says(
+            'stop_failed', what=[why]))
+
     def test_in_the_middle_of_the_set_up(self) -> None:
         axis = Axis()
         axis.deliver(axis.talk.bus_up(axis.now))
@@ -150,6 +191,31 @@ class TestFoundEnabled:
         assert doubts(axis) == [says('may_still_be_running', why=says(
             'found_running', state='operation enabled'))]
 
+    def test_nor_one_that_refuses_the_word_until_it_takes_it(self) -> None:
+        axis = self.meet(control_timeout=0.5)
+        axis.drive.fixed = {(0x6040, 0): 0x08000022}
+        axis.start()
+        axis.live(5.0)
+        sent = axis.take()
+        assert not any(text.startswith(('000#', '205#')) for text in sent)
+        assert sent.count(DISABLE_BY_SDO) > 10
+        assert axis.session.state is DriveState.OFFLINE
+        assert axis.session.offline_advice.fields['parts'] == [
+            says('found_running', state='operation enabled'),
+            says('object_refused', what='6040h.00h', why=describe(0x08000022))]
+        found = says('found_enabled', state='operation enabled')
+        notes = axis.talk.events(Noted)
+        assert [note.text.code for note in notes if note.danger] == ['may_still_be_running']
+        assert [note.text for note in notes].count(found) == 1
+        axis.drive.fixed.clear()
+        axis.live(2.0)
+        assert axis.session.online
+        for each in axis.drive.restarts():
+            axis.drive.becomes(axis.drive.ENABLED)
+            axis.says(str(each))
+        axis.live(0.5)
+        assert [note.text for note in axis.talk.events(Noted)].count(found) == 1
+
 
 class TestLosses:
 
@@ -188,6 +254,28 @@ class TestLosses:
         axis.live(0.4)
         lost, = axis.talk.events(StationLost)
         assert lost.reason == says('no_heartbeat', timeout=0.35)
+
+    def test_it_stays_offline_until_there_are_heartbeats_again(self) -> None:
+        axis = Axis(objects={(0x1017, 0): b'\x64\0'}, heartbeat_producer=0.0).enabled()
+        for again in (True, False):
+            axis.drive.objects[0x1017, 0] = b'\0\0'
+            axis.live(5.0)
+            lost, = axis.talk.events(StationLost)
+            assert lost.reason == says('no_heartbeat', timeout=0.35)
+            assert axis.session.state is DriveState.OFFLINE
+            assert axis.session.offline_advice == says('no_heartbeat', timeout=0.35)
+            axis.drive.objects[0x1017, 0] = b'\x64\0'
+            axis.live(0.5)
+            assert axis.session.state is DriveState.DISABLED, again
+
+    def test_one_that_never_had_any_is_online_and_says_so(self) -> None:
+        axis = Axis(heartbeat_producer=0.0)
+        axis.start()
+        assert axis.session.warning == says('heartbeat_missing')
+        axis.says('705#00')
+        axis.live(1.5)
+        assert axis.session.online
+        assert axis.session.warning == says('heartbeat_missing')
 
     def test_a_node_that_is_not_operational_any_more(self) -> None:
         axis = running()
@@ -258,6 +346,7 @@ class TestTheAnswerBeforeIsToCome:
         axis.says('585#6040600000000000')
         assert by_sdo(axis) == ['605#23FF600000000000']
         axis.says('585#60FF600000000000')
+        axis.says('585#4B41600050020000')       # switch on disabled
         axis.says('585#6016100100000000')
         assert axis.session.stopped
         assert doubts(axis) == []
