@@ -19,7 +19,7 @@ from drive_can_bridge.core.text import is_pattern, printable
 from drive_can_bridge.protocols.observer import Telegram
 from drive_can_bridge.resources import command_that_brings
 from drive_can_bridge.trace.files import (
-    check_readable, open_text, read_records, READABLE, UnknownFormat)
+    Channels, check_readable, open_text, read_records, READABLE, UnknownFormat)
 from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 
@@ -68,7 +68,8 @@ def run(args: Namespace) -> int:
 
     :return: 0; 1 where nothing could be read.
     :raises WrongUsage: no trace, no such drive, or a file that would be written over.
-    :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
+    :raises DriveCanError: a parameter file with problems, a bus that cannot be opened, channels of
+        which nobody knows which is the bus.
     :raises OSError: a file cannot be read or written.
     """
     if args.file is None and args.plot and not args.live:   # options may stand before FILE
@@ -101,10 +102,13 @@ def run(args: Namespace) -> int:
         complaints.conclude()
         complain(f'{args.file}: there is no frame in it')
         return FAILED
+    channels = Channels(list(configuration.buses.values()))
+    if args.file is not None and Path(args.file).is_file():     # a pipe is read only once
+        channels.look_ahead(record.channel for record in read_records(Path(args.file), _ignore))
     selection = Selection(args.drive, args.only)
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, selection, stack)
-        tracer = Tracer(configuration, _together(sinks))
+        tracer = Tracer(configuration, _together(sinks), channels)
         if args.summary:
             endings.append(lambda: _summarise(tracer, selection.names, as_json=args.json))
         if first is None:
@@ -119,6 +123,10 @@ def run(args: Namespace) -> int:
         for ending in endings:
             ending()
     return 0
+
+
+def _ignore(_: str) -> None:
+    """Complaints are for who reads the file the second time."""
 
 
 def _prints(args: Namespace) -> bool:

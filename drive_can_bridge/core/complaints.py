@@ -178,6 +178,9 @@ WORDS = {
     'no_quantity': 'names no quantity, allowed is at least one of {allowed}',
     'not_in_list': '{name!r} is not in {listed}, {hint}',
     'control_word': '{name!r} is the control word, allowed is a setpoint',
+    'joint_commands_limit':
+        '{name!r} is a limit, which moves nothing, allowed is a setpoint; a limit has its own'
+        ' topic, ~/command/{name}',
     'is_bool': '{name!r} is a bool, allowed is a number',
     'does_not_convert': '{name!r} has {unit}, which does not convert; allowed is one of {allowed}',
     'quantity_already': '{name!r} is the {quantity} already, allowed is another parameter',

@@ -210,8 +210,9 @@ def _value(text: str) -> float | bool | str | None:
     """Return a value that is shown as a number where it is one; None: there is none yet."""
     if text in ('true', 'false'):
         return text == 'true'
+    word = text.partition(' ')[0]       # behind it, the name of the value
     try:
-        number = float(text.partition(' ')[0])      # behind it, the name of the value
+        number = int(word, 16) if word.startswith('0x') else float(word)
     except ValueError:
         return text or None
     return number if math.isfinite(number) else text

@@ -34,6 +34,7 @@ from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.tap import message_of, record_of
 
 
@@ -58,35 +59,70 @@ class Channels:
     Finds buses by the channels of a trace.
 
     A word is the name of a bus; if none has it, its channel. A number is its place in the file.
-    The one bus of a file that has only one is meant by a trace without channels, too, and by the
-    first channel of another name that turns up.
+    The one bus of a file that has only one is meant by a trace without channels, too, and by a
+    channel of another name, if there is no other in the trace.
     """
 
     def __init__(self, buses: Sequence[BusConfiguration]) -> None:
         self._buses = list(buses)
         self._found: dict[str | int, BusConfiguration | None] = {}
-        self._adopted = False
+        self._known = len(buses) != 1       # what has another name is of no bus of the file
+        self._adopted: str | int | None = None
+
+    def look_ahead(self, channels: Iterable[str | int]) -> None:
+        """
+        See which channels a trace has, as far as it matters, before the first is looked for.
+
+        :raises DriveCanError: nobody knows which of them is the bus.
+        """
+        foreign: dict[str | int, None] = {}
+        for channel in () if self._known else channels:
+            if channel == '':
+                continue
+            if self._named(channel) is not None:
+                self._known = True
+                return
+            foreign[channel] = None
+        if len(foreign) > 1:
+            raise self._ambiguous(foreign)
 
     def find(self, channel: str | int) -> BusConfiguration | None:
-        """Return the bus; None: it is not in the file."""
+        """
+        Return the bus; None: it is not in the file.
+
+        :raises DriveCanError: nobody knows, and another channel was taken for the bus.
+        """
         if channel not in self._found:
             self._found[channel] = self._look(channel)
         return self._found[channel]
 
     def _look(self, channel: str | int) -> BusConfiguration | None:
+        if channel == '' and len(self._buses) == 1:
+            return self._buses[0]
+        named = self._named(channel)
+        if self._adopted is not None:
+            raise self._ambiguous((self._adopted, channel))
+        if named is None and not self._known:
+            self._adopted, named = channel, self._buses[0]
+        self._known |= self._adopted is None
+        return named
+
+    def _named(self, channel: str | int) -> BusConfiguration | None:
+        """Return the bus that the file itself calls so."""
         for meant in ('name', 'channel'):
             for bus in self._buses:
                 if channel == str(getattr(bus, meant)):
-                    self._adopted = True
                     return bus
-        if len(self._buses) == 1:
-            if self._adopted and channel != '':
-                return None
-            self._adopted = channel != ''
-            return self._buses[0]
         if isinstance(channel, int) and 0 <= channel < len(self._buses):
             return self._buses[channel]
         return None
+
+    def _ambiguous(self, channels: Iterable[str | int]) -> DriveCanError:
+        bus = self._buses[0]
+        names = ', '.join(printable(str(channel)) for channel in channels)
+        return DriveCanError(
+            f'the trace has the channels {names}; which of them is bus {bus.name} of the '
+            f'parameter file? Name it there: buses.{bus.name}.channel (now {bus.channel})')
 
 
 #: s between two looks whether a database is written

@@ -296,30 +296,36 @@ class FlightRecorder:
 
     def _write(self, bus: _Bus, wanted: _Wanted) -> None:
         name = bus.configuration.name
-        offset = 1e-9 * self._clock.stamp() - self._clock.now()
-        stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.since + offset))
-        path = bus.folder / f'{name}_{stamp}_{_plain(wanted.reason)}.log'
+        path = bus.folder
+        answer, text = '', f'bus {name}: no trace of {wanted.reason}: '
+        tell: Callable[[str], None] | None = self._complain
         try:
+            offset = 1e-9 * self._clock.stamp() - self._clock.now()
+            stamp = time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wanted.since + offset))
+            path = bus.folder / f'{name}_{stamp}_{_plain(wanted.reason)}.log'
             bus.folder.mkdir(parents=True, exist_ok=True)
             count = self._fill(path, bus, wanted, offset)
             if count:
                 self._remove_old(bus, path)
         except OSError as error:
-            text = f'bus {name}: no trace of {wanted.reason}: {error.strerror or error}: {path}'
-            self._complain(text)
-            answer = '', text
+            text += f'{error.strerror or error}: {path}'
+        except Exception as error:  # noqa: BLE001  no failure is silent: who asked waits
+            text += f'{type(error).__name__} {error}: {path}'
         else:
-            if not count:
-                bus.last = bus.failed = -SPACING
-                answer = '', (f'bus {name}: not a single frame in the last '
-                              f'{bus.configuration.trace_seconds:g} s')
+            if count:
+                answer = bus.last_path = str(path)
+                tell = self._say
+                text = (f'bus {name}: trace of {wanted.reason}, {count} frames of the last '
+                        f'{bus.configuration.trace_seconds:g} s: {path}')
             else:
-                bus.last_path = str(path)
-                answer = str(path), ''
-                self._say(f'bus {name}: trace of {wanted.reason}, {count} frames of the last '
-                          f'{bus.configuration.trace_seconds:g} s: {path}')
+                bus.last = bus.failed = -SPACING
+                tell = None
+                text = (f'bus {name}: not a single frame in the last '
+                        f'{bus.configuration.trace_seconds:g} s')
+        if tell is not None:
+            tell(text)
         for done in wanted.done:
-            done(*answer)
+            done(answer, '' if answer else text)
 
     def _fill(self, path: Path, bus: _Bus, wanted: _Wanted, offset: float) -> int:
         """Write a file that has its name only when it is complete."""
@@ -344,7 +350,7 @@ class FlightRecorder:
                 os.replace(unfinished, path)
             else:
                 unfinished.unlink()
-        except OSError:
+        except BaseException:
             unfinished.unlink(missing_ok=True)
             raise
         return count

@@ -107,11 +107,13 @@ class Tracer:
     Says what the entries of a trace mean.
 
     :param sink: takes every telegram, in the order of time.
+    :param channels: finds buses; may have looked ahead.
     """
 
-    def __init__(self, configuration: BridgeConfiguration, sink: Sink) -> None:
+    def __init__(self, configuration: BridgeConfiguration, sink: Sink,
+                 channels: Channels | None = None) -> None:
         self._sink = sink
-        self._channels = Channels(list(configuration.buses.values()))
+        self._channels = channels or Channels(list(configuration.buses.values()))
         self._by_channel: dict[str | int, BusTrace] = {}
         self.buses = {bus.name: self._make_bus(bus, configuration)
                       for bus in configuration.buses.values()}
@@ -146,7 +148,11 @@ class Tracer:
         return telegram
 
     def take(self, record: Record) -> None:
-        """Take an entry. The fast path."""
+        """
+        Take an entry. The fast path.
+
+        :raises DriveCanError: nobody knows of which bus it is.
+        """
         time, channel, identifier, data, extended, kind, sent = record
         bus = self._by_channel.get(channel)
         if bus is None:

@@ -29,9 +29,15 @@ CASES = [
     ('rearm: neutral', 'joint: {name: a, position: actual}',
      [at('f.yaml:18: drives.conveyor.joint.position', 'does_not_convert', name='actual',
          unit="the unit 'rpm'", allowed='rad, deg, rev')]),
-    ('rearm: neutral', 'joint: {name: a, velocity_command: limit}',
-     [at('f.yaml:18: drives.conveyor.joint.velocity_command', 'does_not_convert', name='limit',
+    ('rearm: neutral', 'joint: {name: a, velocity: status}',
+     [at('f.yaml:18: drives.conveyor.joint.velocity', 'does_not_convert', name='status',
          unit='no unit', allowed='rad/s, deg/s, rpm, Hz')]),
+    ('rearm: neutral', 'joint: {name: a, velocity_command: limit}',
+     [at('f.yaml:18: drives.conveyor.joint.velocity_command', 'joint_commands_limit',
+         name='limit')]),
+    ('rearm: neutral', 'joint: {name: a, effort_command: limit}',
+     [at('f.yaml:18: drives.conveyor.joint.effort_command', 'joint_commands_limit',
+         name='limit')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: 0}',
      [at('f.yaml:18: drives.conveyor.joint.gear_ratio', 'useless', value=0)]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: .inf}',
@@ -105,10 +111,10 @@ def test_no_complaint_about_a_name_that_is_misspelt_in_the_list(tmp_path: Path) 
 
 def test_factors(tmp_path: Path) -> None:
     text = changed(FILE, '[actual, current, status]', '[position, frequency, current, status]')
-    text = changed(text, '[speed, limit]', '[speed, angle, limit]')
+    text = changed(text, '[speed, limit]', '[speed, angle, order]')
     text = changed(text, 'rearm: neutral', (
         'joint: {name: arm, position: position, velocity: frequency, effort: current, '
-        'position_command: angle, velocity_command: speed, effort_command: limit, '
+        'position_command: angle, velocity_command: speed, effort_command: order, '
         'gear_ratio: -4, pole_pairs: 3}'))
     configuration = load(tmp_path, text)
     joint = configuration.drives['conveyor'].joint
@@ -124,7 +130,7 @@ def test_factors(tmp_path: Path) -> None:
         'current': 1.0,
         'angle': -math.pi / 180 / 4,
         'speed': -2 * math.pi / 60 / 4,
-        'limit': 1.0,
+        'order': 1.0,
     })
 
 

@@ -144,6 +144,7 @@ def test_documents_have_numbers_for_programs() -> None:
         assert list(found[name]['values']) == [each.name for each in drive.values]
     values = [each['value'] for drive in found.values() for each in drive['values'].values()]
     assert any(isinstance(value, float) for value in values)
+    assert found['/conveyor']['values']['status_word'] == {'value': 3, 'unit': ''}
 
 
 def test_names_of_values_stand_beside_the_number_and_are_read() -> None:

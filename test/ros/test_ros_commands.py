@@ -215,9 +215,9 @@ def test_integers_and_bools(bridge: StartBridge, client: Client, tmp_path: Any) 
 
 def test_joint_command(bridge: StartBridge, client: Client) -> None:
     one = bridge(parameters(conveyor={
-        **CONVEYOR, 'joint': {
+        **TWO_SETPOINTS, 'joint': {
             'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint',
-            'effort_command': 'torque_limit', 'gear_ratio': 10.0}}))
+            'effort_command': 'position_setpoint', 'gear_ratio': 10.0}}))
     one.online()
     topic = '/conveyor/joint_command'
     one_rpm = 2 * math.pi / 60 / 10

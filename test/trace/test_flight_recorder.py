@@ -87,6 +87,7 @@ TOLD = {
     'end': 'bus main: the recording has ended',
     'silence': 'bus main: not a single frame in the last 10 s',
     'no place': 'bus main: no trace of asked: Not a directory: ',
+    'defect': 'bus main: no trace of asked: ValueError broken: ',
 }
 
 
@@ -292,6 +293,25 @@ def test_a_place_that_cannot_be_written(bench: World, tmp_path: Path) -> None:
         path, refusal = made.save()
         assert not path and refusal in made.complained
         assert refusal.startswith(TOLD['no place'])
+
+
+def test_whatever_fails_who_asks_is_answered(
+        bench: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def broken(record: Record) -> str:
+        raise ValueError('broken')
+
+    with recording(tmp_path) as made:
+        made.hear()
+        with monkeypatch.context() as defect:
+            defect.setattr(flight, 'format_record', broken)
+            path, refusal = made.save()
+        assert not path and made.complained == [refusal]
+        assert refusal.startswith(TOLD['defect'])
+        assert not list(tmp_path.iterdir())
+        pause(flight.SPACING)
+        made.hear()
+        path, refusal = made.save()     # by the same thread
+        assert made.traces == [Path(path)] and not refusal
 
 
 def test_buses_that_are_not_recorded(bench: World, tmp_path: Path) -> None:

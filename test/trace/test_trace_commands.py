@@ -105,7 +105,7 @@ def test_summary(file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) ->
 
 def test_summary_of_a_bus_that_the_file_does_not_have(
         file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    trace.write_text(TRACE + TRACE.replace(' can0 ', ' can7 '))
+    trace.write_text(TRACE.replace(' can0 ', ' can7 ') + TRACE.replace(' can0 ', ' main '))
     assert drive_can('decode', trace, '--summary', '--json', '--params-file', file) == 0
     *_, main, foreign = map(json.loads, capsys.readouterr().out.splitlines())
     assert main['bus'] == 'main' and main['load_percent'] > 0
@@ -213,10 +213,26 @@ def test_wrong_usage(file: Path, trace: Path, monkeypatch: pytest.MonkeyPatch,
     assert capsys.readouterr() == ('', f'{line}\n')
 
 
+@pytest.mark.parametrize('option', ['', '--summary', '--csv', '--plot'])
+def test_buses_are_not_mixed(file: Path, trace: Path, capsys: pytest.CaptureFixture[str],
+                             option: str) -> None:
+    """Nothing is written where nobody knows which of two channels is the bus."""
+    trace.write_text(TRACE + TRACE.replace(' can0 ', ' can1 '))
+    output = trace.with_name('values.png')
+    words = [option, output] if option in ('--csv', '--plot') else [option] if option else []
+    assert drive_can('decode', trace, '--params-file', file, *words) == 1
+    told = capsys.readouterr()
+    assert not told.out and not output.exists()
+    assert told.err == (
+        'drive_can decode: the trace has the channels can0, can1; which of them is bus main of '
+        f'the parameter file? Name it there: buses.main.channel (now trace_{trace.parent.name})\n')
+
+
 def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     """Names of channels come from whoever made the trace."""
-    trace.write_text(f'{TRACE}(1700000000.300000) ma\x1b[31min{"n" * 300} 123#00\n')
+    known = TRACE.replace('can0', 'main')
+    trace.write_text(f'{known}(1700000000.300000) ma\x1b[31min{"n" * 300} 123#00\n')
     assert drive_can('decode', trace, '--params-file', file) == 0
     line = capsys.readouterr().out.splitlines()[-1]
     *when, channel, shown = line.split()

@@ -12,6 +12,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.trace.files import (
     Channels, check_writable, format_record, labels, parse_line, read_records, TraceWriter,
@@ -262,6 +263,47 @@ def test_which_bus_a_trace_means(buses: list[BusConfiguration], said: list[str],
             for each in [channels.find(word)]} == found
     assert list(labels(buses).values()) == said
     assert [Channels(buses).find(word) for word in said] == buses
+
+
+MAIN = bus('main', 'can0')
+
+
+@pytest.mark.parametrize(('trace', 'meant'), [
+    (['can7'], ['can7']),
+    ([''], ['']),
+    (['', 'can7'], ['', 'can7']),
+    (['can0', 'can7'], ['can0']),
+    (['can7', 'can0'], ['can0']),
+    (['can7', 'can8', 'main', ''], ['main', '']),
+    ([5, 0], [0]),
+    ([5], [5]),
+])
+def test_one_bus_is_one_channel(trace: list[str | int], meant: list[str | int]) -> None:
+    channels = Channels([MAIN])
+    channels.look_ahead(trace)
+    assert [each for each in trace if channels.find(each) is MAIN] == meant
+
+
+#: what is said of two channels
+WHICH = ('the trace has the channels can7, can8; which of them is bus main of the parameter '
+         'file? Name it there: buses.main.channel (now can0)')
+
+
+def test_of_two_foreign_channels_none_is_taken() -> None:
+    with pytest.raises(DriveCanError) as refused:
+        Channels([MAIN]).look_ahead(['can7', '', 'can8', 'can7'])
+    assert str(refused.value) == WHICH
+
+
+@pytest.mark.parametrize('second', ['can8', 'can0'])
+def test_a_pipe_ends_at_the_second_channel(second: str) -> None:
+    """Nobody knew of it when the first was taken; an entry without one makes no difference."""
+    channels = Channels([MAIN])
+    assert [channels.find(each) for each in ('can7', '', 'can7')] == [MAIN] * 3
+    for _ in range(2):
+        with pytest.raises(DriveCanError) as refused:
+            channels.find(second)
+        assert str(refused.value) == WHICH.replace('can8', second)
 
 
 @given(st.sampled_from(['.log', '.asc', '.csv', '.trc', '.blf', '.db']), st.binary(max_size=300))
