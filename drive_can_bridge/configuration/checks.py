@@ -309,7 +309,9 @@ class _JointChecker:
         if control is not None and name == control.parameter and key.endswith(_COMMAND):
             self._wrong(key, says('control_word', name=name))
             return None
-        if parameter.limit and key.endswith(_COMMAND):
+        if parameter.limit and key == f'effort{_COMMAND}':
+            self._tree.suspicious((*self._path, key), says('joint_bounds', name=name))
+        elif parameter.limit and key.endswith(_COMMAND):
             self._wrong(key, says('joint_commands_limit', name=name))
             return None
         if parameter.kind is ValueKind.BOOL:

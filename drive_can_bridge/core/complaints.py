@@ -178,6 +178,9 @@ WORDS = {
     'no_quantity': 'names no quantity, allowed is at least one of {allowed}',
     'not_in_list': '{name!r} is not in {listed}, {hint}',
     'control_word': '{name!r} is the control word, allowed is a setpoint',
+    'joint_bounds':
+        '{name!r} is a limit: the zero that controllers end with would be a limit of zero, with'
+        ' which a drive cannot brake',
     'joint_commands_limit':
         '{name!r} is a limit, which moves nothing, allowed is a setpoint; a limit has its own'
         ' topic, ~/command/{name}',

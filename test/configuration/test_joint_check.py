@@ -35,9 +35,6 @@ CASES = [
     ('rearm: neutral', 'joint: {name: a, velocity_command: limit}',
      [at('f.yaml:18: drives.conveyor.joint.velocity_command', 'joint_commands_limit',
          name='limit')]),
-    ('rearm: neutral', 'joint: {name: a, effort_command: limit}',
-     [at('f.yaml:18: drives.conveyor.joint.effort_command', 'joint_commands_limit',
-         name='limit')]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: 0}',
      [at('f.yaml:18: drives.conveyor.joint.gear_ratio', 'useless', value=0)]),
     ('rearm: neutral', 'joint: {name: a, velocity: actual, gear_ratio: .inf}',
@@ -83,6 +80,11 @@ def test_command_that_is_no_setpoint(tmp_path: Path, new: str, found: object) ->
     text = changed(FILE, '[speed, limit]', '[word, flag]')
     joint = f'joint: {{name: a, effort_command: {new}}}'
     assert problems(tmp_path, changed(text, 'rearm: neutral', joint)) == [found]
+
+
+def test_an_effort_that_is_a_limit_is_a_warning(tmp_path: Path) -> None:
+    text = changed(FILE, 'rearm: neutral', 'joint: {name: a, effort_command: limit}')
+    assert warnings(tmp_path, text) == [at(COMMAND, 'joint_bounds', name='limit')]
 
 
 def test_empty_list(tmp_path: Path) -> None:

@@ -91,8 +91,8 @@ def test_nothing_at_all() -> None:
 
 def test_no_joint_commands_a_limit(good: dict[str, Any]) -> None:
     assert problems({**good, 'drives.conveyor.cyclic_request': ['speed', 'limit'],
-                     'drives.conveyor.joint.effort_command': 'limit'}) == [
-        at('drives.conveyor.joint.effort_command', 'joint_commands_limit', name='limit')]
+                     'drives.conveyor.joint.velocity_command': 'limit'}) == [
+        at('drives.conveyor.joint.velocity_command', 'joint_commands_limit', name='limit')]
 
 
 def test_problem_inside_a_profile(good: dict[str, Any], tmp_path: Path) -> None:
