@@ -4,8 +4,8 @@
 from dataclasses import replace
 
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, parameter, RAMP,
-    read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
+    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, parameter,
+    RAMP, read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, checked, exchange, NEUTRAL, online, SILENT, TICK, ZEROS,
