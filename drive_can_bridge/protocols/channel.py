@@ -78,6 +78,13 @@ class Quarantine:
         """Return when the question may be asked."""
         return self._until[key][0] if key in self._until else -math.inf
 
+    def answered(self, key: Hashable) -> None:
+        """Record an answer: to the oldest question of this key, for all anybody knows."""
+        for entry in self._begun:
+            if entry[1] == key:
+                self._begun.remove(entry)
+                return
+
     def late(self, key: Hashable, now: float) -> int:
         """Return how many answers to the question may still come, at most."""
         return sum(each == key and now < until + LATE_MAX for until, each in self._begun)
@@ -290,6 +297,9 @@ class Channel(Generic[StepT, ReplyT]):
         if isinstance(reply, bool):
             return reply
         self.now = now
+        step = None if self._serving is None else self._serving.step
+        if step is not None:
+            self._quarantine.answered(self._transactor.key(step))
         if self._serving is self._stop and self._doubtful:
             self._doubtful -= 1
             self._hurried, reply = True, self._transactor.silent

@@ -194,6 +194,17 @@ class TestStopsInQuarantine:
         line.answer('second', 1.03)
         assert line.channel.late(1.04) == 0.0
 
+    def test_each_answer_is_counted_once(self) -> None:
+        line, counts = self.forgotten(), []
+        for stop in range(5):
+            now = 1.01 + 0.1 * stop
+            sent, count = line.asks('A', now=now, priority=Priority.STOP), 0
+            while sent:
+                count += len(sent)
+                sent = line.answer('there', now + 0.001 * count)
+            counts.append(count)
+        assert counts == [2] * 5
+
     def test_it_has_all_its_attempts_besides(self) -> None:
         line = self.forgotten()
         line.asks('a', now=1.01)

@@ -8,6 +8,7 @@ object could be mistaken for that to another one.
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+import math
 from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
@@ -15,7 +16,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
-from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.channel import Channel, LATE_MAX
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.protocols.transactor import Transactor
 
@@ -67,7 +68,8 @@ class SdoTransactor(Transactor[Ask, Reply]):
     Does one transfer at a time.
 
     What takes segments is broken off by an abort where it is not gone on with: a drive that waits
-    for the request of the next one may take no other request, not even that to stop.
+    for the request of the next one may take no other request, not even that to stop. That holds,
+    too, for an upload whose answer says only after it was given up that it takes segments.
 
     :param outbox: takes the frames.
     """
@@ -80,6 +82,8 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._toggle = 0
         self._collected: bytearray | None = None    # of an object that takes segments
         self._abandoned = False                     # no further one is asked for
+        # the last upload that nothing has answered yet, and until when something may
+        self._unanswered: tuple[Ask | None, float] = None, -math.inf
 
     def begin(self, step: Ask, now: float) -> None:
         self._collected = None
@@ -94,6 +98,8 @@ class SdoTransactor(Transactor[Ask, Reply]):
             # a read that the bus refused is repeated when its time is over
             if not sent and step.data is not None:
                 self.end(step, NOT_SENT, then)
+        if step.data is None:
+            self._unanswered = step, self.deadline + self.silence + LATE_MAX
         frame = sdo.encode_upload(self._node, step.index, step.subindex) if step.data is None \
             else sdo.encode_download(self._node, step.index, step.subindex, step.data)
         self._outbox.put(frame, left)
@@ -102,6 +108,13 @@ class SdoTransactor(Transactor[Ask, Reply]):
         found, step = self.decode(answer), self.step
         if found.kind is Kind.SEGMENT:
             return self._take_segment(found, now)
+        upload, until = self._unanswered
+        if upload is not None and _belongs(found, upload):
+            self._unanswered = None, -math.inf
+            if upload is not step and now < until:
+                if found.kind is Kind.UPLOAD_BEGUN:
+                    self._give_up(_BROKEN_OFF, upload)
+                raise Unasked(f'SDO response {answer.hex(" ").upper()} to what was given up')
         if step is None or not _belongs(found, step):
             raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
         if found.kind is Kind.UPLOAD_BEGUN:
@@ -135,7 +148,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._toggle ^= sdo.TOGGLE
         if not found.last:
             if len(self._collected) > LENGTH_MAX:
-                self._give_up(_TOO_LONG)
+                self._give_up(_TOO_LONG, self.step)
                 self.finish()
                 return Reply(abort=_TOO_LONG)
             return self._ask_segment(now)
@@ -152,15 +165,14 @@ class SdoTransactor(Transactor[Ask, Reply]):
             Kind.SEGMENT_WANTED, None, toggle=self._toggle)))
         return True
 
-    def _give_up(self, code: int) -> None:
-        step = self.step
+    def _give_up(self, code: int, step: Ask | None) -> None:
         if step is not None:
             self._outbox.put(sdo.request(self._node, Message(
                 Kind.ABORT, (step.index, step.subindex), number=code)))
 
     def handle_timer(self, now: float) -> Reply | bool:
         if self._collected is not None and self.busy and now >= self.deadline:
-            self._give_up(_TIMED_OUT)   # the drive waits for the next segment
+            self._give_up(_TIMED_OUT, self.step)    # the drive waits for the next segment
         return super().handle_timer(now)
 
     def finish(self) -> None:
@@ -169,7 +181,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
 
     def forget(self) -> None:
         if self._collected is not None:
-            self._give_up(_BROKEN_OFF)
+            self._give_up(_BROKEN_OFF, self.step)
         super().forget()
 
     def attempts(self, step: Ask) -> int:

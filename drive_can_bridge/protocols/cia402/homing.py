@@ -54,7 +54,7 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = Step.NONE
         self._deadline = math.inf
-        self._before: list[int] = []    # where held axes were a sample ago
+        self._before: list[int | None] = []     # where held axes were a sample ago
         self._now = -math.inf           # of the last sample
         self._fresh = self._lowered = False
         self._failure = NOTHING
@@ -163,8 +163,11 @@ class Homing:
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
         """Take where the axis is, as soon as it stands: unless it is homed, it has to brake."""
         setpoints = self._session.setpoints
-        before, self._before = self._before, [raws[each.place] for each in setpoints.held]
+        before, self._before = self._before, [
+            raws[each.place] if each.place < len(raws) else None for each in setpoints.held]
         setpoints.measure(raws, driven=False)
+        if None in self._before:    # a sample that was cut short says nothing
+            return
         # not by bit 10: behind a homing that was ended it says no more than that
         if not self._failure or behind and self._before == before:
             self._deadline = math.inf

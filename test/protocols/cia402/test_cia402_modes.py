@@ -345,6 +345,24 @@ class TestHomingThatEndsOnTheWay:
         assert [text[8:16] for text in sent[:back] if text.startswith('205#')][-1] == stands
         assert drive.state == drive.ENABLED
 
+    def test_a_sample_that_was_cut_short_says_nothing(self, homing: int) -> None:
+        axis, drive = self.meet('csp', homing)
+        takes, cut = drive.takes, []
+
+        def cuts(sent: Frame) -> list[Frame]:
+            answers = takes(sent)
+            if drive.number(0x6060) == 6 and not drive._left:
+                cut.append(answers)
+                return [each._replace(data=each.data[:2]) if each.identifier == 0x185 and len(
+                    cut) % 3 else each for each in answers]
+            return answers
+        drive.takes = cuts      # type: ignore[method-assign]
+        (_, success, text), = home(axis, 1.0)
+        assert not success
+        assert says('homing_moves_on') not in text.fields.get('parts', ())  # type: ignore
+        assert len(cut) > 5
+        assert drive.state == drive.ENABLED
+
     @pytest.mark.parametrize(('mode', 'number'), [('csp', 8), ('ip', 7)])
     def test_it_is_disabled_if_it_does_not_stand(
             self, homing: int, mode: str, number: int) -> None:

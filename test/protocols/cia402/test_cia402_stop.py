@@ -403,6 +403,33 @@ class TestSegments:
         assert by_sdo(axis) == [
             '605#8008100000000405', DISABLE_BY_SDO]
 
+    @staticmethod
+    def unanswered() -> Axis:
+        """Have it asked for, and stop before its answer."""
+        axis = running(table=(*TABLE, NAME))
+        axis.drive.takes = drive_without(axis, 0x605)  # type: ignore[method-assign]
+        axis.deliver(axis.talk.submits(read(NAME), axis.now))
+        axis.talk.now = axis.now
+        axis.session.time_lost(axis.now)
+        axis.live(0.051)
+        assert by_sdo(axis) == ['605#4008100000000000', DISABLE_BY_SDO]
+        return axis
+
+    def test_what_turns_out_to_take_segments_later_is_broken_off(self) -> None:
+        axis = self.unanswered()
+        axis.says(self.BEGUN)
+        assert by_sdo(axis) == [self.BROKEN_OFF]
+        axis.says(self.BEGUN)
+        assert by_sdo(axis) == []
+
+    def test_an_abort_of_no_object_is_that_of_the_upload_before(self) -> None:
+        axis = self.unanswered()
+        axis.says('585#8000000001000405')
+        axis.live(0.2)
+        assert by_sdo(axis)[0] == DISABLE_BY_SDO, 'told again'
+        axis.says('585#8000000001000405')
+        assert by_sdo(axis)[:1] != [DISABLE_BY_SDO], 'refused'
+
     def test_at_the_end_it_does_not_wait_at_all(self) -> None:
         axis = self.amidst()
         axis.talk.now = axis.now
