@@ -83,7 +83,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._collected: bytearray | None = None    # of an object that takes segments
         self._abandoned = False                     # no further one is asked for
         # the last upload that nothing has answered yet, and until when something may
-        self._unanswered: tuple[Ask | None, float] = None, -math.inf
+        self._open_upload: tuple[Ask | None, float] = None, -math.inf
 
     def begin(self, step: Ask, now: float) -> None:
         self._collected = None
@@ -99,7 +99,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
             if not sent and step.data is not None:
                 self.end(step, NOT_SENT, then)
         if step.data is None:
-            self._unanswered = step, self.deadline + self.silence + LATE_MAX
+            self._open_upload = step, self.deadline + self.silence + LATE_MAX
         frame = sdo.encode_upload(self._node, step.index, step.subindex) if step.data is None \
             else sdo.encode_download(self._node, step.index, step.subindex, step.data)
         self._outbox.put(frame, left)
@@ -108,9 +108,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
         found, step = self.decode(answer), self.step
         if found.kind is Kind.SEGMENT:
             return self._take_segment(found, now)
-        upload, until = self._unanswered
+        upload, until = self._open_upload
         if upload is not None and _belongs(found, upload):
-            self._unanswered = None, -math.inf
+            self._open_upload = None, -math.inf
             if upload is not step and now < until:
                 if found.kind is Kind.UPLOAD_BEGUN:
                     self._give_up(_BROKEN_OFF, upload)
