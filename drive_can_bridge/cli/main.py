@@ -233,9 +233,10 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
     subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True,
                                        help=argparse.SUPPRESS)
+    # what the others understand costs as much time as all else here
     parsers = {name: subparsers.add_parser(name, prog=f'{PROGRAM} {name}',
                                            formatter_class=Formatter)
-               for name in SUBCOMMANDS}
+               for name in SUBCOMMANDS if wanted == name or wanted not in SUBCOMMANDS}
     module: Any = None
     if wanted in parsers:
         module = importlib.import_module(f'{__package__}.{MODULES.get(wanted, wanted)}')
@@ -244,7 +245,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         own.epilog = '\n\n'.join(filter(None, (own.epilog, examples(PROGRAM, wanted))))
     complete(parser)
     if arguments[:1] == [wanted] and wanted not in parsers:
-        near = nearest(wanted, parsers)
+        near = nearest(wanted, SUBCOMMANDS)
         parser.error(f'there is no subcommand {wanted!r}'
                      + (f', did you mean {near}?' if near else ''))
     args, rest = parser.parse_known_args(arguments)

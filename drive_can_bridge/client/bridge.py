@@ -80,6 +80,8 @@ _NO_VALUE = 'no value; the log of the bridge says why'
 _DIAGNOSTICS_MARGIN = 5.0
 _ENABLED = {'online': Enabled.YES, 'not armed': Enabled.YES, 'disabled': Enabled.NO,
             'fault': Enabled.NO}
+#: parts of a ``control_state`` in which a motor may move, whatever the drive is told
+_MOVING = ('enabled', 'enable sent', 'quick stop', 'fault reaction')
 
 
 class BridgedDrive(Drive):
@@ -169,6 +171,8 @@ class BridgedDrive(Drive):
                                           age=self._period, patience=_DIAGNOSTICS_MARGIN)
         if 'control_state' not in facts:
             return Enabled.UNKNOWN
+        if any(part in facts['control_state'] for part in _MOVING):
+            return Enabled.YES
         return _ENABLED.get(facts.get('state', ''), Enabled.UNKNOWN)
 
     def identity(self) -> str:

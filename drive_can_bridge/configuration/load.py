@@ -254,6 +254,8 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
 
 def _forget_findings(tree: Tree) -> None:
     """Leave out what the bridge finds out by itself: ``ros2 param dump`` writes that too."""
+    if isinstance(tree.data.get('bridges'), list):
+        del tree.data['bridges']
     drives = tree.data.get('drives')
     for drive in drives.values() if isinstance(drives, dict) else ():
         for key in ('identity', 'profile_sha256', 'restore'):

@@ -134,6 +134,7 @@ class ControlMachine:
         self._fault: bool | None = None         # None: not known
         self.fault_text = ''
         self._reached = False                   # enabled was confirmed for this enable word
+        self._seen_enabled: set[str] = set()    # who reported it, knowing that word
         self._disregard = Disregard(timeout)
         self._operation: Operation | None = None
         self._answers = Answers()
@@ -284,7 +285,7 @@ class ControlMachine:
             self._rules.reported(raw, behind=self._sent)
             self._choose()      # what another word has to bring about is not confirmed yet
             self._watch_fault(raw)
-            self._watch_enabled(raw)
+            self._watch_enabled(member, raw)
             self._advance()
             self._choose()
             self._watch_disabled(now)
@@ -457,12 +458,21 @@ class ControlMachine:
         elif self._sending is not ControlAction.RESET_FAULT:
             self._send(ControlAction.DISABLE)
 
-    def _watch_enabled(self, raw: int) -> None:
-        """Withdraw the enable word from a drive that dropped out by itself."""
-        enabled = self._table.enabled
-        if self._reached and enabled is not None and not enabled.matches(raw):
+    def _watch_enabled(self, member: str, raw: int) -> None:
+        """Withdraw the enable word from a drive that dropped out by itself, confirmed or not."""
+        table = self._table
+        if self._sending is not ControlAction.ENABLE or table.enabled is None:
+            return
+        if table.enabled.matches(raw):
+            if self._sent:
+                self._seen_enabled.add(member)
+            return
+        if self._reached:
             self._notes.append(sentences.dropped_out_for_good(self._reports.text))
-            self._end(False, sentences.dropped_out(self._reports.text))
+        elif member not in self._seen_enabled and not (
+                table.braking is not None and table.braking.matches(raw)):
+            return      # it is on its way
+        self._end(False, sentences.dropped_out(self._reports.text))
 
     def _watch_disabled(self, now: float) -> None:
         """Tell of a drive that runs on although its control word is there to stop it."""
@@ -493,6 +503,7 @@ class ControlMachine:
     def _send(self, action: ControlAction) -> None:
         """Make the word of this name the current one."""
         self._sending = action
+        self._seen_enabled.clear()
         self._reached = self._reached and action is ControlAction.ENABLE
         self._choose()
 

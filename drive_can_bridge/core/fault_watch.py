@@ -97,6 +97,7 @@ class FaultWatch:
         elif isinstance(outcome, Failure):
             self.unread = outcome.reason
             self._tell(sentences.fault_unread(outcome.reason))
+            self._have_refusals_tell(sentences.number_unread(outcome.reason))
         return True
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:

@@ -156,6 +156,11 @@ def too_long(length: int) -> str:
 
 
 @sentence
+def no_object() -> str:
+    return 'has no index in the profile, so no SDO reaches it'
+
+
+@sentence
 def width_unknown() -> str:
     return ('how many bits it has, nobody knows: it cannot be read, and is not in the profile; '
             'add it there')
@@ -315,8 +320,13 @@ def fault_named(number: str, name: str) -> str:
 
 
 @sentence
+def number_unread(reason: str) -> str:
+    return f'(number not read: {reason})'
+
+
+@sentence
 def fault_unread(reason: str) -> str:
-    return f'fault (number not read: {reason})'
+    return f'fault {number_unread(reason)}'
 
 
 @sentence
@@ -931,8 +941,8 @@ def other_master_asks(station: int, frame: str) -> str:
 
 
 @sentence
-def other_master_asks_node(node: int, frame: str) -> str:
-    return f'another master sends PKW requests to node {node}: {frame}'
+def other_master_asks_node(node: int, what: str, frame: str) -> str:
+    return f'another master sends {what} to node {node}: {frame}'
 
 
 @sentence

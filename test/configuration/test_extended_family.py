@@ -4,6 +4,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from builders import CONTROL, drive as configured, parameter, SPEED, WORD
 from configuration_builders import load
 import pytest
 from saying import says
@@ -13,6 +14,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
 from drive_can_bridge.protocols.datamodel.extended import encode_read_request, encode_write
 from drive_can_bridge.protocols.datamodel.family import DataModelExtended
+from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = DataModelExtended()
 
@@ -92,3 +94,13 @@ def test_maps_moved_out_of_range(drive: DriveConfiguration, offset: int) -> None
     found = [(complaint.key, complaint.message) for complaint in FAMILY.check(
         with_options(drive, parameter_offset=offset))]
     assert ('request_map_base', says('map_out_of_range', base=122, offset=offset)) in found
+
+
+@pytest.mark.parametrize('family', ['datamodel_extended', 'datamodel_standard'])
+def test_an_alias_of_the_control_word_is_no_setpoint(family: str) -> None:
+    alias = parameter('raw_word', WORD.number)
+    for request, told in (((SPEED, alias), ['raw_word']), ((alias, WORD), ['control_word']),
+                          ((SPEED, WORD), []), ((SPEED,), [])):
+        found = [complaint.message for complaint in FAMILIES[family].check(configured(
+            protocol=family, control=CONTROL, request=request))]
+        assert [each.fields['name'] for each in found if each.code == 'same_number'] == told

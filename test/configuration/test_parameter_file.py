@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from configuration_builders import at, FILE, local, PROFILE
+from configuration_builders import at, FILE, load, local, PROFILE
 import pytest
 from saying import says
 
@@ -441,3 +441,11 @@ def test_names_of_any_nodes_are_not_tried_in_all_ways(tmp_path: Path) -> None:
     file.write_text(f'{"/**" * 300}/x:\n  ros__parameters: {{a: 1, a: 2}}\n', encoding='utf-8')
     assert unseen_problems([file], '/a/b/c/d/y')[0] == []
     assert unseen_problems([file], '/a/b/c/d/x')[0] != []
+
+
+def test_what_a_bridge_finds_out_by_itself_may_stand_in_a_file(tmp_path: Path) -> None:
+    """``ros2 param dump`` writes it."""
+    found = '        identity: a=1\n        profile_sha256: 0a\n        restore: "{}"\n'
+    text = FILE.replace('    buses:\n', '    bridges: [/drive_can_bridge]\n    buses:\n')
+    text = text.replace('        station: 1\n', f'        station: 1\n{found}')
+    assert list(load(tmp_path, text).drives) == ['conveyor', 'lift']

@@ -402,6 +402,31 @@ def test_enable_without_any_status_succeeds_when_sent(table: ControlTable) -> No
     assert cycle(control, None, 0.04) == RUN
 
 
+def test_a_member_that_drops_out_before_the_others_are_enabled_ends_the_enable() -> None:
+    """It would start again with them."""
+    control = ControlMachine(FULL, timeout=2.0, members=['mixer', 'fan'])
+    for name in ('mixer', 'fan'):
+        control.member_found(name)
+
+    def says_all(mixer: int, fan: int, now: float) -> int:
+        word = control.word
+        control.word_sent(now)
+        control.status_received(mixer, now + 0.005, 'mixer')
+        control.status_received(fan, now + 0.006, 'fan')
+        return word
+    says_all(READY, READY, 0.0)
+    control.request(ControlRequest(ENABLE), 0.01)
+    says_all(READY, READY, 0.02)
+    assert says_all(ENABLED, READY, 0.04) == RUN
+    assert says_all(ENABLED, READY, 0.06) == RUN
+    assert outcomes(control) == []
+    says_all(READY, ENABLED, 0.08)
+    assert control.word == OFF
+    (_, success, why), = outcomes(control)
+    assert not success
+    assert why == says('dropped_out')
+
+
 def test_enable_of_an_enabled_drive_succeeds_at_once() -> None:
     control = enabled()
     control.request(ControlRequest(ENABLE), 1.0)

@@ -133,6 +133,9 @@ def test_a_number_that_cannot_be_read(name: str) -> None:
     notes = [note.text for note in partner.talk.events(Noted)]
     assert notes.count(says('fault_unread')) == 1
     assert text(partner) == ''
+    partner.talk.session.services.submit(ControlRequest(ControlAction.ENABLE), partner.now)
+    assert partner.talk.control_outcomes() == [('enable', False, says(
+        'reset_first', fault=says('number_unread')))]
     assert partner.talk.session.state is DriveState.FAULT
 
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
@@ -17,6 +18,7 @@ from rclpy.task import Future
 from waiting import clock, pause
 
 from drive_can_bridge.client import find_source, open_drives
+from drive_can_bridge.client.bridge import BridgedDrive
 from drive_can_bridge.client.drive import Drive, Enabled
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
@@ -270,3 +272,21 @@ def test_a_second_bridge_with_the_same_drive_does_not_configure(bridge: StartBri
     first.node.trigger_cleanup()
     assert second.node.trigger_configure().name == 'SUCCESS'
     second.node.trigger_cleanup()
+
+
+@pytest.mark.parametrize(('state', 'control_state', 'enabled'), [
+    ('online', 'operation enabled', Enabled.YES),
+    ('disabled', 'switch on disabled', Enabled.NO), ('disabled', 'ready', Enabled.NO),
+    ('disabled', 'disable sent', Enabled.NO), ('fault', 'fault', Enabled.NO),
+    # told to stop, or not enabled yet, and the motor may move
+    ('disabled', 'operation enabled', Enabled.YES), ('disabled', 'enabled', Enabled.YES),
+    ('disabled', 'quick stop active', Enabled.YES), ('disabled', 'quick stop', Enabled.YES),
+    ('fault', 'fault reaction active', Enabled.YES), ('disabled', 'enable sent', Enabled.YES),
+    ('disabled', 'mixer: ready to switch on, fan: operation enabled', Enabled.YES),
+    ('offline', 'unknown', Enabled.UNKNOWN)])
+def test_a_drive_counts_as_enabled_while_its_motor_may_move(
+        state: str, control_state: str, enabled: Enabled) -> None:
+    graph: Any = SimpleNamespace(newest_status=lambda *_, **__: {
+        'state': state, 'control_state': control_state})
+    facts: Any = SimpleNamespace(name='lift', through='/drive_can_bridge')
+    assert BridgedDrive(graph, '/lift', facts, {}, {}, 1.0, str).enabled() is enabled

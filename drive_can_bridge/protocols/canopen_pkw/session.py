@@ -390,8 +390,8 @@ class PkwSession(Session):
                 self._end_futile_stop(now)
                 self._writers.again.heard(now, hurry=True)
             elif identifier == options.request_cob_id:
-                self.report.note(ForeignMasterSeen(
-                    sentences.other_master_asks_node(self.configuration.station, str(frame))))
+                self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
+                    self.configuration.station, 'PKW requests', str(frame))))
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
 

@@ -21,6 +21,7 @@ from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.pdo import width
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
+NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
 #: what says how a drive exchanges: identifiers and mapping of PDOs, SYNC, heartbeats,
 #: interpolation time
@@ -66,6 +67,9 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
+    def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
+        return Failure(NO_OBJECT) if parameter.index is None else None
+
     def misfit(self, items: Sequence[Item]) -> Sentence:
         return NOT_ATOMIC
 
@@ -77,9 +81,12 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         if not _own_width(parameter):
             found = yield from self._upload(parameter)
             if isinstance(found, Failure):
-                known = found.reason.fields.get('number') == sdo.READ_OF_WRITE_ONLY
-                return Failure(sentences.width_unknown()) if known else found
-            length = len(found[0])
+                if found.reason.fields.get('number') != sdo.READ_OF_WRITE_ONLY:
+                    return found
+                if not parameter.width_known:
+                    return Failure(sentences.width_unknown())
+            else:
+                length = len(found[0])
             low, high = -1 << 8 * length - 1, (1 << 8 * length) - 1
             if not low <= raw <= high:
                 return Failure(sentences.not_in_bits(raw, 8 * length, low, high))

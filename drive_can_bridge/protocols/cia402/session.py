@@ -334,8 +334,10 @@ class Cia402Session(Session):
                 self._again.heard(now)
                 self._channel.receive(data, now)
             elif identifier in self._masters:
+                sdo_request = identifier == sdo.REQUEST_BASE + self.configuration.station
                 self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
-                    self.configuration.station, str(frame))))
+                    self.configuration.station,
+                    'SDO requests' if sdo_request else 'process data', str(frame))))
             elif identifier == network.HEARTBEAT_BASE + self.configuration.station:
                 self._take_heartbeat(network.decode_heartbeat(data), now)
             elif identifier == network.EMERGENCY_BASE + self.configuration.station:

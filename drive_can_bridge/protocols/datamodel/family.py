@@ -8,6 +8,7 @@ from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.datamodel import standard_round
 from drive_can_bridge.protocols.datamodel.extended import (
     CYCLIC_PARAMETER, PAYLOAD, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT)
@@ -64,9 +65,11 @@ def check_parameters(drive: DriveConfiguration, family: str) -> Iterator[Complai
 
 
 def _check_request(drive: DriveConfiguration) -> Iterator[Complaint]:
-    """Look for setpoints that would overwrite each other, or the maps themselves."""
+    """Look for setpoints that would overwrite each other, the control word, or the maps."""
     numbers: dict[int, str] = {}
-    for parameter in drive.cyclic_request:
+    word = control_word(drive, controlled=True)
+    listed = drive.cyclic_request
+    for parameter in listed if word is None or word in listed else (word, *listed):
         if parameter.number is None:
             continue
         if parameter.number in numbers:

@@ -368,7 +368,8 @@ def test_another_master_is_noticed() -> None:
     talk = online()
     assert talk.hears('505#C002002A01000000', 10.06) == []
     event, = talk.events()
-    assert event.text == says('other_master_asks_node', frame='505#C002002A01000000', node=5)
+    assert event.text == says('other_master_asks_node', what='PKW requests',
+                              frame='505#C002002A01000000', node=5)
 
 
 def test_nothing_is_planned_before_activation() -> None:

@@ -258,3 +258,47 @@ class TestQuickStop:
         axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
         axis.live(0.5)
         assert axis.take().count('605#406C600000000000') == 1
+
+
+class TestOneThatFallsOutBeforeItsEnableIsConfirmed:
+    """Nothing but a new request starts it: section 4 of the contract, "by itself"."""
+
+    @staticmethod
+    def fails(axis: Axis, status: int) -> None:
+        (_, success, why), = axis.talk.control_outcomes()
+        assert not success
+        assert why == says('dropped_out', status=says('status_word', raw=status))
+        assert axis.session.state is DriveState.DISABLED
+
+    @pytest.mark.parametrize(('state', 'status', 'words'), [
+        (0x07, 0x0217, ['0F00', '0200', '0600']), (0x40, 0x0250, ['0F00', '0700', '0600'])])
+    def test_one_that_was_seen_enabled(self, state: int, status: int, words: list[str]) -> None:
+        axis = Axis().online()
+        axis.drive.objects[0x6061, 0] = b'\0'      # so that it is enabled, and not confirmed
+        axis.drive.braking = 20
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        axis.live(0.2)
+        assert axis.talk.control_outcomes() == []
+        assert axis.words()[-1] == '0F00'
+        axis.drive.becomes(state)
+        axis.live(0.1)
+        self.fails(axis, status)
+        axis.drive.objects[0x6061, 0] = b'\x09'
+        axis.live(0.5)
+        assert axis.words() == words
+
+    def test_one_that_was_enabled_between_two_looks(self) -> None:
+        """A limit switch begins the quick stop at once."""
+        axis = Axis().online()
+        control = axis.drive._control
+
+        def limited(word: int) -> None:
+            control(word)
+            if word == 0x0F and axis.drive.state == axis.drive.ENABLED:
+                axis.drive.braking = 20
+                axis.drive.becomes(axis.drive.QUICK_STOP)
+        axis.drive._control = limited       # type: ignore[method-assign]
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        axis.live(0.6)
+        assert axis.words() == ['0700', '0F00', '0200', '0600']
+        self.fails(axis, 0x0217)

@@ -9,7 +9,7 @@ from saying import says
 from servo_builders import Axis, TABLE
 
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.events import RequestCompleted
+from drive_can_bridge.core.events import ForeignMasterSeen, RequestCompleted
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -163,3 +163,38 @@ def test_parameters_of_a_drive_that_differs(axis: Axis) -> None:
     axis = Axis(objects={**OBJECTS, (0x1019, 0): b'\5'}, table=LISTED)
     axis.start()
     assert outcomes(axis, read(BYTE)) == [0x80]
+
+
+def test_a_raw_name_of_what_is_listed_has_the_width_that_is_listed(axis: Axis) -> None:
+    """What ``drive_can write`` says of how to store: a write-only object by its raw name."""
+    sdo = axis.drive._sdo
+
+    def write_only(data: bytes) -> bytes:
+        if data[:4] == bytes.fromhex('40052000'):
+            return bytes.fromhex('8005200001000106')
+        return sdo(data)
+    axis.drive._sdo = write_only    # type: ignore[method-assign]
+    assert outcomes(axis, write((raw('x2005.0', axis), 7))) == ['written']
+    assert '605#2B05200007000000' in axis.take()
+    assert outcomes(axis, write((raw('x2005.0', axis), 1 << 16))) == [
+        says('not_in_bits', value=1 << 16, bits=16, low=-1 << 15, high=(1 << 16) - 1)]
+
+
+def test_an_entry_of_another_protocol_is_no_object() -> None:
+    """A profile for several may have entries without an index."""
+    numbered = parameter('numbered', 50)
+    axis = Axis(objects=OBJECTS, table=(*LISTED, numbered)).online()
+    axis.take()
+    assert outcomes(axis, read(numbered)) == outcomes(axis, write((numbered, 7))) == [
+        says('no_object')]
+    assert not [text for text in axis.take() if text.startswith('605#') and '000000' in text[:12]]
+
+
+def test_what_another_master_sends_is_named() -> None:
+    axis = Axis().online()
+    axis.talk.events()
+    for frame, what in (('605#4041600000000000', 'SDO requests'),
+                        ('205#0F0000000000', 'process data')):
+        axis.says(frame)
+        event, = axis.talk.events(ForeignMasterSeen)
+        assert event.text == says('other_master_asks_node', node=5, what=what, frame=frame)
