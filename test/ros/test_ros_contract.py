@@ -7,6 +7,7 @@ which one it runs with.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -199,6 +200,8 @@ def test_bits_and_online_are_latched(start: Start, client: Client, facts: Facts)
     wait_until(lambda: late.values == [True])
     drive.fault('ok')
     wait_until(lambda: bits['fault'].values == [False, True, False])
+    for bit, topic in bits.items():     # on change only
+        assert all(one != other for one, other in pairwise(topic.values)), bit
 
     online = client.latched(f'{DRIVE}/online', Bool)
     wait_until(lambda: online.values == [True])
@@ -283,7 +286,7 @@ def test_commands(start: Start, client: Client, facts: Facts) -> None:
     client.listen()
     command(client, speed_setpoint=3000.5, mode=10)
     command(client, speed_setpoint=float('nan'), mode=-1)
-    wait_until(lambda: session.statistics.commands_refused == refused + 4)
+    client.diagnostics(STATUS, lambda drive: int(drive['commands_refused']) == refused + 4)
     client.wait_logged('3000.5 is out of range: -3000 to 3000 rpm', WARN)
     settle(one)
     assert drive.value('speed_setpoint') == pytest.approx(-250.0) and drive.value('mode') == 3
@@ -350,6 +353,7 @@ def test_control(start: Start, client: Client, facts: Facts) -> None:
     drive.fault('trip')
     client.diagnostics(STATUS, lambda drive: drive['state'] == 'fault')
     assert enable(client) == (False, sentences.reset_first())
+    assert trigger(client, 'quick_stop')[0]
     success, message = trigger(client, 'reset_fault')
     assert success and message not in ('fault', enabled)
     settle(one)
@@ -372,6 +376,8 @@ def test_control(start: Start, client: Client, facts: Facts) -> None:
 def test_list_describe_and_types(shared: Bridge, client: Client, facts: Facts) -> None:
     listed = client.call(f'{DRIVE}/list_parameters', ListParameters).result
     assert (list(listed.names), list(listed.prefixes)) == (facts.listed, [])
+    assert client.call(f'{DRIVE}/list_parameters', ListParameters,
+                       ListParameters.Request(depth=1)).result == listed
     found = client.call(f'{DRIVE}/list_parameters', ListParameters, ListParameters.Request(
         prefixes=['gain', 'ramp', 'nothing'], depth=1)).result
     assert list(found.names) == ['gain']
@@ -422,15 +428,16 @@ def test_get(shared: Bridge, client: Client, facts: Facts) -> None:
     before = client.diagnostics(STATUS)
     client.listen()
     absent, reason = facts.absent
-    # one bad name takes no other along
-    assert client.get(DRIVE, 'gain', absent, 'gian', *facts.no_names, 'flag') == [
-        7, None, None, *[None] * len(facts.no_names), True]
+    # one bad name takes no other along; one may stand twice; nobody asks for what is write-only
+    assert client.get(DRIVE, 'gain', absent, 'gian', *facts.no_names, 'order', 'flag', 'gain') == [
+        7, None, None, *[None] * len(facts.no_names), None, True, 7]
     client.wait_logged(f'conveyor: read {absent} ({facts.address(absent)}): {reason}', WARN)
     client.wait_logged('conveyor: read gian: unknown parameter gian, did you mean gain?', WARN)
     failed = int(before['parameter_requests_failed']) + 2 + len(facts.no_names)
     status = client.diagnostics(
         STATUS, lambda drive: int(drive['parameter_requests_failed']) >= failed)
     assert int(status['parameter_requests_failed']) == failed
+    assert int(status['parameter_requests_ok']) > int(before['parameter_requests_ok'])
     assert status['last_parameter_error'].startswith('read ')
     assert not shared.played['conveyor'].violations
 
@@ -447,7 +454,10 @@ def test_set(shared: Bridge, client: Client, facts: Facts) -> None:
     assert events == [{name: pytest.approx(value) for name, value in good.items()}]
     assert client.set(DRIVE, ramp_time=3) == [(True, '')]  # an integer is a double, too
     assert drive.value('ramp_time') == pytest.approx(3.0)
+    wait_until(lambda: type(events[-1].get('ramp_time')) is float)
     assert client.set(DRIVE, order=3) == [(True, facts.order_note)]
+    wait_until(lambda: events[-1] == {'order': 3})
+    assert client.set(DRIVE) == []
     for name, (parameter, _) in facts.raw.items():
         if parameter != 'ramp_time':
             assert client.set(DRIVE, **{keyword(name): 1}) == [(True, '')], name
@@ -476,6 +486,8 @@ def test_set(shared: Bridge, client: Client, facts: Facts) -> None:
         drive.set_value('gain', 7)
         drive.fault('stuck=gain')
         assert client.set(DRIVE, gain=9, far_away=10) == [(False, facts.stuck), (True, '')]
+        client.wait_logged(
+            f"conveyor: set gain ({facts.address_of('gain')}): {facts.stuck}", WARN)
         wait_until(lambda: events[announced:] == [{'far_away': 10}])
     else:
         assert len(events) == announced
