@@ -160,12 +160,6 @@ class Launched:
                 if not any(type(part).__name__ == 'LocalSubstitution' for part in word)]
 
 
-def test_launch_takes_it(file: Path, tmp_path: Path) -> None:
-    arguments = Launched(file, tmp_path).description.get_launch_arguments()
-    assert [argument.name for argument in arguments][:len(ARGUMENTS[file.name])] == (
-        ARGUMENTS[file.name])
-
-
 @pytest.mark.parametrize('name', ['bridge.launch.py', 'managed.launch.py'])
 def test_the_bridge_gets_the_arguments(name: str, tmp_path: Path) -> None:
     launched = Launched(LAUNCH / name, tmp_path)

@@ -126,14 +126,6 @@ def test_a_drive_that_falls_silent(bridge: StartBridge, tmp_path: Path) -> None:
     assert not [telegram for telegram in told if telegram.verdict is Verdict.SUSPICIOUS]
 
 
-def test_a_fault(bridge: StartBridge, tmp_path: Path) -> None:
-    one = bridge(recording(tmp_path, lift=LIFT))
-    one.online()
-    one.played['lift'].fault('trip')
-    path, = wait_until(lambda: traces(tmp_path))
-    assert path.name.endswith('_lift_fault.log')
-
-
 def test_save_trace(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
     one = bridge(recording(tmp_path))
     one.online()

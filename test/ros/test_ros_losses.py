@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What counts as the loss of a drive."""
+"""What counts as the loss of a drive, and what a defect says."""
 
 from typing import Any
 
@@ -19,7 +19,9 @@ def test_a_defect_counts_as_one_loss_and_a_stop_that_was_asked_for_as_none(
         monkeypatch.undo()
         raise KeyError('a defect')
     monkeypatch.setattr(type(lift.session), 'handle_timer', fail)
-    wait_until(lambda: not lift.session.online, what='the defect')
+    wait_until(lambda: lift.session.defect, what='the defect')
+    assert client.set('/lift', ramp_time=1.0) == [(False, lift.session.defect)]
+    wait_until(lambda: not lift.session.online, what='its end')
     one.online()
     assert lift.times_lost == 1
     one.played['lift'].fault('off')

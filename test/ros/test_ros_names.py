@@ -11,7 +11,7 @@ from clients import Client, ERROR, patience, wait_until
 import pytest
 from rcl_interfaces.msg import LoggerLevel, ParameterEvent
 from rcl_interfaces.srv import SetLoggerLevels
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 import yaml
@@ -104,7 +104,8 @@ EVERYTHING = {
     'subscription': ['command/speed_setpoint', 'command/torque_limit', 'joint_command']}
 
 
-def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client) -> None:
+@pytest.mark.parametrize('key', ['/**/drive_can_bridge', '/**'])
+def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str) -> None:
     joint = {'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint'}
     changes = {'publisher': {'reliability': 'best_effort', 'durability': 'volatile', 'depth': 2},
                'subscription': {'reliability': 'best_effort'}}
@@ -112,7 +113,7 @@ def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client) ->
                  for kind, topics in EVERYTHING.items() for topic in topics}
     overrides['/diagnostics'] = {'publisher': changes['publisher']}
     one = bridge({**parameters(conveyor={**CONVEYOR, 'joint': joint}),
-                  'qos_overrides': overrides})
+                  'qos_overrides': overrides}, key=key)
     one.online()
     node = client.node
     client.find(one.node, 'conveyor', 'drive_can_bridge')
@@ -134,29 +135,6 @@ def test_a_quality_that_does_not_exist(bridge: StartBridge, client: Client) -> N
     assert '/conveyor' not in client.nodes()
 
 
-OVERRIDES = {
-    '/conveyor/actual_speed': {'publisher': {'reliability': 'best_effort', 'depth': 3}},
-    '/conveyor/command/speed_setpoint': {'subscription': {'reliability': 'best_effort'}},
-    '/conveyor/online': {'publisher': {'depth': 5}},
-}
-
-
-@pytest.mark.parametrize('key', ['/**/drive_can_bridge', '/**'])
-def test_quality_can_be_overridden(bridge: StartBridge, client: Client, key: str) -> None:
-    one = bridge({**parameters(), 'qos_overrides': OVERRIDES}, key=key)
-    one.online()
-    client.find(one.node, 'conveyor')
-    [info] = client.node.get_publishers_info_by_topic('/conveyor/actual_speed')
-    assert info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
-    [info] = client.node.get_publishers_info_by_topic('/conveyor/motor_current')
-    assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
-    unreliable = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-    client.topic('/conveyor/actual_speed', Float64, unreliable).wait()
-    publisher = client.publisher('/conveyor/command/speed_setpoint', Float64, unreliable)
-    with one.record() as recorder:
-        for value in (0.0, 3.0):
-            publisher.publish(Float64(data=value))
-        wait_until(lambda: recorder.words()[:1] == (30,))
 
 
 def test_log_level_by_service(bridge: StartBridge, client: Client) -> None:

@@ -128,13 +128,14 @@ class Busy:
 
     def __init__(self, client: Client, kind: Any, name: str) -> None:
         self._node = client.node
+        self.asked: list[Any] = []
         self.kept: list[tuple[Any, ...]] = []
         self._service = self._node.create_service(kind, name, self._answer)
         self._send = self._service.send_response
         self._service.send_response = lambda *answer: self.kept.append(answer)
 
-    @staticmethod
-    def _answer(_: Any, response: Any) -> Any:
+    def _answer(self, request: Any, response: Any) -> Any:
+        self.asked.append(request)
         response.success, response.message = True, 'stopped'
         return response
 
@@ -174,25 +175,4 @@ def test_a_stop_may_take_as_long_as_that_of_a_command(
         busy.close()
     assert told == [Outcome(True, 'stopped'),
                     Outcome(False, may_still_be_running(no_answer_to_stop(patience)))]
-
-
-def test_disable_asks_for_anything_but_enable(client: Client) -> None:
-    asked: list[bool] = []
-
-    def answer(request: Any, response: Any) -> Any:
-        asked.append(request.data)
-        response.success = True
-        return response
-
-    now, told = 100.0, list[Outcome]()
-    service = client.node.create_service(SetBool, '/lift/enable', answer)
-    try:
-        with asking(client) as operations:
-            operations.poll({'/lift': [Stop.DISABLE]}, now)
-            operations.stop('/lift', Stop.DISABLE, told.append, now)
-            wait_until(lambda: not operations.poll({'/lift': [Stop.DISABLE]}, now),
-                       what='an answer')
-    finally:
-        client.node.destroy_service(service)
-    assert asked == [False]
-    assert told == [Outcome(True, '')]
+    assert busy.asked == [kind.Request()] * 2 * times, 'for anything but enable'

@@ -101,31 +101,22 @@ def test_rows_of_numbers(client: Client) -> None:
                 *one.position, *one.effort) == wanted
 
 
-def test_numbers_in_another_order_are_not_prepared(client: Client) -> None:
-    message = JointState()
-    publisher = client.node.create_publisher(JointState, '/nothing_joint', 1)
-    assert PreparedMessage.find(publisher, message, [
-        ('I', partial(setattr, message.header.stamp, 'nanosec')),
-        ('i', partial(setattr, message.header.stamp, 'sec'))]) is None
-    client.node.destroy_publisher(publisher)
-
-
-def test_what_is_not_found_is_not_prepared(client: Client) -> None:
-    publisher = client.node.create_publisher(Bool, '/nothing_bool', 1)
-    assert PreparedMessage.find(publisher, Bool(), [('d', lambda _: None)]) is None
-    client.node.destroy_publisher(publisher)
-
-
-def test_what_stands_there_twice_is_not_prepared(client: Client) -> None:
-    message = ParameterEvent(changed_parameters=[
+def test_what_is_not_found_once_and_in_order_is_not_prepared(client: Client) -> None:
+    joint, event = JointState(), ParameterEvent(changed_parameters=[
         Parameter(value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE)) for _ in range(2)])
-    publisher = client.node.create_publisher(ParameterEvent, '/nothing_event', 1)
 
     def put(value: float) -> None:
-        for entry in message.changed_parameters:
+        for entry in event.changed_parameters:
             entry.value.double_value = value
-    assert PreparedMessage.find(publisher, message, [('d', put)]) is None
-    client.node.destroy_publisher(publisher)
+    cases: list[tuple[Any, list[tuple[str, Any]]]] = [
+        (joint, [('I', partial(setattr, joint.header.stamp, 'nanosec')),
+                 ('i', partial(setattr, joint.header.stamp, 'sec'))]),
+        (Bool(), [('d', lambda _: None)]), (event, [('d', put)])]
+    for message, numbers in cases:
+        publisher = client.node.create_publisher(
+            type(message), f'/nothing_{type(message).__name__.lower()}', 1)
+        assert PreparedMessage.find(publisher, message, numbers) is None, numbers
+        client.node.destroy_publisher(publisher)
 
 
 def test_destroyed_publisher_raises_what_everybody_expects(client: Client) -> None:

@@ -117,21 +117,6 @@ def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None
     assert client.state() == 'active'
 
 
-def test_a_drive_that_is_stopped_for_a_defect_says_so(
-        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = run(bridge, client)
-    session = one.node.drives['lift'].session
-
-    def fail(*_: Any) -> None:
-        monkeypatch.undo()
-        raise KeyError('a defect')
-    monkeypatch.setattr(type(session), 'handle_timer', fail)
-    wait_until(lambda: session.defect)
-    defect = session.defect
-    assert client.set('/lift', ramp_time=1.0) == [(False, defect)]
-    one.online()
-
-
 @pytest.mark.parametrize('taken', [False, True])
 @pytest.mark.parametrize('service', ['set_parameters', 'quick_stop'])
 def test_who_asks_for_what_meets_a_defect_is_answered_once(
