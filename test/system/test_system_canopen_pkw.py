@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""A simulated LTMR, the bridge and a ROS node in three processes; and the bytes between them."""
+"""An LTMR in literal text, and the bytes between it and the bridge."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from parameter_files import bridge_file
-from processes import Client, Process, Processes, Simulator
+from processes import Client, Processes
 from slcan_peer import Answers, Peer
 from waiting import wait_for
 
@@ -20,58 +20,7 @@ PUMP: dict[str, Any] = {
 }
 
 
-def pump_file(directory: Path, **options: Any) -> Path:
-    """Write a parameter file with one LTMR."""
-    return bridge_file(directory, drives={'pump': {**PUMP, **options}},
-                       bus={'bitrate': 250_000})
-
-
-def started(processes: Processes, client: Client, namespace: str, directory: Path,
-            **options: Any) -> tuple[Simulator, Process, str]:
-    """Start a simulated LTMR and a bridge; return both, and the drive's name in ROS."""
-    file = pump_file(directory, **options)
-    simulator = processes.simulator(file)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/pump'
-    client.online(drive)
-    return simulator, bridge, drive
-
-
-def status_of(namespace: str) -> str:
-    return f'{namespace}/drive_can_bridge: drive pump'
-
-
-def test_restart_of_the_device(processes: Processes, client: Client, namespace: str,
-                               tmp_path: Path) -> None:
-    simulator, bridge, drive = started(processes, client, namespace, tmp_path,
-                                       missed_limit=100)
-    assert client.control(f'{drive}/enable', True)[0]
-    frames = len(simulator.frames())
-    simulator.write('pump restart=0.5')
-    bridge.error('pump: offline: .*restarted')
-    boot = simulator.frame('^705#00 T', since=frames)
-    assert boot == ['705#00 T']
-    client.online(drive)
-    client.diagnostics(status_of(namespace), state='^disabled$', nmt_state='^operational$')
-    # it was started anew before anything else, and the motor is off
-    later = simulator.frames(since=frames)
-    after = later[later.index('705#00 T'):]
-    first_answer = next(place for place, frame in enumerate(after) if frame.endswith(' T')
-                        and frame.startswith('485#'))
-    assert '000#0105 R' in after[:first_answer]
-    client.bit(f'{drive}/system_status_1/on', False)
-    assert not simulator.frames('^505#C00200[2A]A01000000', since=frames)
-    assert client.control(f'{drive}/enable', True)[0]
-    client.bit(f'{drive}/system_status_1/on', True)
-    assert bridge.end() == 0
-
-
-# -- against literal bytes ------------------------------------------------------------------------
-
 READ_455 = 't5058C7010025', 't5058C70100A5'
-WITNESS = {**PUMP, 'cyclic_response': ['system_status_1']}
-
-
 #: registers 62, 64 to 74 and 76: what the bridge reads once to know who it talks to
 IDENTITY = {f'{register:02X}00': '3412' for register in (62, *range(64, 75), 76)}
 
@@ -110,30 +59,16 @@ class Controller:
             value = self.words[register]
         return [f'{head}{function}{value}0000']
 
-    def restart(self) -> None:
-        """Begin anew after a loss of power."""
-        self.function, self.operational = '00', False
-        self.words.update(C701='4100', C002='0000')
-
-
-
-def witnessed(processes: Processes, client: Client, namespace: str, directory: Path,
-              connect: Callable[[Answers], Peer], controller: Controller, **options: Any,
-              ) -> tuple[Peer, Process, str]:
-    """Start a bridge that talks to the literal controller."""
-    peer = connect(dict.fromkeys(['t00020105', 't5058'], controller))
-    file = bridge_file(directory, drives={'pump': {**WITNESS, **options}},
-                       bus={'bitrate': 250_000})
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/pump'
-    client.online(drive)
-    return peer, bridge, drive
-
 
 def test_bytes_of_the_manual(processes: Processes, client: Client, namespace: str,
                              tmp_path: Path, connect: Callable[[Answers], Peer]) -> None:
     controller = Controller()
-    peer, bridge, drive = witnessed(processes, client, namespace, tmp_path, connect, controller)
+    peer = connect(dict.fromkeys(['t00020105', 't5058'], controller))
+    file = bridge_file(tmp_path, bus={'bitrate': 250_000}, drives={
+        'pump': {**PUMP, 'cyclic_response': ['system_status_1']}})
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/pump'
+    client.online(drive)
     client.value(f'{drive}/system_status_1', 0x41, 0x41, kind='Int64')
     for head in READ_455:
         peer.wait_for(head)

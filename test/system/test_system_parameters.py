@@ -12,7 +12,6 @@ from processes import Client, Process, Processes
 import pytest
 from waiting import wait_for
 
-from drive_can_bridge.cli.main import main as drive_can
 from drive_can_bridge.transport.bus_identity import DeviceLock
 
 #: nothing here may depend on how busy the machine is
@@ -179,25 +178,3 @@ def test_watching_ends_with_ctrl_c(processes: Processes, tmp_path: Path) -> None
     assert [each['name'] for each in found[:4]] == ['motor_current', 'ramp_time'] * 2
     assert found[0]['time'] < found[2]['time']
     assert watch.errors == []
-
-
-
-def test_an_imported_table_is_read_from_drives_made_of_it(
-        processes: Processes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    table = tmp_path / 'table.csv'
-    rows = [f'{number};Wert {number};{"s" if number % 2 else "rpm"};0,1;rw'
-            for number in range(300, 420)]
-    table.write_text('\n'.join(['Nr;Bezeichnung;Einheit;Skalierung;Zugriff', *rows, '']),
-                     encoding='latin-1')
-    profile = tmp_path / 'imported.yaml'
-    assert drive_can(['profile', 'import', str(table), '-o', str(profile)]) == 0
-    file = bridge_file(tmp_path, drives={'conveyor': {
-        **CONVEYOR, 'profile': str(profile), 'cyclic_request': [],
-        'cyclic_response': ['wert_300']}})
-    processes.simulator(file)
-    capsys.readouterr()
-    assert drive_can(['read', '--json', '--params-file', str(file)]) == 0
-    found = list(map(json.loads, capsys.readouterr().out.splitlines()))
-    assert [each['number'] for each in found] == list(range(300, 420))
-    assert {each['unit'] for each in found} == {'s', 'rpm'}
-    assert all(isinstance(each['raw'], int) for each in found)

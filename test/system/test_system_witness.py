@@ -40,10 +40,7 @@ parameters:
   motor_current: {number: 210, type: int16, access: ro}
   first: {number: 30, storage: ram}
   second: {number: 31, storage: ram}
-  kept: {number: 256, storage: eeprom}
-  kept_too: {number: 258, storage: eeprom}
 """
-EEPROM_GAP = 0.020
 
 
 @pytest.fixture
@@ -51,13 +48,13 @@ def peer(connect: Callable[[Answers], Peer]) -> Peer:
     return connect(dict(DRIVE))
 
 
-def witness_file(directory: Path, **drive: object) -> Path:
+def witness_file(directory: Path) -> Path:
     """Write the configuration of the manual's examples."""
     profile = directory / 'manual.yaml'
     profile.write_text(PROFILE, encoding='utf-8')
     return bridge_file(directory, drives={'conveyor': {
         **CONVEYOR, 'profile': str(profile), 'cyclic_request': ['speed_setpoint'],
-        'cyclic_response': ['actual_speed', 'motor_current'], **drive}})
+        'cyclic_response': ['actual_speed', 'motor_current']}})
 
 
 @pytest.mark.real
@@ -108,81 +105,6 @@ def test_bytes_of_the_manual(processes: Processes, client: Client, namespace: st
              'T003001E28000100010000' + '0000'}
     assert {line for line in frames if not line.startswith(CYCLIC_REQUEST)} <= known
     assert {line for line in peer.lines if not line.startswith('T')} <= {'', 'C', 'S4', 'O'}
-
-
-def test_eeprom_writes_are_paced(processes: Processes, client: Client, namespace: str,
-                                 tmp_path: Path, peer: Peer) -> None:
-    cells = {'0100': '0000', '0102': '0000'}  # P=256, P=258
-
-    def read(line: str) -> list[str]:
-        return [f'T102{line[4:8]}18{cells[line[4:8]]}{ZEROS[4:]}']
-
-    def write(line: str) -> list[str]:
-        cells[line[4:8]] = line[10:14]
-        return []
-    peer.answers.update({'T002010018': read, 'T003010018': write,
-                         'T002010218': read, 'T003010218': write})
-    bridge = processes.bridge(witness_file(tmp_path), namespace)
-    drive = f'/{namespace}/conveyor'
-    client.online(drive)
-    for value in (1, 2, 3):
-        assert client.set(drive, kept=value, kept_too=value) == [(True, '')] * 2
-    assert client.set(drive, kept=3, kept_too=3) == [(True, '')] * 2
-    writes = [(place, line) for place, line in enumerate(peer.received)
-              if line.text.startswith('T0030')]
-    assert [line.text for _, line in writes] == [
-        f'T003010{cell}18000{value}{ZEROS[4:]}' for value in (1, 2, 3) for cell in (0, 2)]
-    for place, line in writes:
-        later = next(other for other in peer.received[place + 1:]
-                     if other.text.startswith(('T0030', 'T0020')))
-        # the first was sent after .after, the other before .at: no delay here makes them closer
-        assert round(later.at - line.after, 9) >= EEPROM_GAP
-    assert bridge.end() == 0
-
-
-def test_maps_are_rewritten_in_the_safe_order(processes: Processes, client: Client,
-                                              namespace: str, tmp_path: Path, peer: Peer) -> None:
-    # another master's maps: 51, 52 | 210, 0
-    cells = {'7A': '0033', '7B': '0034', '7C': '0000', '7D': '0000',
-             '7E': '00D2', '7F': '0000', '80': '0000', '81': '0000'}
-
-    def read(line: str) -> list[str]:
-        names = list(cells)
-        first = names.index(line[6:8])
-        words = ''.join(cells[name] for name in names[first:first + int(line[8])])
-        return [f'T1{line[2:10]}{words:0<16}']
-
-    def write(line: str) -> list[str]:
-        cells[line[6:8]] = line[10:14]
-        return []
-    peer.answers.update({READ_REQUEST_MAP: read, READ_RESPONSE_MAP: read})
-    for name in cells:
-        peer.answers[f'T00200{name}18'] = read
-        peer.answers[f'T00300{name}18'] = write
-    file = witness_file(tmp_path)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    text = bridge.error('mapping differs')
-    assert '51' in text
-    assert '50' in text
-    client.diagnostics(f'{namespace}/drive_can_bridge: drive conveyor', state='mapping differs')
-    assert client.get(drive, 'first') == [1000]
-    assert not [line for line in peer.lines if line.startswith(('T0030', CYCLIC_REQUEST))]
-    assert bridge.end() == 0
-
-    second = processes.bridge(witness_file(tmp_path, mapping='configure'), f'{namespace}_again')
-    client.online(f'/{namespace}_again/conveyor')
-    assert second.end() == 0
-    writes = [(place, line) for place, line in enumerate(peer.received)
-              if line.text.startswith('T0030') and not line.text.startswith(CYCLIC_REQUEST)]
-    assert [line.text[:14] for _, line in writes] == [
-        'T003007A180000', 'T003007B180000', 'T003007E1800D1', 'T003007F1800D2',
-        'T003007A180032']
-    first_cycle = next(place for place, line in enumerate(peer.received)
-                       if line.text.startswith(CYCLIC_REQUEST))
-    assert first_cycle > writes[-1][0]
-    for (_, line), (_, later) in zip(writes, writes[1:]):
-        assert round(later.at - line.after, 9) >= EEPROM_GAP
 
 
 MALFORMED = [
@@ -253,23 +175,3 @@ def test_rubbish_on_the_bus(processes: Processes, client: Client, namespace: str
     # the bridge's own frames stayed the usual ones
     frames = {line[:10] for line in peer.lines if line.startswith('T')}
     assert frames <= {CYCLIC_REQUEST, READ_REQUEST_MAP[:10], READ_RESPONSE_MAP[:10], READ_30[:10]}
-
-
-def test_cyclic_answers_of_wrong_length(processes: Processes, client: Client, namespace: str,
-                                        tmp_path: Path, peer: Peer) -> None:
-    bridge = processes.bridge(witness_file(tmp_path), namespace)
-    drive = f'/{namespace}/conveyor'
-    client.online(drive)
-    client.value(f'{drive}/motor_current', 0, 0, kind='Int64')
-    # four bytes hold both values; two hold one; three are a torn word
-    peer.answers[CYCLIC_REQUEST] = 'T103FFFF0400640007'
-    client.value(f'{drive}/motor_current', 7, 7, kind='Int64')
-    client.value(f'{drive}/actual_speed', 10.0, 10.0)
-    peer.answers[CYCLIC_REQUEST] = 'T103FFFF0200C8'
-    client.value(f'{drive}/actual_speed', 20.0, 20.0)
-    bridge.error('conveyor: frame rejected: cyclic response with 2 data bytes, 4 needed')
-    peer.answers[CYCLIC_REQUEST] = 'T103FFFF00'
-    client.online(drive, wanted=False)
-    peer.answers[CYCLIC_REQUEST] = str(DRIVE[CYCLIC_REQUEST])
-    client.online(drive)
-    assert bridge.end() == 0
