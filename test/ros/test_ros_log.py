@@ -105,5 +105,17 @@ def test_its_thread_sums_up_what_repeats_by_itself(bench: World) -> None:
     assert logger.lines[-1][1].startswith('lift: gone ')
 
 
+@pytest.mark.usefixtures('threads')
+def test_the_end_writes_what_is_held_behind_what_waits() -> None:
+    logger = Logger()
+    log = Log(logger, REAL)
+    for _ in range(7):
+        log.speaker('lift').info('online')
+    log.close()
+    *written, (_, summary) = logger.lines
+    assert written == [('info', 'lift: online')] * 5
+    assert summary.split()[:3] == ['lift:', 'online', '(2']
+
+
 def test_tests_leave_the_logs_of_the_user_alone() -> None:
     assert Path(tempfile.gettempdir()) in Path(str(get_logging_directory())).parents
