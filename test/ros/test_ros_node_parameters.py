@@ -37,12 +37,6 @@ def test_everything_can_be_read(bridge: StartBridge, client: Client) -> None:
     assert client.get(BRIDGE, *expected) == list(expected.values())
     names = client.call(f'{BRIDGE}/list_parameters', ListParameters).result.names
     assert set(expected) <= set(names)
-    descriptors = client.call(
-        f'{BRIDGE}/describe_parameters', DescribeParameters,
-        DescribeParameters.Request(names=['drives.conveyor.period',
-                                          'drives.conveyor.rearm'])).descriptors
-    assert [entry.read_only for entry in descriptors] == [True, False]
-    assert all(entry.description for entry in descriptors)
 
 
 def test_the_digest_of_the_profile(bridge: StartBridge, client: Client, tmp_path: Path) -> None:
