@@ -93,6 +93,13 @@ def started(**options: Any) -> Conversation:
     return talk
 
 
+def reading(**options: Any) -> tuple[Conversation, list[str]]:
+    """Return a conversation in its first round, and the read that it sent at 10.051 s."""
+    talk = started(**options)
+    assert talk.at(10.05) == [IDLE]
+    return talk, talk.hears(IDLE_ANSWER, 10.051)
+
+
 def online(**options: Any) -> Conversation:
     """
     Return a conversation with a device that answered its first round at 10.053 s.

@@ -6,8 +6,8 @@ from dataclasses import replace
 from builders import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, driven, echo,
-    ENABLE_0, ENABLE_1, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, ready, running, RUNS_0,
-    RUNS_1, START, started, STILL_0, TABLE, TRIPPED_0, WORD,
+    ENABLE_0, ENABLE_1, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, reading, ready, running,
+    RUNS_0, RUNS_1, START, STILL_0, TABLE, TRIPPED_0, WORD,
 )
 import pytest
 from saying import says, status_word
@@ -15,16 +15,6 @@ from saying import says, status_word
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.parameters import Access
-from drive_can_bridge.protocols.families import FAMILIES
-
-
-def test_disable_is_the_first_thing_that_is_written() -> None:
-    talk = started(control=CONTROL)
-    talk.at(10.05)
-    talk.hears(IDLE_ANSWER, 10.051)
-    assert talk.hears(ANSWER_1, 10.052) == [DISABLE_0]
-    assert talk.hears(DISABLED_0, 10.053) == []
-    assert talk.until(10.0701) == [(10.07, READ_1)], 'once'
 
 
 def test_enable_and_disable() -> None:
@@ -41,18 +31,11 @@ def test_enable_and_disable() -> None:
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
-def test_control_word_waits_for_one_exchange_only() -> None:
-    talk = ready()
-    assert talk.until(10.0901) == [(10.09, READ_0)]
-    assert talk.asks(ControlAction.ENABLE, 10.0902) == []
-    assert talk.hears(ANSWER_0, 10.091) == [ENABLE_1]
-
-
 def test_status_read_before_the_word_confirms_nothing() -> None:
     """The round was half way when the drive was enabled: its status is from before."""
     talk = ready()
-    talk.until(10.0901)
-    talk.asks(ControlAction.ENABLE, 10.0902)
+    assert talk.until(10.0901) == [(10.09, READ_0)]
+    assert talk.asks(ControlAction.ENABLE, 10.0902) == [], 'one exchange at a time'
     assert talk.hears(RUNS_0, 10.091) == [ENABLE_1]   # it runs already, whoever did that
     assert talk.hears(ENABLED_1, 10.092) == []
     assert talk.control_outcomes() == []
@@ -89,9 +72,7 @@ def test_trip_puts_the_word_back() -> None:
 
 
 def test_trip_is_known_from_the_first_round_on() -> None:
-    talk = started(control=CONTROL)
-    talk.at(10.05)
-    talk.hears(IDLE_ANSWER, 10.051)
+    talk, _ = reading(control=CONTROL)
     assert talk.hears('485#C70100A644000000', 10.052) == [DISABLE_0]
     assert talk.session.state is DriveState.FAULT
 
@@ -157,7 +138,7 @@ def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
             text = sent.pop()
             assert text not in (ENABLE_0, ENABLE_1)
             now += 0.001
-            sent += talk.hears(_answer(text), now)
+            sent += talk.hears(echo(text, '4100'), now)
         now = max(now, talk.session.next_timer())
         sent = talk.at(now)
     (_, success, message), = outcomes
@@ -165,25 +146,6 @@ def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
     assert not success
     assert message == says('stuck', timeout=2.0)
     assert sent == [DISABLE_1], 'it is not known to be disabled any more'
-
-
-def _answer(text: str) -> str:
-    if text == IDLE:
-        return IDLE_ANSWER
-    if text in (DISABLE_0, DISABLE_1):
-        return text.replace('505#', '485#')
-    return text.replace('505#', '485#')[:12] + '41000000'
-
-
-def test_disable_is_repeated_until_it_is_acknowledged() -> None:
-    talk = running(parameter_timeout=0.1)
-    assert talk.asks(ControlAction.DISABLE, 10.095) == [DISABLE_0]
-    assert talk.until(10.294) == [(10.145, DISABLE_1), (10.195, DISABLE_0)]
-    assert talk.until(10.3) == [(10.295, IDLE)], 'it is silent: the round has its turn'
-    assert talk.hears(IDLE_ANSWER, 10.3) == [READ_1]
-    assert talk.hears(RUNS_1, 10.301) == [DISABLE_0]
-    assert talk.hears(DISABLED_0, 10.302) == []
-    assert talk.at(10.303) == [READ_1]
 
 
 def test_unsent_word_waits_for_the_mailbox() -> None:
@@ -383,15 +345,5 @@ def test_word_among_the_cyclic_requests_is_refreshed() -> None:
         while sent:
             text = sent.pop()
             written += [due] if text in (DISABLE_0, DISABLE_1) else []
-            sent += talk.hears(_answer(text), due + 0.001)
+            sent += talk.hears(echo(text, '4100'), due + 0.001)
     assert written == [10.11, 10.17]
-
-
-@pytest.mark.parametrize('name', ['control_register_1', 'p704', 'x2008.5'])
-def test_users_do_not_write_the_word(name: str) -> None:
-    talk = ready()
-    drive = talk.session.configuration
-    parameter = drive.profile.parameters.get(name) or FAMILIES['canopen_pkw'].raw_parameter(
-        drive, name)
-    assert parameter is not None
-    assert talk.session.services.write_refusal(parameter) == 'use ~/enable'

@@ -1,23 +1,26 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Setpoints that change while others are being written, by devices that take one at a time."""
 
-from collections.abc import Callable, Sequence
+from functools import partial
 
 from builders import Conversation, frame
 from literal_drives import PkwNode
 from pkw_builders import configuration, CONTROL, SPEED, TORQUE
 import pytest
+from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import StationLost
 
-#: what a user does at a time
-Step = tuple[float, Callable[[float], object]]
 WRITTEN = ('C602', 'C802')
 
 
 class Device:
-    """A device that runs when it is told to, and does one request after the other."""
+    """
+    A device that runs when it is told to, and does one request after the other.
+
+    :ivar latency: s that each takes.
+    """
 
     def __init__(self, **options: float) -> None:
         self.talk = Conversation(configuration(
@@ -25,57 +28,51 @@ class Device:
         self.node = PkwNode(5, dict.fromkeys((456, 465, 466, 500, 501, 704, 710, 712), 0)
                             | {455: 1})
         self.node.operational = True
+        self.free, self.latency = 0.0, 0.001
+        self.line = Timeline(self.talk, self.answer)
         self.talk.bus_up(9.0)
         self.talk.activate(10.0)
-        self.log: list[tuple[float, str]] = []
-        self.live(20.0, [self.asks(15.5, ControlAction.ENABLE)])
+        self.asks(15.5, ControlAction.ENABLE)
+        self.line.live(20.0)
         assert self.talk.session.control is not None
         assert self.talk.session.control.operating
 
-    def asks(self, at: float, action: ControlAction) -> Step:
-        return at, lambda now: self.talk.asks(action, now)
+    def answer(self, text: str) -> tuple[float, str] | None:
+        answers = self.node.takes(frame(text))
+        self.node.registers[455] = 1 | (0x80 if self.node.registers[704] == 1 else 0)
+        if not answers:
+            return None
+        self.free = max(self.talk.now, self.free) + self.latency
+        return self.free - self.talk.now, str(answers[0])
 
-    def commands(self, at: float, speed: float, torque: int) -> list[Step]:
-        return [(at, lambda now: self.talk.commands(0, speed, now)),
-                (at, lambda now: self.talk.commands(1, torque, now))]
+    def asks(self, at: float, action: ControlAction) -> None:
+        self.line.plan(at, partial(self.talk.asks, action))
 
-    def live(self, end: float, plan: Sequence[Step] = (), latency: float = 0.001) -> None:
-        """Let time pass, every timer in time."""
-        talk, steps, free = self.talk, sorted(plan, key=lambda step: step[0]), 0.0
-        coming: list[tuple[float, str]] = []
-        while True:
-            due = max(talk.now, min([talk.session.next_timer(), *(at for at, _ in coming),
-                                     *(at for at, _ in steps[:1])]))
-            if due > end:
-                return
-            if steps and steps[0][0] <= due:
-                done = steps.pop(0)[1](due)
-                sent = done if isinstance(done, list) else []
-            elif coming and coming[0][0] <= due:
-                sent = talk.hears(coming.pop(0)[1], due)
-            else:
-                sent = talk.at(due)
-            for text in sent:
-                self.log.append((due, text))
-                for answer in self.node.takes(frame(text)):
-                    free = max(due, free) + latency
-                    coming.append((free, str(answer)))
-                self.node.registers[455] = 1 | (0x80 if self.node.registers[704] == 1 else 0)
+    def commands(self, at: float, *, speed: float | None = None, torque: int | None = None,
+                 ) -> None:
+        for index, value in enumerate((speed, torque)):
+            if value is not None:
+                self.line.plan(at, partial(self._command, index, value))
+
+    def _command(self, index: int, value: float, now: float) -> list[str]:
+        self.talk.commands(index, value, now)
+        return []
 
     def told(self, what: str, value: str, since: float) -> list[float]:
         """Return when a register was given a value."""
-        return [at for at, text in self.log
+        return [at for at, text in self.line.log
                 if at > since and text[4:8] == what and text[12:16] == value]
 
 
 def test_two_setpoints_that_expire_one_after_the_other() -> None:
     """The second while the neutral value of the first is being written; one round a second."""
     device = Device(period=1.0, command_timeout=1.0)
-    begin = [at for at, text in device.log if text.startswith('505#C701')][-1] + 0.5
-    plan = device.commands(begin, 0.0, 0)
+    begin = [at for at, text in device.line.log if text.startswith('505#C701')][-1] + 0.5
+    device.commands(begin, speed=0.0, torque=0)
     for at in (begin + 0.01, begin + 0.9, begin + 1.65):
-        plan += [device.commands(at, 10.0, 5)[1], device.commands(at + 0.0005, 10.0, 5)[0]]
-    device.live(begin + 5.0, plan)
+        device.commands(at, torque=5)
+        device.commands(at + 0.0005, speed=10.0)
+    device.line.live(begin + 5.0)
     expired = begin + 2.6505
     told = device.told('C602', '6400', begin)[-1]
     assert told < expired
@@ -85,10 +82,14 @@ def test_two_setpoints_that_expire_one_after_the_other() -> None:
 @pytest.mark.parametrize('after', [0.003, 0.008, 0.013, 0.018, 0.03])
 def test_neutral_follows_disable_whatever_is_being_written(after: float) -> None:
     device = Device(period=1.0, command_timeout=0.0)
-    device.live(20.5, device.commands(20.0, 0.0, 0) + device.commands(20.001, 10.0, 5))
+    device.commands(20.0, speed=0.0, torque=0)
+    device.commands(20.001, speed=10.0, torque=5)
+    device.line.live(20.5)
     assert device.node.registers[710] == 100
-    device.live(21.9, [(20.6, lambda now: device.talk.commands(0, 20.0, now)),  # due at 21.05
-                       device.asks(21.05 + after, ControlAction.DISABLE)], 0.01)
+    device.latency = 0.01
+    device.commands(20.6, speed=20.0)       # due at 21.05
+    device.asks(21.05 + after, ControlAction.DISABLE)
+    device.line.live(21.9)
     for what in WRITTEN:
         assert device.told(what, '0000', 21.05)[0] < 21.05 + after + 0.15
 
@@ -99,8 +100,9 @@ def test_neutral_follows_disable_whatever_is_being_written(after: float) -> None
 def test_a_slow_device_is_not_lost(latency: float, timeout: float, every: float) -> None:
     """Two setpoints are commanded to and fro."""
     device = Device(period=0.1, command_timeout=0.0, parameter_timeout=timeout)
-    plan = device.commands(20.0, 0.0, 0)
+    device.latency = latency
+    device.commands(20.0, speed=0.0, torque=0)
     for turn in range(int(14.0 / every)):
-        plan += device.commands(20.05 + every * turn, 10.0 * (turn % 2), 5 * (turn % 2))
-    device.live(34.0, plan, latency)
+        device.commands(20.05 + every * turn, speed=10.0 * (turn % 2), torque=5 * (turn % 2))
+    device.line.live(34.0)
     assert device.talk.events(StationLost) == []

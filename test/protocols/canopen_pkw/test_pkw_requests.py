@@ -6,8 +6,8 @@ from typing import Any
 
 from builders import Conversation, read, write
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, FLC, FLC_2, IDLE, IDLE_ANSWER,
-    KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_0, READ_1, SPEED, START, started,
+    ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, FLC, FLC_2, IDLE, IDLE_ANSWER,
+    KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_1, reading, SPEED, START, started,
     STATUS, TABLE,
 )
 import pytest
@@ -80,9 +80,7 @@ def test_by_index(request_: Any, sent: str, answer: str, outcome: list[object]) 
 
 
 def online_by_index() -> Conversation:
-    talk = started(addressing='canopen')
-    talk.at(10.05)
-    talk.hears(IDLE_ANSWER, 10.051)
+    talk, _ = reading(addressing='canopen')
     talk.hears('485#042006B641000000', 10.052)
     assert talk.session.online
     talk.events()
@@ -94,7 +92,7 @@ def online_by_index() -> Conversation:
     ('p465', '505#D101002500000000'), ('x2004.10', '505#0420103500000000'),
     ('p704', '505#C002002500000000'), ('x200c.1', '505#0C20013500000000'),
     ('xFFFF.ff', '505#FFFFFF3500000000'), ('p65535', '505#FFFF002500000000'),
-    ('p0', '505#0000002500000000'),
+    ('p0', '505#0000002500000000'), ('p500', '505#F401002500000000'),     # one half of a value
 ])
 def test_raw_names_say_themselves_how_they_go(name: str, sent: str, by_index: bool) -> None:
     talk = online_by_index() if by_index else online()
@@ -125,9 +123,7 @@ def test_word_order_of_a_parameter_wins() -> None:
     ('word_be', '505#028C2A00005A0000', '485#028C2A0000000000'),
 ])
 def test_writes_in_other_layouts(layout: str, sent: str, answer: str) -> None:
-    talk = started(layout=layout)
-    talk.at(10.05)
-    request, = talk.hears('485#0000000000000000', 10.051)
+    talk, (request,) = reading(layout=layout)
     talk.hears(request.replace('505', '485'), 10.052)
     talk.events()
     assert asked(talk, write((FLC, 90))) == sent
@@ -280,9 +276,8 @@ def test_node_that_is_known_to_be_stopped_gets_no_requests() -> None:
 
 
 def test_request_waits_for_one_exchange_and_so_does_the_round() -> None:
-    talk = started(response=(STATUS, LEVEL, FLC))
-    talk.at(10.05)
-    assert talk.hears(IDLE_ANSWER, 10.051) == ['505#C70100A500000000']
+    talk, sent = reading(response=(STATUS, LEVEL, FLC))
+    assert sent == ['505#C70100A500000000']
     assert talk.submits(read(CLASS, CURRENT), 10.0515) == []
     assert talk.hears('485#C70100A541000000', 10.052) == ['505#F401002600000000']
     assert talk.hears('485#F401002600000000', 10.053) == ['505#D10100A500000000']
@@ -301,16 +296,6 @@ def test_silent_parameter_delays_the_round_by_its_time_out_only() -> None:
     assert talk.hears(IDLE_ANSWER, 10.161) == [READ_1], 'the round goes first'
     assert talk.hears(ANSWER_1, 10.162) == ['505#8C02002500000000']
     assert talk.session.statistics.missed == 0
-
-
-def test_toggle_alternates_whoever_asks() -> None:
-    talk = online()
-    assert asked(talk, read(FLC)) == '505#8C02002500000000'
-    talk.hears('485#8C02002500000000', 10.061)
-    assert talk.until(10.0701) == [(10.07, READ_1)]
-    talk.hears(ANSWER_1, 10.071)
-    assert talk.until(10.0901) == [(10.09, READ_0)]
-    talk.hears(ANSWER_0, 10.091)
 
 
 # -- what users may not do ------------------------------------------------------------------------
@@ -342,8 +327,6 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
 
 
 @pytest.mark.parametrize('name, refusal', [
-    ('p710', 'sent cyclically: publish ~/command/speed'),
-    ('x2008.b', 'sent cyclically: publish ~/command/speed'),
     ('p720', 'one half of position: set that'), ('p721', 'one half of position: set that'),
     ('x2008.16', 'one half of position: set that'), ('p722', ''), ('p9999', ''),
     ('p704', ''), ('x3000.1', ''),
@@ -353,11 +336,6 @@ def test_register_and_object_are_one_even_if_the_profile_gives_one_of_them() -> 
 def test_write_refusals(name: str, refusal: str) -> None:
     talk = online(request=(SPEED,))
     assert talk.session.services.write_refusal(raw(name)) == refusal
-
-
-def test_anybody_may_read_anything() -> None:
-    talk = online()
-    assert asked(talk, read(raw('p500'))) == '505#F401002500000000'
 
 
 def test_time_out_can_change_while_running() -> None:

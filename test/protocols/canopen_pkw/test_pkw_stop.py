@@ -4,10 +4,10 @@
 from dataclasses import replace
 from typing import Any
 
-from builders import BOOL, Conversation, parameter, RAM, read, write
+from builders import BOOL, Conversation, parameter, RAM, read
 from pkw_builders import (
     ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1,
-    driven, ENABLE_0, ENABLED_0, FLC, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
+    driven, echo, ENABLE_0, ENABLED_0, IDLE, IDLE_ANSWER, online, OPERATIONAL, PRE_OPERATIONAL,
     READ_0, READ_1, ready, running, RUNS_0, RUNS_1, SPEED, SPEED_1, START, STILL_0, STILL_1,
     STOPPED, TABLE, WORD,
 )
@@ -23,6 +23,9 @@ READ_CLASS_0 = '505#5E02002500000000'
 READ_CLASS_1 = '505#5E0200A500000000'
 CLASS_0 = '485#5E02002507000000'
 CLASS_1 = '485#5E0200A507000000'
+WITH_QUICK_STOP = replace(CONTROL, quick_stop=0x0002)
+
+
 def worries(talk: Conversation) -> list[str]:
     return [note.text for note in talk.events(Noted) if 'may still be running' in note.text]
 
@@ -110,15 +113,6 @@ def test_nothing_more_to_a_node_that_is_held_back_and_has_stopped() -> None:
     assert talk.deactivate(11.0) == []
     assert talk.session.stopped
     assert worries(talk) == []
-
-
-def test_held_back_and_silent_is_told() -> None:
-    talk = running()
-    talk.hears(PRE_OPERATIONAL, 10.3)
-    sent = talk.until(11.1)
-    assert sent == [(10.433333, DISABLE_1), (10.566667, DISABLE_0)]
-    assert worries(talk) == [may_run('stop_failed', what=[
-        says('write_not_acknowledged', what='control_register_1 0000h', attempts=3)])]
 
 
 # -- frames that the bus refuses ------------------------------------------------------------------
@@ -229,47 +223,38 @@ def test_refused_neutral_at_a_command_time_out_is_written_although_nothing_refre
     assert worries(talk) == []
 
 
-def test_refused_write_was_not_sent_and_leaves_the_mailbox_in_step() -> None:
-    talk = online()
-    refuse(talk)
-    assert talk.submits(write((FLC, 90)), 10.055) == []
-    assert talk.outcomes() == [[says('not_sent')]]
-    accept(talk)
-    assert talk.submits(write((FLC, 91)), 10.056) == ['505#8C02002A5B000000']
-    talk.hears('485#8C02002A00000000', 10.057)
-    assert talk.outcomes() == [['written']]
-
-
 # -- soon -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
-def test_control_stop_waits_for_the_answer_under_way(action: ControlAction) -> None:
-    talk = running_with_quick_stop()
-    stop = f'505#C00200AA{"0000" if action is ControlAction.DISABLE else "0200"}0000'
-    assert talk.submits(read(CLASS), 10.093) == [READ_CLASS_0]
-    assert talk.asks(action, 10.095) == []
-    assert talk.hears(CLASS_0, 10.1) == [stop]
+STOP_WORDS = pytest.mark.parametrize(('action', 'word'), [
+    (ControlAction.DISABLE, '00'), (ControlAction.QUICK_STOP, '02')])
+
+
+@STOP_WORDS
+def test_control_stop_waits_for_the_answer_under_way_and_neutral_is_right_behind(
+        action: ControlAction, word: str) -> None:
+    talk = driven(control=WITH_QUICK_STOP)
+    assert talk.session.state is DriveState.ONLINE
+    assert talk.submits(read(CLASS), 10.114) == [READ_CLASS_0]
+    assert talk.asks(action, 10.115) == []
+    assert talk.hears(CLASS_0, 10.116) == [f'505#C00200AA{word}000000']
     assert talk.outcomes() == [[7]]
+    assert talk.hears('485#C00200AA00000000', 10.117) == [STILL_0]
+    assert talk.hears('485#C602002A00000000', 10.118) == []
 
 
-@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
-def test_control_stop_waits_50_ms_at_most(action: ControlAction) -> None:
+@STOP_WORDS
+def test_control_stop_waits_50_ms_at_most(action: ControlAction, word: str) -> None:
     """Function 00h does not go first: its answer might be waited for as well."""
-    talk = running_with_quick_stop()
-    stop = f'505#C00200AA{"0000" if action is ControlAction.DISABLE else "0200"}0000'
+    talk = running(control=WITH_QUICK_STOP)
     assert talk.submits(read(CLASS), 10.093) == [READ_CLASS_0]
     assert talk.asks(action, 10.095) == []
-    assert talk.until(10.16) == [(10.145, stop)]
+    assert talk.until(10.16) == [(10.145, f'505#C00200AA{word}000000')]
     # the round's turn, and then the read again that made room: it was not its fault
     assert talk.hears('485#C00200AA00000000', 10.161) == [READ_0]
     assert talk.hears(RUNS_0, 10.162) == [READ_CLASS_1]
     assert talk.hears(CLASS_1, 10.163) == []
     assert talk.outcomes() == [[7]]
-
-
-def running_with_quick_stop() -> Conversation:
-    return running(control=replace(CONTROL, quick_stop=0x0002))
 
 
 def test_read_of_the_round_makes_room_too() -> None:
@@ -283,25 +268,11 @@ def test_read_of_the_round_makes_room_too() -> None:
     assert talk.session.statistics.missed == 0
 
 
-def test_disable_goes_before_setpoints_and_neutral_right_behind() -> None:
-    talk = driven()
-    assert talk.session.state is DriveState.ONLINE
-    assert talk.submits(read(CLASS), 10.114) == [READ_CLASS_0]
-    assert talk.asks(ControlAction.DISABLE, 10.115) == []
-    assert talk.hears(CLASS_0, 10.116) == [DISABLE_1]
-    assert talk.hears(DISABLED_1, 10.117) == [STILL_0]
-    assert talk.hears('485#C602002A00000000', 10.118) == []
-
-
-STOP_WORDS = pytest.mark.parametrize(('action', 'word'), [
-    (ControlAction.DISABLE, '00'), (ControlAction.QUICK_STOP, '02')])
-
-
 @STOP_WORDS
 def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
         action: ControlAction, word: str) -> None:
     """The adapter took it, the bus never had it. Once more does no harm."""
-    talk = driven(control=replace(CONTROL, quick_stop=0x0002))
+    talk = driven(control=WITH_QUICK_STOP)
     assert talk.asks(action, 10.115) == [f'505#C002002A{word}000000']
     assert talk.submits(read(CLASS), 10.12) == []
     assert talk.until(10.166) == [(10.165, f'505#C00200AA{word}000000')], 'no function 00h'
@@ -315,7 +286,7 @@ def test_stop_word_whose_frame_got_lost_is_repeated_before_anything_else(
 def test_stop_word_that_is_never_answered_has_three_attempts_before_others_go_on(
         action: ControlAction, word: str) -> None:
     """The last of them has the time that any request has."""
-    talk = driven(control=replace(CONTROL, quick_stop=0x0002), refresh_interval=0.05)
+    talk = driven(control=WITH_QUICK_STOP, refresh_interval=0.05)
     assert talk.asks(action, 10.115) == [f'505#C002002A{word}000000']
     assert talk.until(10.714) == [(10.165, f'505#C00200AA{word}000000'),
                                   (10.215, f'505#C002002A{word}000000')]
@@ -339,7 +310,7 @@ def test_late_answer_to_a_stop_word_is_as_good_as_that_to_its_repetition() -> No
 
 def test_word_that_changes_while_a_stop_is_repeated() -> None:
     """A quick stop gives up after 0.2 s: what is repeated is the newest word."""
-    talk = driven(control=replace(CONTROL, quick_stop=0x0002), control_timeout=0.07)
+    talk = driven(control=WITH_QUICK_STOP, control_timeout=0.07)
     assert talk.asks(ControlAction.QUICK_STOP, 10.115) == ['505#C002002A02000000']
     assert talk.until(10.164) == []
     assert talk.until(10.166) == [(10.165, '505#C00200AA02000000')]
@@ -409,8 +380,8 @@ def test_restart_that_nobody_saw() -> None:
         now = 10.19 + 0.02 * beat
         for _, text in talk.until(now + 1e-6):
             assert text[:16] not in ('505#C002002A0100', '505#C00200AA0100')
-            for more in talk.hears(_answer(text), now + 0.001):
-                talk.hears(_answer(more), now + 0.002)
+            for more in talk.hears(echo(text, '4100'), now + 0.001):
+                talk.hears(echo(more, '4100'), now + 0.002)
 
 
 def test_restart_in_the_middle_of_a_refresh() -> None:
@@ -435,13 +406,8 @@ def test_refresh_goes_on_while_the_drive_is_seen_running() -> None:
             text = sent.pop()
             if text[4:8] == 'C002':
                 written.append((beat, text[12:]))
-            sent += talk.hears(_answer(text, 'C320'), now + 0.001)
+            sent += talk.hears(echo(text), now + 0.001)
     assert written == [(1, '01000000'), (4, '01000000'), (7, '01000000')]
-
-
-def _answer(text: str, status: str = '4100') -> str:
-    reply = text.replace('505#', '485#')
-    return f'{reply[:12]}{status}0000' if text[4:8] == 'C701' else reply
 
 
 # -- nothing jumps --------------------------------------------------------------------------------
@@ -490,14 +456,6 @@ def test_boot_up_frames_in_a_flood(runs: bool) -> None:
     assert talk.session.facts()['nmt_state'] == 'pre-operational'
 
 
-def test_boot_up_soon_after_a_start_is_answered_when_its_time_has_come() -> None:
-    talk = online()
-    assert talk.hears(BOOT_UP, 11.0) == [START]
-    assert talk.hears(BOOT_UP, 11.03) == []
-    assert talk.until(11.1499) == [(11.1, START)]
-    assert talk.until(11.1501) == [(11.15, IDLE)], 'and then the moment that any start takes'
-
-
 def test_emergencies_in_a_flood() -> None:
     talk = online()
     for place in range(1000):
@@ -512,7 +470,7 @@ def test_emergencies_in_a_flood() -> None:
     while (due := talk.session.next_timer()) < end:
         for text in talk.at(due):
             while text:
-                text, *_ = talk.hears(_answer(text), due + 0.0001) or ['']
+                text, *_ = talk.hears(echo(text, '4100'), due + 0.0001) or ['']
     assert talk.session.facts()['emergency'] == 'none'
     assert talk.session.online
     assert talk.hears(OPERATIONAL, 11.11) == []

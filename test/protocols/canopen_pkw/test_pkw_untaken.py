@@ -54,28 +54,19 @@ def enabling(talk: Conversation, until: float, **how: Any) -> list[str]:
     return asked + answers(talk, until, status='4100', **how)
 
 
-def test_drive_that_refuses_neutral_is_not_enabled() -> None:
+def test_drive_that_refuses_neutral_is_not_enabled_and_can_be_disabled() -> None:
     """Its register may hold anything: what somebody has preset there would move it."""
     talk = online(request=(SPEED,), control=CONTROL)
     talk.until(10.0701)
     talk.hears(echo(READ_0, '4100'), 10.071)
     sent = enabling(talk, 11.0, refused=True)
-    assert '0100' not in words(sent)
+    assert set(words(sent)) == {'0000'}, 'enable is withdrawn'
     (action, success, message), = talk.control_outcomes()
     assert (action, success) == ('enable', False)
     assert message == says('word_refused', word=1, reason=says('word_held_back', what=says(
         'write_refused', what='speed', reason=says('refused_by_drive', number=0x08000022))))
-
-
-def test_drive_that_refused_neutral_once_can_be_enabled_and_disabled() -> None:
-    talk = online(request=(SPEED,), control=CONTROL)
-    talk.until(10.0701)
-    talk.hears(echo(READ_0, '4100'), 10.071)
-    sent = enabling(talk, 10.5, refused=True)
-    assert set(words(sent)) == {'0000'}, 'enable is withdrawn'
-    talk.control_outcomes()
-    asked = talk.asks(ControlAction.DISABLE, talk.now)
-    sent = answers(talk, 11.0, status='4100') if not asked else asked
+    talk.asks(ControlAction.DISABLE, talk.now)
+    answers(talk, 12.0, status='4100')
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
