@@ -41,14 +41,6 @@ def running() -> Conversation:
     return talk
 
 
-def test_control_begins_with_ready() -> None:
-    talk = online(DISABLED)
-    assert talk.session.control is not None
-    assert talk.session.control.state == 'switch-on disabled'
-    assert words(talk, 10.02, DISABLED, READY) == ['7E04', '7E04']
-    assert talk.session.control.state == STANDING
-
-
 def test_walk_from_switch_on_disabled() -> None:
     talk = online(DISABLED)
     talk.asks(ENABLE, 10.003)

@@ -10,19 +10,16 @@ from builders import drive, frame, read
 from cannord_session_builders import (
     ACTUAL, CURRENT, FREQUENCY, inverter, OFFSET, PARAMETERS, SETPOINTS, STANDING, VALUES,
 )
-from clocks import HandClock
 import pytest
 from saying import says
 
-from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (
     DriveState, Event, ForeignMasterSeen, Noted, ProcessDataReceived, RequestCompleted,
     StationFound, StationLost)
-from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 
@@ -109,6 +106,17 @@ class Bus:
         assert not self.session(name).services.control_refusal(action)
         self.session(name).services.submit(ControlRequest(action), self.now)
         self.pump()
+
+    def ends(self, *order: int) -> None:
+        """Deactivate all, in this order."""
+        for place in order or range(len(self.sessions)):
+            self.sessions[place].deactivate(self.now)
+
+    def unplugged(self) -> list[str]:
+        """Lose the bus; return what left."""
+        for session in self.sessions:
+            session.bus_down(self.now, 'unplugged')
+        return self.pump()
 
     def outcomes(self, name: str = 'lift') -> list[tuple[str, bool, str]]:
         found = [done for of, done in self.controlled if of == name]
@@ -310,23 +318,6 @@ def test_parameters_are_everybodys_own() -> None:
 
 
 # -- control --------------------------------------------------------------------------------------
-
-
-def test_enable_brings_all_up() -> None:
-    bus = three()
-    bus.asks(ENABLE)
-    assert words(bus.live(0.02)) == ['7F04']
-    bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
-    bus.live(0.06)
-    assert bus.outcomes() == []
-    bus.answers[3] = RUNNING
-    bus.live(0.06)
-    assert bus.outcomes() == [('enable', True, 'operation enabled')]
-    assert words(bus.live(0.1)) == ['7F04'] * 5
-    assert bus.session('lift').state is DriveState.NOT_ARMED
-    control = bus.session('lift').control
-    assert control is not None
-    assert control.state == 'operation enabled'
 
 
 def test_enable_waits_for_the_last_one_to_be_ready() -> None:
@@ -544,8 +535,7 @@ def test_end_while_a_member_that_ran_is_lost() -> None:
     bus.live(1.0)
     unheard = [('turn', 'told to stop, but it does not answer: it may still be running')]
     assert worries(bus) == unheard, 'once'
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     bus.live(1.0)
     assert worries(bus) == unheard
 
@@ -554,8 +544,7 @@ def test_last_status_of_each_is_known_after_the_end() -> None:
     """Those of drives that run on, too: nobody calls them stopped."""
     bus = driven()
     bus.answers = {1: READY, 2: '370B0000', 3: READY}
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     bus.live(1.0)
     assert all(session.stopped for session in bus.sessions)
     controls = {session.configuration.name: session.control for session in bus.sessions}
@@ -570,8 +559,7 @@ def test_end_while_a_member_that_ran_is_lost_but_hears_again() -> None:
     del bus.answers[3]
     bus.live(0.3)
     bus.answers = {1: READY, 2: READY, 3: READY}
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     bus.live(1.0)
     assert worries(bus) == []
 
@@ -582,8 +570,7 @@ def test_member_that_falls_silent_together_with_the_stop(
         station: int, name: str, order: tuple[int, ...]) -> None:
     bus = driven()
     del bus.answers[station]
-    for place in order:
-        bus.sessions[place].deactivate(bus.now)
+    bus.ends(*order)
     sent = bus.live(0.1)
     assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
     bus.live(1.0)
@@ -595,8 +582,7 @@ def test_member_that_falls_silent_together_with_the_stop(
 def test_a_late_answer_of_one_member_does_not_end_the_wait_for_another() -> None:
     bus = driven()
     bus.answers = {}
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     alone = [text for _, text in bus.live(0.06) if not text.startswith('400')]
     assert sorted(text[:3] for text in alone) == ['002', '004', '006']
     last = int(alone[-1][:3], 16)
@@ -630,8 +616,7 @@ def test_member_that_has_ended_misses_nothing() -> None:
 
 def test_a_stop_that_all_have_heard_waits_for_nobody() -> None:
     bus = driven()
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     bus.live(0.07)
     assert all(session.stopped for session in bus.sessions)
     assert worries(bus) == []
@@ -640,8 +625,7 @@ def test_a_stop_that_all_have_heard_waits_for_nobody() -> None:
 @pytest.mark.parametrize('order', [(0, 1, 2), (2, 1, 0)])
 def test_the_end_of_the_bridge_is_the_reason_whoever_is_told_first(order: tuple[int, ...]) -> None:
     bus = driven()
-    for place in order:
-        bus.sessions[place].deactivate(bus.now)
+    bus.ends(*order)
     bus.live(1.0)
     noted = bus.events(Noted)
     # as a drive alone says it, and for whoever reads the log: nothing is wrong
@@ -678,8 +662,7 @@ def test_members_that_are_lost_do_not_keep_the_others_from_being_stopped() -> No
 def test_stop_of_a_member_while_the_bridge_ends() -> None:
     bus = driven()
     bus.asks(QUICK_STOP, 'hoist')
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     bus.live(0.3)
     assert bus.outcomes() == []
     (_, success, message), = bus.outcomes('hoist')
@@ -731,11 +714,16 @@ def test_commands_count_from_the_last_operation_enabled_on() -> None:
     assert words(bus.live(0.02)) == ['7F04']
     bus.answers = {1: RUNNING, 2: RUNNING, 3: '330B0000'}
     bus.live(0.1)
+    assert bus.outcomes() == []
     assert [session.state for session in bus.sessions] == [DriveState.DISABLED] * 3
     assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.DISABLED, 'turn is switched on'
     bus.answers[3] = RUNNING
     bus.live(0.06)
     assert bus.outcomes() == [('enable', True, 'operation enabled')]
+    assert words(bus.live(0.1)) == ['7F04'] * 5
+    assert lift.state is DriveState.NOT_ARMED
+    assert lift.control is not None
+    assert lift.control.state == 'operation enabled'
     assert lift.services.command(0, 25.0, bus.now) is CommandOutcome.NOT_ARMED
     assert lift.services.command(0, 0.0, bus.now) is CommandOutcome.ARMED
 
@@ -771,8 +759,7 @@ def test_stop_of_a_slow_group_is_brought_forward() -> None:
 def test_stop_frames_of_a_group_that_the_bus_refuses() -> None:
     bus = driven()
     bus.refusing = lambda text: text.startswith('400')
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     assert {text.split('#')[1] for _, text in bus.live(0.3)} == {'7E040000'}
     assert [session.stopped for session in bus.sessions] == [False, False, False]
     for session in bus.sessions:
@@ -792,8 +779,7 @@ def test_member_whose_frame_is_refused_gets_one_before_the_stop_ends() -> None:
         asked.append(text)
         return text.startswith('004') and asked.count(text) < 3
     bus.refusing = refusing
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     sent = [text for _, text in bus.live(1.0)]
     assert {text[:3] for text in sent} == {'400', '002', '004', '006'}
     assert all(session.stopped for session in bus.sessions)
@@ -805,9 +791,7 @@ def test_enable_that_only_one_of_them_got_is_owed_a_stop() -> None:
     bus.refusing = lambda text: text.startswith('400')
     bus.asks(ENABLE)
     assert [text for _, text in bus.live(0.02)] == ['002#7F040000']
-    for session in bus.sessions:
-        session.bus_down(bus.now, 'unplugged')
-    bus.pump()
+    bus.unplugged()
     assert worries(bus) == [
         ('lift', says('may_still_be_running', why=says('bus_lost_before_stop')))]
 
@@ -820,23 +804,18 @@ def test_a_frame_that_answers_nothing_does_not_show_that_a_stop_was_heard() -> N
     bus.asks(DISABLE)
     assert [text for _, text in bus.live(0.02)] == ['400#7E040000', '004#7E040000']
     bus.hears(f'007#{READY}')       # twice, say: it was asked before enable only
-    for session in bus.sessions:
-        session.bus_down(bus.now, 'unplugged')
-    bus.pump()
+    bus.unplugged()
     assert [name for name, _ in worries(bus)] == ['lift', 'turn'], 'hoist has answered its stop'
 
 
 def test_stall_reopened_bus_and_signal() -> None:
     bus = driven()
-    for session in bus.sessions:
-        session.bus_down(bus.now, 'unplugged')
-    bus.pump()
+    bus.unplugged()
     assert tuple(name for name, _ in worries(bus)) == NAMES
     bus.now += 1.5
     for session in bus.sessions:
         session.bus_up(bus.now)
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     sent = bus.live(1.0)
     assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
     assert {text for _, text in sent} == {
@@ -844,65 +823,7 @@ def test_stall_reopened_bus_and_signal() -> None:
     assert worries(bus) == []
 
 
-# -- as the exchange serves them ------------------------------------------------------------------
-
-
-class Ears:
-    """Whoever listens to a drive, or to the bus."""
-
-    def __init__(self) -> None:
-        self.events: list[Event] = []
-
-    def handle_event(self, event: Event) -> None:
-        self.events.append(event)
-
-    def process_data(self, *told: object) -> None:
-        """Take no notice."""
-
-    take_commands = discard_commands = request_sent = bus_opened = process_data
-
-
-class Cable:
-    """A link that takes frames down."""
-
-    def __init__(self) -> None:
-        self.sent: list[str] = []
-
-    def send(self, sent: Frame) -> bool:
-        self.sent.append(str(sent))
-        return True
-
-
-def test_silent_member_is_offline_by_its_own_timer() -> None:
-    """Nothing but the leader's cycle tells it that an answer was due."""
-    now = 10.0
-    drives = members(2)
-    sessions = make_sessions(drives)
-    ears = [Ears(), Ears()]
-    exchange = BusExchange(
-        BusConfiguration('main', 'virtual', 'x'), sessions,
-        [[claim.route for claim in FAMILIES['cannord'].claims(entry)] for entry in drives],
-        Ears(), HandClock(lambda: now))  # type: ignore[arg-type]
-    cable = exchange.link = Cable()  # type: ignore[assignment]
-    for session, each in zip(sessions, ears):
-        exchange.attach(session, each)  # type: ignore[arg-type]
-    exchange.bus_opened()
-    exchange.activate()
-    asked: list[tuple[float, str]] = []
-    for tick in range(400):     # 0.4 s
-        now = round(10.0 + 0.001 * tick, 3)
-        exchange._pass()
-        asked += [(now, text) for text in cable.sent]
-        for text in cable.sent[:]:
-            if text.startswith('002') or text.startswith('004') and now < 10.05:
-                exchange.frame_received(frame(f'{int(text[:3], 16) + 1:03X}#{READY}'), 0.0)
-        cable.sent.clear()
-        if StationLost('no answer to process data for 3 cycles') in ears[1].events:
-            break
-    assert [when for when, text in asked if text.startswith('004')] == [10.02, 10.06, 10.1, 10.14]
-    assert now == pytest.approx(10.16, abs=0.002)
-    assert [session.online for session in sessions] == [True, False]
-    assert StationLost not in {type(event) for event in ears[0].events}
+# -- whose turn it is -----------------------------------------------------------------------------
 
 
 def test_a_turn_that_the_bus_refused_is_not_repeated() -> None:
@@ -927,8 +848,7 @@ def test_stop_reaches_everybody() -> None:
     bus = Bus(*[inverter(name=f'drive_{station}', station=station, broadcast='group')
                 for station in range(1, 8)])
     bus.live(0.15)
-    for session in bus.sessions:
-        session.deactivate(bus.now)
+    bus.ends()
     assert not any(session.stopped for session in bus.sessions)
     sent = [text for _, text in bus.live(1.0)]
     assert [text for text in sent if text.startswith('400')] == ['400#7E040000'] * 3
@@ -937,16 +857,6 @@ def test_stop_reaches_everybody() -> None:
     assert all(session.next_timer() == math.inf for session in bus.sessions)
     assert sum(session.statistics.rejected for session in bus.sessions) == 0
     assert {event.reason for _, event in bus.events(StationLost)} == {'deactivated'}
-
-
-def test_enabled_group_is_disabled_by_the_stop() -> None:
-    bus = enabled()
-    lift = bus.session('lift')
-    lift.services.command(0, 0.0, bus.now)
-    lift.services.command(0, 50.0, bus.now)
-    for session in bus.sessions:
-        session.deactivate(bus.now)
-    assert {text.split('#')[1] for _, text in bus.live(1.0)} == {'7E040000'}
 
 
 def test_bus_down_and_lost_time() -> None:
@@ -959,8 +869,7 @@ def test_bus_down_and_lost_time() -> None:
     bus.answers = dict.fromkeys((1, 2, 3), READY)
     assert set(words(bus.live(0.1))) == {'7E04'}
     assert all(session.online for session in bus.sessions)
-    for session in bus.sessions:
-        session.bus_down(bus.now, 'unplugged')
+    assert bus.unplugged() == []
     assert bus.live(1.0) == []
     for session in bus.sessions:
         session.bus_up(bus.now)

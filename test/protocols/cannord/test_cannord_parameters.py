@@ -37,35 +37,23 @@ def asked(talk: Conversation, request: Any, *talks: tuple[str, str]) -> list[obj
 # -- reading --------------------------------------------------------------------------------------
 
 
-def test_read_word() -> None:
-    assert asked(online(), read(ACCELERATION), ('6610000000000000', '6610000000006700')) == [103]
-
-
-def test_read_element_of_an_array() -> None:
-    assert asked(online(), read(FAULT_NUMBER), ('BC62000000000000', 'BC42000000006400')) == [100]
-
-
-def test_read_parameter_of_another_set() -> None:
-    assert asked(online(), read(ACCELERATION_2),
-                 ('6660010000000000', '6640010000006400')) == [100]
-
-
-def test_read_negative_word() -> None:
-    for high in ('FFFF', '0000'):   # whatever stands in the half that is not the word
-        assert asked(online(), read(OFFSET),
-                     ('9B11000000000000', f'9B110000{high}FBFF')) == [-5]
-
-
-def test_read_double_words() -> None:
-    assert asked(online(), read(POSITION), ('6562150000000000', '65521500FFFF6079')) == [-34464]
-    assert asked(online(), read(COUNTER), ('CA12000000000000', 'CA2200000100A086')) == [100000]
-
-
-def test_several_are_read_one_after_the_other() -> None:
-    assert asked(online(), read(ACCELERATION, FLAG, OFFSET),
-                 ('6610000000000000', '6610000000006700'),
-                 ('7810000000000000', '7810000000000100'),
-                 ('9B11000000000000', '9B11000000000500')) == [103, 1, 5]
+@pytest.mark.parametrize(('wanted', 'talks', 'outcomes'), [
+    pytest.param([ACCELERATION], [('6610000000000000', '6610000000006700')], [103], id='word'),
+    pytest.param([FAULT_NUMBER], [('BC62000000000000', 'BC42000000006400')], [100],
+                 id='element-of-an-array'),
+    pytest.param([ACCELERATION_2], [('6660010000000000', '6640010000006400')], [100],
+                 id='of-another-set'),
+    pytest.param([OFFSET], [('9B11000000000000', '9B110000FFFFFBFF')], [-5], id='negative'),
+    pytest.param([OFFSET], [('9B11000000000000', '9B1100000000FBFF')], [-5],
+                 id='high-half-of-a-word-says-nothing'),
+    pytest.param([POSITION], [('6562150000000000', '65521500FFFF6079')], [-34464], id='double'),
+    pytest.param([COUNTER], [('CA12000000000000', 'CA2200000100A086')], [100000], id='unsigned'),
+    pytest.param([ACCELERATION, FLAG, OFFSET], [
+        ('6610000000000000', '6610000000006700'), ('7810000000000000', '7810000000000100'),
+        ('9B11000000000000', '9B11000000000500')], [103, 1, 5], id='one-after-the-other')])
+def test_reads(wanted: list[Parameter], talks: list[tuple[str, str]], outcomes: list[object],
+               ) -> None:
+    assert asked(online(), read(*wanted), *talks) == outcomes
 
 
 @pytest.mark.parametrize(('number', 'text'), [
@@ -523,8 +511,3 @@ def test_telegram_time_out_that_was_not_answered_is_looked_at_when_it_was_writte
     assert talk.hears('203#0112000000000500', 10.421) == ['202#0112000000000000']
     talk.hears('203#0112000000000500', 10.422)
     assert talk.session.warning == says('timeout_too_tight', timeout=0.5)
-
-
-def test_nobody_asks_for_a_time_out_that_is_not_listed() -> None:
-    talk = online()
-    assert talk.hears('003#310B0000', 10.003) == []

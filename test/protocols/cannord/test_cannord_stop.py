@@ -1,8 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
-
-from builders import Conversation, read, write
+from builders import Conversation, read
 from cannord_session_builders import (
     ACTUAL, commanded, ENABLED, exchange, FREQUENCY, inverter, MONITORING, OFFSET, online, READY,
     READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
@@ -131,17 +130,6 @@ def test_refused_disable_goes_on() -> None:
     assert talk.control_outcomes() == [('disable', True, STANDING)]
 
 
-def test_refused_write_was_not_sent() -> None:
-    talk = online()
-    talk.refusing = lambda text: text.startswith('202')
-    assert talk.submits(write((OFFSET, 7)), 10.003) == []
-    assert talk.outcomes() == [[says('not_sent')]]
-    talk.refusing = lambda text: False
-    assert talk.submits(write((OFFSET, 8)), 10.004) == ['202#9BE1000000000800']
-    talk.hears('203#9B11000000000800', 10.005)
-    assert talk.outcomes() == [['written']]
-
-
 def test_refused_read_is_asked_again() -> None:
     talk = online(parameter_timeout=0.03)
     talk.refusing = lambda text: text.startswith('202')
@@ -188,30 +176,7 @@ def test_and_a_fault() -> None:
     assert talk.until(10.23) == [(10.22, READY_FRAME)]
 
 
-def test_anything_else_keeps_the_beat() -> None:
-    talk = online(period=0.1)
-    talk.asks(ENABLE, 10.02)
-    assert talk.until(10.101) == [(10.1, STANDING_FRAME)]
-
-
 # -- nothing jumps --------------------------------------------------------------------------------
-
-
-def test_commands_count_from_operation_enabled_on() -> None:
-    talk = online()
-    assert talk.commands(0, 0.0, 10.003) is CommandOutcome.DISABLED
-    assert talk.session.state is DriveState.DISABLED
-    talk.asks(ENABLE, 10.004)
-    assert talk.commands(0, 0.0, 10.005) is CommandOutcome.DISABLED
-    assert exchange(talk, 10.02, '003#330B0000') == STANDING_FRAME
-    assert talk.commands(0, 0.0, 10.023) is CommandOutcome.DISABLED, 'switched on'
-    assert exchange(talk, 10.04, ENABLED) == STANDING_FRAME
-    assert talk.session.state is DriveState.NOT_ARMED
-    assert talk.commands(0, 25.0, 10.043) is CommandOutcome.NOT_ARMED
-    assert exchange(talk, 10.06, ENABLED) == STANDING_FRAME
-    assert talk.commands(0, 0.0, 10.063) is CommandOutcome.ARMED
-    assert talk.commands(0, 25.0, 10.064) is CommandOutcome.ACCEPTED
-    assert exchange(talk, 10.08, RUNNING) == HALF_FRAME
 
 
 def test_a_drive_that_drops_out_by_itself_is_neutral_at_once() -> None:
