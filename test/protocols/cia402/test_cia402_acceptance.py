@@ -101,24 +101,18 @@ def test_a_fixed_mapping_that_fits_but_for_types_that_can_be_written(
     assert axis.session.online
 
 
-def test_a_fixed_mapping_that_does_not_fit_is_left_as_it_was_found() -> None:
+@pytest.mark.parametrize(('fixed', 'refused'), [
+    (CONTENTS, '1600h.00h'), ([*FITS], '1400h.01h')])
+def test_a_fixed_mapping_that_does_not_fit_is_left_as_it_was_found(
+        fixed: list[tuple[int, int]], refused: str) -> None:
     axis = Axis(objects={**FITS, (0x1600, 1): bytes.fromhex('10007160')})
-    axis.drive.fixed = dict.fromkeys(CONTENTS, 0x06010000)
+    axis.drive.fixed = dict.fromkeys(fixed, 0x06010000)
     found = axis.drive.objects[0x1400, 1]
     axis.start()
     assert not axis.session.online
     assert axis.session.offline_advice == says('mapping_differs', how=says(
-        'object_refused', what='1600h.00h', why=describe(0x06010000)))
+        'object_refused', what=refused, why=describe(0x06010000)))
     assert axis.drive.objects[0x1400, 1] == found
-
-
-def test_a_fixed_drive_that_differs_says_what_it_refused() -> None:
-    axis = Axis(objects={**FITS, (0x1600, 1): bytes.fromhex('10007160')})
-    axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
-    axis.start()
-    assert not axis.session.online
-    assert axis.session.offline_advice == says('mapping_differs', how=says(
-        'object_refused', what='1400h.01h', why=describe(0x06010000)))
 
 
 def test_bit_8_does_not_fall_without_bit_4_when_an_arming_is_taken_back() -> None:

@@ -77,8 +77,7 @@ class TestTheWay:
         while '205#0F0000000000' not in axis.take():
             axis.live(0.001)
         axis.mute = True
-        axis.deliver(axis.talk.asks(DISABLE, axis.now))
-        axis.live(0.015)
+        axis.asks(DISABLE, 0.015)
         assert axis.words() == ['0700']
 
 
@@ -104,8 +103,7 @@ class TestWhatKeepsItFromEnabling:
         axis = Axis()
         axis.online()
         axis.drive.objects[0x6061, 0] = b'\1'
-        axis.deliver(axis.talk.asks(ENABLE, axis.now))
-        axis.live(0.5)
+        assert axis.asks(ENABLE, 0.5) == []
         axis.commands(0.0, 100.0)
         axis.live(0.1)
         assert not any(text.startswith('205#0F00') and text != '205#0F0000000000'
@@ -123,9 +121,7 @@ class TestWhatKeepsItFromEnabling:
         axis = Axis()
         axis.online()
         axis.drive.objects[0x6061, 0] = b'\0'
-        axis.deliver(axis.talk.asks(ENABLE, axis.now))
-        axis.live(0.2)
-        assert axis.talk.control_outcomes() == []
+        assert axis.asks(ENABLE, 0.2) == []
         axis.drive.objects[0x6061, 0] = b'\x09'
         axis.live(0.1)
         assert axis.talk.control_outcomes() == [('enable', True, 'operation enabled')]
@@ -155,10 +151,8 @@ class TestQuickStop:
     def test_one_that_ends_by_itself_keeps_its_word_until_it_has(self) -> None:
         axis = Axis().enabled()
         axis.drive.braking = 20
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.15)
+        assert axis.asks(QUICK_STOP, 0.15) == []
         assert axis.words() == ['0200']
-        assert axis.talk.control_outcomes() == []
         axis.live(0.1)
         assert axis.words() == ['0200', '0600']
         assert [(success, message) for _, success, message in axis.talk.control_outcomes()] == [
@@ -177,9 +171,7 @@ class TestQuickStop:
     def test_one_that_holds(self, by_bit: bool) -> None:
         axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
         axis.drive.braking = 20
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.15)
-        assert axis.talk.control_outcomes() == []
+        assert axis.asks(QUICK_STOP, 0.15) == []
         assert axis.session.control.holds == ''
         if by_bit:
             axis.drive.objects[0x6041, 0] = b'\x07\x06'
@@ -204,18 +196,15 @@ class TestQuickStop:
     def test_a_disable_meanwhile_goes_on_with_the_quick_stop(self) -> None:
         axis = Axis().enabled()
         axis.drive.braking = 30
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.02)
-        axis.deliver(axis.talk.asks(DISABLE, axis.now))
-        axis.live(0.15)
+        axis.asks(QUICK_STOP, 0.02)
+        axis.asks(DISABLE, 0.15)
         assert axis.words() == ['0200']
         axis.live(0.3)
         assert axis.words() == ['0200', '0600']
 
     def test_nothing_else_goes_out_until_a_status_behind_it_was_seen(self) -> None:
         axis = Axis().enabled()
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.0095)
+        axis.asks(QUICK_STOP, 0.0095)
         axis.mute = True
         axis.live(0.01)
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
@@ -241,8 +230,7 @@ class TestQuickStop:
     def test_one_that_holds_at_the_end_of_the_bridge(self) -> None:
         axis = Axis(objects={(0x605A, 0): b'\x06\0', (0x606C, 0): b'\x10\0\0\0'}).enabled()
         axis.drive.braking = 20
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.05)
+        axis.asks(QUICK_STOP, 0.05)
         axis.deliver(axis.talk.deactivate(axis.now))
         axis.live(0.3)
         assert axis.words() == ['0F00', '0200'][1:]
@@ -255,8 +243,7 @@ class TestQuickStop:
         axis = Axis(objects={(0x605A, 0): b'\x06\0'}).enabled()
         del axis.drive.objects[0x606C, 0]
         axis.drive.braking = 20
-        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
-        axis.live(0.5)
+        axis.asks(QUICK_STOP, 0.5)
         assert axis.take().count('605#406C600000000000') == 1
 
 

@@ -22,8 +22,19 @@ FITTING = {
 FITS = {place: bytes.fromhex(text) for place, text in FITTING.items()}
 
 
-def meet(mode: str = 'csv', objects: dict[Any, Any] | None = None, **options: Any) -> Axis:
+def meet(mode: str = 'csv', objects: dict[Any, Any] | None = None, *,
+         refuses: dict[tuple[int, int], int] | None = None,
+         lacks: tuple[int, int] | None = None, **options: Any) -> Axis:
+    """
+    Look for a drive.
+
+    :param refuses: what it does not let be written, and its codes.
+    :param lacks: an object that it does not have.
+    """
     axis = Axis(mode, objects, **options)
+    axis.drive.fixed = refuses or {}
+    if lacks is not None:
+        del axis.drive.objects[lacks]
     axis.start()
     return axis
 
@@ -90,15 +101,11 @@ class TestConfigure:
         assert says('nothing_stops') in notes(axis)
 
     def test_a_fixed_mapping_that_fits(self) -> None:
-        axis = Axis(objects=FITS)
-        axis.drive.fixed = dict.fromkeys(FITS, 0x06010000)
-        axis.start()
+        axis = meet(objects=FITS, refuses=dict.fromkeys(FITS, 0x06010000))
         assert axis.session.online
 
     def test_a_fixed_mapping_that_does_not(self) -> None:
-        axis = Axis()
-        axis.drive.fixed = {(0x1600, 1): 0x06040041}
-        axis.start()
+        axis = meet(refuses={(0x1600, 1): 0x06040041})
         assert differs(axis) == says('object_refused', what='1600h.01h', why=describe(0x06040041))
         axis.drive.fixed.clear()
         axis.live(1.1)
@@ -127,16 +134,12 @@ class TestConfigure:
         assert axis.session.online
 
     def test_a_type_1_that_a_tpdo_refuses(self) -> None:
-        axis = Axis()
-        axis.drive.fixed = {(0x1800, 2): 0x06090030}
-        axis.start()
+        axis = meet(refuses={(0x1800, 2): 0x06090030})
         assert '1800h.02h' in differs(axis)
 
     def test_an_inhibit_time_that_is_refused_is_told_once(self) -> None:
-        axis = Axis('pv', {(0x1800, 3): bytes.fromhex('6400'), (0x1800, 5): bytes(2)},
-                    transmission='event')
-        axis.drive.fixed = {(0x1800, 3): 0x06010002}
-        axis.start()
+        axis = meet('pv', {(0x1800, 3): bytes.fromhex('6400'), (0x1800, 5): bytes(2)},
+                    refuses=fixed((0x1800, 3)), transmission='event')
         assert '00180332000000' in written(axis)
         said = notes(axis)
         assert [text for text in said if '1800h.03h' in text] == [
@@ -146,9 +149,8 @@ class TestConfigure:
         assert not [text for text in notes(axis) if '1800h.03h' in text]
 
     def test_two_pdos_each_way(self) -> None:
-        axis = Axis(request_pdos=(1, 3), response_pdos=(2, 4), response=(
+        axis = meet(request_pdos=(1, 3), response_pdos=(2, 4), response=(
             POSITION, VELOCITY, TORQUE))
-        axis.start()
         assert axis.session.online
         sent = axis.take()
         assert '605#23011A0220006460' in sent
@@ -198,16 +200,13 @@ class TestRemedy:
         ({**FITS, **NO_MODE}, {}, {'mapping': 'assume'}, 'drive_to_correct')])
     def test_what_to_do(self, objects: dict[Any, Any], refuses: dict[tuple[int, int], int],
                         options: dict[str, Any], remedy: str) -> None:
-        axis = Axis(objects=objects, **options)
-        axis.drive.fixed = refuses
-        axis.start()
+        axis = meet(objects=objects, refuses=refuses, **options)
         differs(axis)
         assert axis.session.remedy(axis.session.offline_advice) == says(
             remedy, why=says('mapping_differs'))
 
     def test_it_differs_while_it_is_looked_at_again(self) -> None:
-        axis = Axis(objects=self.NO_MODE)
-        axis.start()
+        axis = meet(objects=self.NO_MODE)
         seen = set()
         deliver = axis.deliver
 
@@ -224,9 +223,7 @@ class TestRemedy:
 
     @pytest.mark.parametrize('lacks', [(0x1803, 1), (0x6041, 0), (0x6064, 0)])
     def test_an_object_that_it_lacks(self, lacks: tuple[int, int]) -> None:
-        axis = Axis('csp', response_pdos=(4,))
-        del axis.drive.objects[lacks]
-        axis.start()
+        axis = meet('csp', lacks=lacks, response_pdos=(4,))
         differs(axis)
         assert axis.session.remedy('') == says('drive_to_correct')
 
@@ -245,8 +242,7 @@ class TestFaultReaction:
     REACTION, FAULT = bytes.fromhex('1F02'), bytes.fromhex('1802')
 
     def test_it_is_waited_for_before_anything_is_touched(self) -> None:
-        axis = Axis(objects={(0x6041, 0): self.REACTION})
-        axis.start()
+        axis = meet(objects={(0x6041, 0): self.REACTION})
         axis.live(0.5)
         told = axis.take()
         assert told.count('605#4041600000000000') > 10
@@ -260,8 +256,7 @@ class TestFaultReaction:
         assert axis.session.state is DriveState.FAULT
 
     def test_one_that_does_not_end_is_not_cycled(self) -> None:
-        axis = Axis(objects={(0x6041, 0): self.REACTION}, control_timeout=1.0)
-        axis.start()
+        axis = meet(objects={(0x6041, 0): self.REACTION}, control_timeout=1.0)
         axis.live(5.0)
         assert not [text for text in axis.take() if text.startswith(('000#', '605#2', '205#'))]
         assert axis.session.offline_advice == says('found_braking')
@@ -290,9 +285,7 @@ class TestWithoutWriting:
             assert f'{place[0]:04X}h.{place[1]:02X}h' in differs(axis)
 
     def test_assume_does_not_look(self) -> None:
-        axis = Axis(mapping='assume')
-        axis.drive.objects.update(FITS)
-        axis.start()
+        axis = meet(objects=FITS, mapping='assume')
         assert axis.session.online
         assert not any(text[4:].startswith(('400014', '400018', '400510')) for text in axis.take())
 
@@ -319,10 +312,7 @@ class TestMode:
         assert differs(axis) == says('mode_not_offered', mode='csv', number=9, offered=0x25)
 
     def test_no_6502h(self) -> None:
-        axis = Axis()
-        del axis.drive.objects[0x6502, 0]
-        axis.start()
-        assert axis.session.online
+        assert meet(lacks=(0x6502, 0)).session.online
 
     @pytest.mark.parametrize(('period', 'sent'), [
         (0.01, ['C26002FD000000', 'C260010A000000']), (0.0005, ['C26002FC000000',
@@ -332,9 +322,8 @@ class TestMode:
         assert [text for text in written(axis) if text.startswith('C260')] == sent
 
     def test_one_that_is_refused_is_told_and_nothing_else_happens(self) -> None:
-        axis = Axis(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'})
-        axis.drive.fixed = {(0x60C2, 1): 0x06090032}
-        axis.start()
+        axis = meet(objects={(0x60C2, 1): b'\1', (0x60C2, 2): b'\xFE'},
+                    refuses={(0x60C2, 1): 0x06090032})
         assert axis.session.online
         assert notes(axis) == [
             says('object_refused', what='60C2h.01h', why=describe(0x06090032))]
@@ -371,10 +360,7 @@ class TestWatches:
         assert axis.session.online
 
     def test_no_6007h_counts_as_watching(self) -> None:
-        axis = Axis()
-        del axis.drive.objects[0x6007, 0]
-        axis.start()
-        assert says('nothing_stops') not in notes(axis)
+        assert says('nothing_stops') not in notes(meet(lacks=(0x6007, 0)))
 
     def test_off(self) -> None:
         axis = meet(bridge_heartbeat=0.0)
@@ -418,8 +404,7 @@ class TestNoNmt:
         axis.start()
         axis.live(0.5)
         assert differs(axis) == says('not_pre_operational')
-        axis = Axis(nmt_start=False)
-        axis.start()
+        axis = meet(nmt_start=False)
         assert '00140105020000' in written(axis)
         assert not axis.session.online
         axis.drive.operational = True

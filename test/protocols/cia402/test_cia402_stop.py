@@ -138,10 +138,9 @@ class TestTheEnd:
 
     def test_in_the_middle_of_the_set_up(self) -> None:
         axis = Axis()
-        axis.deliver(axis.talk.bus_up(axis.now))
         axis.deaf = True
-        axis.deliver(axis.talk.activate(axis.now))
-        axis.live(1.0)
+        axis.start()
+        axis.live(0.7)
         sent = end(axis)
         assert not any(text.startswith('205#') for text in sent)
         assert doubts(axis) == []
@@ -172,9 +171,8 @@ class TestFoundEnabled:
     def test_one_that_takes_its_time_is_waited_for(self) -> None:
         axis = self.meet()
         axis.drive.ramp = 1000
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
-        axis.live(1.0)
+        axis.start()
+        axis.live(0.7)
         assert not any(text.startswith(('000#', '205#', '605#2F6060')) for text in axis.take())
         axis.drive.becomes(axis.drive.ON)
         axis.live(0.3)
@@ -183,9 +181,8 @@ class TestFoundEnabled:
     def test_one_that_does_not_leave_is_not_cycled_and_named(self) -> None:
         axis = self.meet(control_timeout=0.5)
         axis.drive.ramp = 1000
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.deliver(axis.talk.activate(axis.now))
-        axis.live(4.0)
+        axis.start()
+        axis.live(3.7)
         assert not any(text.startswith(('000#', '205#')) for text in axis.take())
         assert axis.session.state is DriveState.OFFLINE
         assert doubts(axis) == [says('may_still_be_running', why=says(
@@ -247,14 +244,6 @@ class TestLosses:
         assert not any(text.startswith('205#') and text[4:] not in ('060000000000',)
                        for text in sent[sent.index('605#2F60600009000000'):])
 
-    def test_heartbeats_that_cease(self) -> None:
-        axis = running()
-        axis.says('705#05')
-        axis.drive.objects[0x1017, 0] = b'\0\0'
-        axis.live(0.4)
-        lost, = axis.talk.events(StationLost)
-        assert lost.reason == says('no_heartbeat', timeout=0.35)
-
     def test_it_stays_offline_until_there_are_heartbeats_again(self) -> None:
         axis = Axis(objects={(0x1017, 0): b'\x64\0'}, heartbeat_producer=0.0).enabled()
         for again in (True, False):
@@ -286,31 +275,6 @@ class TestLosses:
         lost, = axis.talk.events(StationLost)
         assert lost.reason == says('node_state', state='pre-operational')
         assert axis.session.online
-
-    def test_the_bus_comes_back(self) -> None:
-        axis = running()
-        axis.talk.now = axis.now
-        axis.deliver(axis.talk.bus_down(axis.now))
-        axis.live(0.5)
-        assert axis.take() == []
-        assert axis.drive.state == axis.drive.ENABLED
-        axis.deliver(axis.talk.bus_up(axis.now))
-        axis.live(0.5)
-        sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
-        assert sent[0] == DISABLE_BY_SDO
-        assert axis.session.online
-        assert axis.session.state is DriveState.DISABLED
-
-    def test_a_process_that_stood_still(self) -> None:
-        axis = running()
-        axis.now += 2.0
-        axis.talk.now = axis.now
-        axis.session.time_lost(axis.now)
-        axis.deliver(axis.talk.sent())
-        axis.live(0.5)
-        assert axis.session.online
-        assert axis.session.state is DriveState.DISABLED
-        assert axis.drive.state == axis.drive.READY
 
 
 def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
@@ -386,9 +350,7 @@ class TestSegments:
 
     def test_a_stop_waits_for_the_segment_under_way_and_breaks_off(self) -> None:
         axis = self.amidst()
-        axis.talk.now = axis.now
-        axis.session.time_lost(axis.now)
-        axis.deliver(axis.talk.sent())
+        axis.deliver(axis.talk.time_lost(axis.now))
         axis.live(0.02)
         assert not any(text.startswith('605#') for text in axis.take())
         axis.says(self.SEGMENT)
@@ -397,8 +359,7 @@ class TestSegments:
 
     def test_but_for_a_moment_only(self) -> None:
         axis = self.amidst()
-        axis.talk.now = axis.now
-        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.time_lost(axis.now))
         axis.live(0.051)
         assert by_sdo(axis) == [
             '605#8008100000000405', DISABLE_BY_SDO]
@@ -409,8 +370,7 @@ class TestSegments:
         axis = running(table=(*TABLE, NAME))
         axis.drive.takes = drive_without(axis, 0x605)  # type: ignore[method-assign]
         axis.deliver(axis.talk.submits(read(NAME), axis.now))
-        axis.talk.now = axis.now
-        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.time_lost(axis.now))
         axis.live(0.051)
         assert by_sdo(axis) == ['605#4008100000000000', DISABLE_BY_SDO]
         return axis
@@ -432,8 +392,7 @@ class TestSegments:
 
     def test_at_the_end_it_does_not_wait_at_all(self) -> None:
         axis = self.amidst()
-        axis.talk.now = axis.now
-        axis.session.time_lost(axis.now)
+        axis.deliver(axis.talk.time_lost(axis.now))
         axis.deliver(axis.talk.deactivate(axis.now))
         assert by_sdo(axis) == [
             self.BROKEN_OFF, DISABLE_BY_SDO]

@@ -198,8 +198,7 @@ class TestRounds:
     def test_sync_that_the_bus_refuses_is_no_stop(self) -> None:
         axis = Axis().enabled()
         axis.talk.refusing = lambda text: text == '080#'
-        axis.deliver(axis.talk.asks(ControlAction.DISABLE, axis.now))
-        axis.live(0.02)
+        axis.asks(ControlAction.DISABLE, 0.02)
         assert axis.session.control is not None
         assert axis.session.control.word_due
 
