@@ -9,7 +9,8 @@ of the bridge: without it these tests skip.
 from collections.abc import Iterator
 from typing import Any
 
-from builders import drive, read, text_of, write
+from builders import drive, read, write
+from interop_bridge import Bridge, DEADLINE, dictionary_of, objectdictionary
 import pytest
 from waiting import clock, wait_for
 
@@ -17,21 +18,15 @@ from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
-from drive_can_bridge.core.requests import Request
-from drive_can_bridge.core.session import Session
-from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 
 canopen = pytest.importorskip('canopen')
-objectdictionary = pytest.importorskip('canopen.objectdictionary')
 
 NODE = 5
-#: s after which a thing that has not happened never will
-DEADLINE = 30.0
+U8, U16, U32 = (
+    objectdictionary.UNSIGNED8, objectdictionary.UNSIGNED16, objectdictionary.UNSIGNED32)
 LTMR = read_profile(profiles_directory() / 'tesys_t_ltmr.yaml').profile
 
 
@@ -42,34 +37,18 @@ def bus_of(channel: str) -> BusConfiguration:
 # -- the other stack as master --------------------------------------------------------------------
 
 
-def master_dictionary() -> Any:
-    """Return what a master knows of an LTMR: PDO4, the mailbox, a few more."""
-    od = objectdictionary.ObjectDictionary()
-
-    def variable(name: str, index: int, subindex: int, data_type: int) -> Any:
-        made = objectdictionary.ODVariable(name, index, subindex)
-        made.data_type = data_type
-        return made
-
-    u8, u16, u32 = (objectdictionary.UNSIGNED8, objectdictionary.UNSIGNED16,
-                    objectdictionary.UNSIGNED32)
-    for index, entries in {
-            0x1403: {1: u32, 2: u8}, 0x1803: {1: u32, 2: u8}, 0x1603: {0: u8, 1: u32, 2: u32},
-            0x1A03: {0: u8, 1: u32, 2: u32}, 0x3000: {1: u32, 2: u32, 3: u32, 4: u32},
-            0x2004: {6: u16, 7: u16}, 0x2007: {3: u16}, 0x2008: {5: u16}}.items():
-        record = objectdictionary.ODRecord(f'object {index:X}', index)
-        for subindex, data_type in entries.items():
-            record.add_member(variable(f'entry {subindex}', index, subindex, data_type))
-        od.add_object(record)
-    od.add_object(variable('heartbeat', 0x1017, 0, u16))
-    od.add_object(variable('name', 0x1008, 0, objectdictionary.VISIBLE_STRING))
-    return od
+#: what a master knows of an LTMR: PDO4, the mailbox, a few more
+OBJECTS = {0x1017: ('heartbeat', U16), 0x1008: ('name', objectdictionary.VISIBLE_STRING)}
+RECORDS = {
+    0x1403: {1: U32, 2: U8}, 0x1803: {1: U32, 2: U8}, 0x1603: {0: U8, 1: U32, 2: U32},
+    0x1A03: {0: U8, 1: U32, 2: U32}, 0x3000: {1: U32, 2: U32, 3: U32, 4: U32},
+    0x2004: {6: U16, 7: U16}, 0x2007: {3: U16}, 0x2008: {5: U16}}
 
 
 @pytest.fixture
 def node(network: Any) -> Any:
     """Return the LTMR as the other stack's master sees it."""
-    remote = canopen.RemoteNode(NODE, master_dictionary())
+    remote = canopen.RemoteNode(NODE, dictionary_of(OBJECTS, RECORDS))
     # a busy machine is no reason to give up
     remote.sdo.RESPONSE_TIMEOUT = DEADLINE
     network.add_node(remote)
@@ -252,102 +231,16 @@ class Registers:
         self.words.update({455: 0x0041, 704: 0})
 
 
-class Bridge:
-    """The part of a bridge that is about one bus: its exchange."""
-
-    def __init__(self, channel: str, **options: Any) -> None:
-        configuration = drive(
-            'canopen_pkw', name='pump', station=NODE, table=LTMR.parameters.values(),
-            control=LTMR.control, request=(),
-            response=(LTMR.parameters['system_status_1'],), period=0.05, parameter_timeout=0.5,
-            control_timeout=DEADLINE, missed_limit=5, **options)
-        self.session: Session
-        self.session, = make_sessions([configuration])
-        routes = [claim.route for claim in FAMILIES['canopen_pkw'].claims(configuration)]
-        self.exchange = BusExchange(bus_of(channel), [self.session], [routes], self, clock())
-        self.exchange.attach(self.session, self)
-        self.samples: list[tuple[int, ...]] = []
-        self.events: list[Event] = []
-        self.controlled: list[ControlCompleted] = []
-        self.failures: list[str] = []
-
-    def __enter__(self) -> 'Bridge':
-        self.exchange.open()
-        self.exchange.activate()
-        return self
-
-    def __exit__(self, *_: Any) -> None:
-        self.exchange.deactivate()
-        self.exchange.close()
-        assert not self.failures
-
-    # what the exchange tells
-
-    def take_commands(self, now: float) -> None:
-        """Nothing to hand over: there are no setpoints."""
-
-    def request_sent(self, now: float) -> None:
-        """Nobody asks."""
-
-    def discard_commands(self, why: str) -> None:
-        """Nothing to throw away."""
-
-    def process_data(self, event: ProcessDataReceived) -> None:
-        self.samples.append(event.raws)
-
-    def handle_event(self, event: Event) -> None:
-        if isinstance(event, ControlCompleted):
-            self.controlled.append(event)
-        else:
-            self.events.append(event)
-
-    def bus_opened(self, bus: str) -> None:
-        """Record the bus: it was to be expected."""
-
-    def bus_lost(self, bus: str, reason: str) -> None:
-        self.failures.append(reason)
-
-    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        self.failures.append(reason)
-
-    # what a test asks
-
-    def facts(self, key: str) -> str:
-        with self.exchange.lock:
-            return self.session.facts()[key]
-
-    def online(self, wanted: bool = True) -> None:
-        wait_for(lambda: self.session.online is wanted, f'online: {wanted}')
-
-    def outcome(self, request: Request) -> list[object]:
-        """Submit a request; return its outcomes."""
-        self.exchange.submit(self.session, request)
-
-        def find() -> list[object] | None:
-            for event in list(self.events):
-                if isinstance(event, RequestCompleted) and event.request is request:
-                    return [text_of(outcome) for outcome in event.outcomes]
-            return None
-        found: list[object] = wait_for(find, 'the outcome of a request')
-        return found
-
-    def control(self, action: ControlAction) -> tuple[bool, str]:
-        """Ask for a control action; return its outcome."""
-        done = len(self.controlled)
-        self.exchange.submit(self.session, ControlRequest(action))
-        wait_for(lambda: len(self.controlled) > done, f'{action.value} to end')
-        outcome = self.controlled[done]
-        return outcome.success, outcome.message
+def bridge_on(channel: str, **options: Any) -> Bridge:
+    return Bridge(bus_of(channel), ltmr_configuration(
+        period=0.05, parameter_timeout=0.5, control_timeout=DEADLINE, missed_limit=5, **options))
 
 
 @pytest.fixture
 def local(network: Any) -> Any:
     """Return a node of the other stack, with heartbeats every 50 ms; not started yet."""
-    od = objectdictionary.ObjectDictionary()
-    heartbeat = objectdictionary.ODVariable('heartbeat', 0x1017, 0)
-    heartbeat.data_type = objectdictionary.UNSIGNED16
-    heartbeat.default = 50
-    od.add_object(heartbeat)
+    od = dictionary_of({0x1017: ('heartbeat', U16)}, {})
+    od[0x1017].default = 50
     return network.create_node(NODE, od)
 
 
@@ -364,7 +257,7 @@ def registers(network: Any, local: Any) -> Registers:
 
 def test_bridge_starts_a_node_and_follows_its_state(channel: str, local: Any,
                                                     registers: Registers) -> None:
-    with Bridge(channel) as bridge:
+    with bridge_on(channel) as bridge:
         assert not bridge.session.online
         boot(local)
         bridge.online()
@@ -383,7 +276,7 @@ def test_bridge_that_does_not_start_anybody(channel: str, local: Any, registers:
                                             network: Any) -> None:
     commands: list[bytes] = []
     network.subscribe(0, lambda _, data, __: commands.append(bytes(data)))
-    with Bridge(channel, nmt_start=False) as bridge:
+    with bridge_on(channel, nmt_start=False) as bridge:
         boot(local)
         wait_for(lambda: bridge.facts('nmt_state') == 'pre-operational', 'the state')
         assert not bridge.session.online
@@ -397,7 +290,7 @@ def test_bridge_that_does_not_start_anybody(channel: str, local: Any, registers:
 
 def test_bridge_uses_the_mailbox_of_a_node(channel: str, local: Any,
                                            registers: Registers) -> None:
-    with Bridge(channel) as bridge:
+    with bridge_on(channel) as bridge:
         boot(local)
         bridge.online()
         ratio = LTMR.parameters['flc1_ratio']
@@ -407,17 +300,17 @@ def test_bridge_uses_the_mailbox_of_a_node(channel: str, local: Any,
         trip_class = LTMR.parameters['motor_trip_class']
         (refusal,) = bridge.outcome(write((trip_class, 10)))
         assert '06020000h' in str(refusal)
-        assert bridge.control(ControlAction.ENABLE)[0]
+        assert bridge.control(ControlAction.ENABLE)
         assert registers.words[704] == 1
-        assert bridge.control(ControlAction.DISABLE)[0]
+        assert bridge.control(ControlAction.DISABLE)
         assert registers.words[704] == 0
 
 
 def test_bridge_sees_a_restart(channel: str, local: Any, registers: Registers) -> None:
-    with Bridge(channel) as bridge:
+    with bridge_on(channel) as bridge:
         boot(local)
         bridge.online()
-        assert bridge.control(ControlAction.ENABLE)[0]
+        assert bridge.control(ControlAction.ENABLE)
         lost = len(bridge.events)
         registers.restart()
         boot(local)
@@ -428,11 +321,11 @@ def test_bridge_sees_a_restart(channel: str, local: Any, registers: Registers) -
         seen = len(bridge.samples)
         wait_for(lambda: len(bridge.samples) > seen + 3, 'samples')
         assert registers.words[704] == 0
-        assert bridge.control(ControlAction.ENABLE)[0]
+        assert bridge.control(ControlAction.ENABLE)
 
 
 def test_bridge_misses_heartbeats(channel: str, local: Any, registers: Registers) -> None:
-    with Bridge(channel, heartbeat_timeout=1.0) as bridge:
+    with bridge_on(channel, heartbeat_timeout=1.0) as bridge:
         boot(local)
         bridge.online()
         local.nmt.stop_heartbeat()
@@ -442,7 +335,7 @@ def test_bridge_misses_heartbeats(channel: str, local: Any, registers: Registers
 
 
 def test_bridge_shows_emergencies(channel: str, local: Any, registers: Registers) -> None:
-    with Bridge(channel) as bridge:
+    with bridge_on(channel) as bridge:
         boot(local)
         bridge.online()
         before = bridge.facts('emergency')

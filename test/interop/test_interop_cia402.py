@@ -13,31 +13,25 @@ import os
 from pathlib import Path
 from typing import Any
 
-from builders import drive, read, text_of, write
+from builders import drive, read, write
 import can
+from interop_bridge import Bridge, DEADLINE, dictionary_of, objectdictionary
 import pytest
 from waiting import clock, wait_for
 from world import World
 
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import Request
-from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
 canopen = pytest.importorskip('canopen')
-objectdictionary = pytest.importorskip('canopen.objectdictionary')
 p402 = pytest.importorskip('canopen.profiles.p402')
 
 NODE = 5
-#: s after which a thing that has not happened never will
-DEADLINE = 30.0
 PERIOD = 0.02
 SERVO = read_profile(profiles_directory() / 'cia402_servo.yaml').profile
 _U8, _I8, _U16, _I16, _U32, _I32 = (
@@ -59,27 +53,13 @@ ENTRIES = {'communication': {0: _U8, 1: _U32, 2: _U8, 3: _U16, 5: _U16},
 
 def dictionary() -> Any:
     """Return an object dictionary with those, PDOs, and the list of watched nodes."""
-    od = objectdictionary.ObjectDictionary()
-
-    def variable(name: str, index: int, subindex: int, data_type: int) -> Any:
-        made = objectdictionary.ODVariable(name, index, subindex)
-        made.data_type = data_type
-        return made
-
-    for index, (name, data_type) in VARIABLES.items():
-        od.add_object(variable(name, index, 0, data_type))
     records = {0x1016: {0: _U8, 1: _U32}, 0x1018: {0: _U8, 1: _U32, 2: _U32, 3: _U32, 4: _U32},
                0x60C2: {0: _U8, 1: _U8, 2: _I8}}
     for number in range(4):
         for base, kind in ((0x1400, 'communication'), (0x1600, 'mapping'),
                            (0x1800, 'communication'), (0x1A00, 'mapping')):
             records[base + number] = ENTRIES[kind]
-    for index, entries in records.items():
-        record = objectdictionary.ODRecord(f'object {index:X}', index)
-        for subindex, data_type in entries.items():
-            record.add_member(variable(f'entry {subindex}', index, subindex, data_type))
-        od.add_object(record)
-    return od
+    return dictionary_of(VARIABLES, records)
 
 
 def bus_of(channel: str) -> BusConfiguration:
@@ -325,76 +305,24 @@ class Device:
             self.state = 0x27
 
 
-class Bridge:
-    """The part of a bridge that is about one bus: its exchange."""
+def bridge_on(bus: BusConfiguration) -> Bridge:
+    return Bridge(bus, drive(
+        'cia402', name='axis', station=NODE, table=SERVO.parameters.values(),
+        request=names('target_velocity'), response=names('actual_velocity'), mode='csv',
+        period=PERIOD, parameter_timeout=0.5, control_timeout=DEADLINE, missed_limit=10,
+        command_timeout=DEADLINE, heartbeat_timeout=5.0))
 
-    def __init__(self, bus: BusConfiguration, **options: Any) -> None:
-        configuration = drive(
-            'cia402', name='axis', station=NODE, table=SERVO.parameters.values(),
-            request=names('target_velocity'), response=names('actual_velocity'), mode='csv',
-            period=PERIOD, parameter_timeout=0.5, control_timeout=DEADLINE, missed_limit=10,
-            command_timeout=DEADLINE, heartbeat_timeout=5.0, **options)
-        self.session, = make_sessions([configuration])
-        routes = [claim.route for claim in FAMILIES['cia402'].claims(configuration)]
-        self.exchange = BusExchange(bus, [self.session], [routes], self, clock())
-        self.exchange.attach(self.session, self)
-        self.events: list[Event] = []
-        self.samples: list[tuple[int, ...]] = []
-        self.failures: list[str] = []
 
-    def __enter__(self) -> 'Bridge':
-        self.exchange.open()
-        self.exchange.activate()
-        return self
-
-    def __exit__(self, *_: Any) -> None:
-        self.exchange.deactivate()
-        self.exchange.close()
-        assert not self.failures
-
-    def nothing(self, *_: Any, **__: Any) -> None:
-        """Take no notice."""
-
-    take_commands = request_sent = discard_commands = bus_opened = nothing
-
-    def process_data(self, event: ProcessDataReceived) -> None:
-        self.samples.append(event.raws)
-
-    def handle_event(self, event: Event) -> None:
-        self.events.append(event)
-
-    def bus_lost(self, bus: str, reason: str) -> None:
-        self.failures.append(reason)
-
-    def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        self.failures.append(reason)
-
-    def online(self, wanted: bool = True) -> None:
-        wait_for(lambda: self.session.online is wanted, f'online: {wanted}')
-
-    def found(self, kind: type, request: Any) -> Any:
-        return wait_for(lambda: next((event for event in list(self.events) if isinstance(
-            event, kind) and event.request is request), None), f'the end of {request}')
-
-    def outcome(self, request: Request) -> list[object]:
-        self.exchange.submit(self.session, request)
-        return [text_of(each) for each in self.found(RequestCompleted, request).outcomes]
-
-    def control(self, action: ControlAction) -> bool:
-        request = ControlRequest(action)
-        self.exchange.submit(self.session, request)
-        return bool(self.found(ControlCompleted, request).success)
-
-    def command(self, value: float) -> None:
-        with self.exchange.lock:
-            self.session.services.command(0, value, clock().now())
+def command(bridge: Bridge, value: float) -> None:
+    with bridge.exchange.lock:
+        bridge.session.services.command(0, value, clock().now())
 
 
 def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration, Any]) -> None:
     bus, network = place
     device = Device(network)
     device.boot()
-    with Bridge(bus) as bridge:
+    with bridge_on(bus) as bridge:
         bridge.online()
         # what it had written there
         sdo = device.node.sdo
@@ -407,8 +335,8 @@ def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration
         assert set(device.words) <= {0, 6, 7}
         assert bridge.control(ControlAction.ENABLE)
         assert device.state == 0x27
-        bridge.command(0.0)
-        bridge.command(60.0)
+        command(bridge, 0.0)
+        command(bridge, 60.0)
         wait_for(lambda: bridge.samples[-1] == (0x0237, 10_000), 'the speed')
         velocity, offset, missing = names('profile_velocity', 'home_offset', 'torque_slope')
         assert bridge.outcome(write((velocity, 1234), (offset, -5))) == ['written', 'written']
@@ -431,7 +359,7 @@ def test_bridge_sets_a_device_up_again_that_has_started_anew(
     bus, network = place
     device = Device(network)
     device.boot()
-    with Bridge(bus) as bridge:
+    with bridge_on(bus) as bridge:
         bridge.online()
         assert bridge.control(ControlAction.ENABLE)
         device.boot()
