@@ -76,6 +76,11 @@ def changed(text: str, old: str, new: str) -> str:
     return text.replace(old, new, 1)
 
 
+def line_of(text: str, part: str) -> int:
+    """Return the line in which a part of a text begins, counted from 1."""
+    return text.count('\n', 0, text.index(part)) + 1
+
+
 def write(folder: Path, text: str = FILE, profile: str = PROFILE) -> Path:
     """Write a parameter file and the profile it names."""
     (folder / 'table.yaml').write_text(profile, encoding='utf-8')

@@ -52,9 +52,6 @@ def test_good(good: dict[str, Any]) -> None:
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
     ('drives.conveyor.statoin', 1,
      [at('drives.conveyor.statoin', 'unknown_key', hint=says('did_you_mean', word='station'))]),
-    ('drives.conveyor.station', 200,
-     [at('drives.conveyor.station', 'value_out_of_range', value=200, least=1, most=127,
-         remark=' (datamodel_extended)')]),
     ('drives.conveyor.station', True,
      [at('drives.conveyor.station', 'wrong_type', value=True, kind='a bool',
          allowed='an integer')]),
@@ -64,11 +61,6 @@ def test_good(good: dict[str, Any]) -> None:
      [at('drives.conveyor.station', 'wrong_kind', kind='a bytes', allowed='an integer')]),
     ('drives.conveyor.period', float('nan'),
      [at('drives.conveyor.period', 'not_finite', allowed='a number of 0.001 to 60')]),
-    ('drives.conveyor.cyclic_request', ['sped'],
-     [at('drives.conveyor.cyclic_request', 'not_in_profile', name='sped',
-         hint=says('did_you_mean', word='speed'))]),
-    ('drives.conveyor.bus', 'mian',
-     [at('drives.conveyor.bus', 'unknown', name='mian', hint=says('did_you_mean', word='main'))]),
     ('drives.conveyor', 5,
      [at('drives.conveyor', 'value_and_below', below='bus'),
       at('drives.conveyor', 'wrong_type', value=5, kind='an integer', allowed='a mapping')]),
@@ -87,12 +79,6 @@ def test_problem(good: dict[str, Any], name: str, value: object, expected: list[
 
 def test_nothing_at_all() -> None:
     assert problems({}) == [at('buses', 'missing', allowed='a mapping')]
-
-
-def test_no_joint_commands_a_limit(good: dict[str, Any]) -> None:
-    assert problems({**good, 'drives.conveyor.cyclic_request': ['speed', 'limit'],
-                     'drives.conveyor.joint.velocity_command': 'limit'}) == [
-        at('drives.conveyor.joint.velocity_command', 'joint_commands_limit', name='limit')]
 
 
 def test_problem_inside_a_profile(good: dict[str, Any], tmp_path: Path) -> None:

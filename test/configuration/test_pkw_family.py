@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The family table's row of CANopen PKW, and what it makes of parameter files."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from configuration_builders import at, changed, load, problems, warnings
@@ -60,19 +60,17 @@ def with_options(drive: DriveConfiguration, **options: object) -> DriveConfigura
     return replace(drive, options=replace(drive.options, **options))
 
 
-def test_defaults(drive: DriveConfiguration) -> None:
-    assert drive.parameter_timeout == 0.5, 'longer than that of the other families'
-    assert asdict(drive.options) == {
-        'layout': 'word_le', 'word_order': 'high_first', 'abort_code_order': 'auto',
-        'addressing': 'register', 'nmt_start': True, 'heartbeat_timeout': 0.0,
-        'predefined_set': True,
-        'request_cob_id': 0x505, 'response_cob_id': 0x485, 'refresh_interval': 1.0}
+def test_answers_may_take_longer_than_those_of_other_families(drive: DriveConfiguration) -> None:
+    assert drive.parameter_timeout == 0.5
 
 
 def test_claims(drive: DriveConfiguration) -> None:
-    routes = [claim.route for claim in FAMILY.claims(drive)]
-    assert routes == [(0x505, 0x7FF, False), (0x485, 0x7FF, False), (0x085, 0x7FF, False),
-                      (0x705, 0x7FF, False), (0x000, 0x7FF, False)]
+    assert [(claim.route, claim.purpose) for claim in FAMILY.claims(drive)] == [
+        ((0x505, 0x7FF, False), '505h (PKW requests to node 5)'),
+        ((0x485, 0x7FF, False), '485h (PKW responses of node 5)'),
+        ((0x085, 0x7FF, False), '085h (emergency messages of node 5)'),
+        ((0x705, 0x7FF, False), '705h (heartbeats of node 5)'),
+        ((0x000, 0x7FF, False), '000h (NMT)')]
     moved = with_options(drive, request_cob_id=0x201, response_cob_id=0x181)
     assert [claim.route.identifier for claim in FAMILY.claims(moved)] == [
         0x201, 0x181, 0x085, 0x705, 0x000]
@@ -89,54 +87,41 @@ def test_predefined_set_is_reserved(drive: DriveConfiguration) -> None:
     assert FAMILY.reserved(with_options(drive, predefined_set=False)) == []
 
 
-#: an 11-bit drive whose requests are identifiers of node 5, and what they would be to it
+#: an 11-bit drive that uses identifiers of node 5: what for, and what they would be to the node
 STRANGERS = [
-    ('datamodel_standard', 'request_id_base: 0x204', '205h (receive PDO1 of node 5'),
-    ('datamodel_standard', 'request_id_base: 0x604', '605h (SDO requests to node 5'),
-    ('datamodel_standard', 'response_id_base: 0x584', '585h (SDO responses of node 5'),
-    ('datamodel_standard', 'request_id_base: 0x7F', '080h (SYNC'),
-    ('datamodel_standard', 'request_id_base: 0x384', '385h (transmit PDO3 of node 5'),
+    ('datamodel_standard', 1, 'request_id_base: 0x204', '11-bit identifier 205h',
+     '205h (receive PDO1 of node 5'),
+    ('datamodel_standard', 1, 'request_id_base: 0x604', '11-bit identifier 605h',
+     '605h (SDO requests to node 5'),
+    ('datamodel_standard', 1, 'response_id_base: 0x584', '11-bit identifier 585h',
+     '585h (SDO responses of node 5'),
+    ('datamodel_standard', 1, 'request_id_base: 0x7F', '11-bit identifier 080h', '080h (SYNC'),
+    ('datamodel_standard', 1, 'request_id_base: 0x384', '11-bit identifier 385h',
+     '385h (transmit PDO3 of node 5'),
+    # requests on 080h, answers on 081h
+    ('cannord', 64, 'broadcast: none', 'process data to station 64', '080h (SYNC'),
 ]
 
 
-@pytest.mark.parametrize(('protocol', 'key', 'purpose'), STRANGERS)
-def test_other_families_keep_off_the_predefined_set(tmp_path: Path, protocol: str, key: str,
-                                                    purpose: str) -> None:
+@pytest.mark.parametrize(('protocol', 'station', 'key', 'own', 'purpose'), STRANGERS)
+def test_other_families_keep_off_the_predefined_set(
+        tmp_path: Path, protocol: str, station: int, key: str, own: str, purpose: str) -> None:
     text = FILE + f"""\
       fan:
         bus: main
         protocol: {protocol}
-        station: 1
+        station: {station}
         profile: {tmp_path}/other.yaml
         period: 0.1
         cyclic_response: [status]
         {key}
 """
     (tmp_path / 'other.yaml').write_text(
-        'protocols: [datamodel_standard]\nparameters: {status: {number: 1, access: ro}}\n')
-    both = f'{ONE}, 11-bit identifier {purpose[:4]} here and {purpose}; predefined_set) there'
+        f'protocols: [{protocol}]\nparameters: {{status: {{number: 1, access: ro}}}}\n')
+    both = f'{ONE}, {own} here and {purpose}; predefined_set) there'
     assert problems(tmp_path, text, PROFILE) == [
-        at('f.yaml:21: drives.fan.station', 'collides', station=1, other='pump', other_station=5,
-           bus='main', purpose=both)]
-    without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
-    assert problems(tmp_path, without, PROFILE) == []
-
-
-def test_inverters_keep_off_the_predefined_set(tmp_path: Path) -> None:
-    # CANnord address 64: requests on 080h, answers on 081h
-    text = FILE + f"""\
-      fan:
-        bus: main
-        protocol: cannord
-        station: 64
-        profile: {tmp_path}/other.yaml
-        cyclic_response: [speed]
-"""
-    (tmp_path / 'other.yaml').write_text('protocols: [cannord]\nparameters: {speed: {}}\n')
-    both = f'{ONE}, process data to station 64 here and 080h (SYNC; predefined_set) there'
-    assert problems(tmp_path, text, PROFILE) == [
-        at('f.yaml:21: drives.fan.station', 'collides', station=64, other='pump', other_station=5,
-           bus='main', purpose=both)]
+        at('f.yaml:21: drives.fan.station', 'collides', station=station, other='pump',
+           other_station=5, bus='main', purpose=both)]
     without = changed(text, 'station: 5', 'station: 5\n        predefined_set: false')
     assert problems(tmp_path, without, PROFILE) == []
 
@@ -171,9 +156,6 @@ def test_round_that_does_not_fit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('old', 'new', 'problem'), [
     ('station: 5', 'station: 0',
      at('f.yaml:13: drives.pump.station', 'value_out_of_range', value=0, least=1, most=127,
-        remark=' (canopen_pkw)')),
-    ('station: 5', 'station: 128',
-     at('f.yaml:13: drives.pump.station', 'value_out_of_range', value=128, least=1, most=127,
         remark=' (canopen_pkw)')),
     ('period: 0.1', 'period: 0.1\n        request_cob_id: 0x485',
      at('f.yaml:16: drives.pump.request_cob_id', 'identifier_of_node', identifier=0x485,
@@ -278,13 +260,6 @@ def test_raw_names(drive: DriveConfiguration, name: str,
     'x2004.100', 'x2004.1.1', 'xg.1', 'speed', 'p1 ', 'p٣'])
 def test_names_that_are_not_raw(drive: DriveConfiguration, name: str) -> None:
     assert FAMILY.raw_parameter(drive, name) is None
-
-
-def test_station_names_the_frames(drive: DriveConfiguration) -> None:
-    purposes = [claim.purpose for claim in FAMILY.claims(drive)]
-    assert purposes == [
-        '505h (PKW requests to node 5)', '485h (PKW responses of node 5)',
-        '085h (emergency messages of node 5)', '705h (heartbeats of node 5)', '000h (NMT)']
 
 
 @pytest.mark.parametrize('keys, taken', [

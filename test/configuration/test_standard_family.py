@@ -5,14 +5,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 import re
 
-from configuration_builders import at, changed, FILE, load, parts, problems, PROFILE, warnings
+from configuration_builders import at, changed, FILE, load, problems, PROFILE, warnings
 import pytest
 from saying import says
 
 from drive_can_bridge.configuration.checks import bus_shares
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Access, ParameterType
 from drive_can_bridge.protocols.datamodel.family import DataModelStandard
 
 FAMILY = DataModelStandard()
@@ -47,14 +46,6 @@ def drive(tmp_path: Path) -> DriveConfiguration:
 # -- keys -----------------------------------------------------------------------------------------
 
 
-def test_defaults(drive: DriveConfiguration) -> None:
-    assert asdict(drive.options) == {
-        'request_map_base': 122, 'response_map_base': 126, 'parameter_offset': 0,
-        'request_id_base': 0x3F0, 'response_id_base': 0x7F0, 'eeprom_write_gap': 0.02,
-        'quarantine': 0.1, 'length_policy': 'lenient', 'refresh_interval': 0.5,
-        'allow_fast_cycle': False}
-
-
 def test_all_keys(tmp_path: Path) -> None:
     drive = loaded(tmp_path, with_keys(
         'request_id_base: 0x300', 'response_id_base: 896', 'quarantine: 1',
@@ -68,21 +59,6 @@ def test_all_keys(tmp_path: Path) -> None:
         'allow_fast_cycle': True}
     assert isinstance(drive.options.quarantine, float)
     assert isinstance(drive.options.refresh_interval, float)
-
-
-def test_mapping_is_of_another_family(tmp_path: Path) -> None:
-    line, = found(tmp_path, with_keys('mapping: verify'))
-    assert line.startswith('f.yaml:18: drives.conveyor.mapping: ')
-    assert 'datamodel_extended' in line
-    assert 'datamodel_standard' in line
-
-
-@pytest.mark.parametrize('key', ['request_id_base: 0x3F0', 'response_id_base: 0x7F0',
-                                 'quarantine: 0.1', 'refresh_interval: 0.5'])
-def test_keys_of_this_family_are_not_for_29_bits(tmp_path: Path, key: str) -> None:
-    line, = found(tmp_path, with_keys(key, text=FILE))
-    assert line.startswith(f'f.yaml:18: drives.conveyor.{key.split(":")[0]}: ')
-    assert 'datamodel_standard' in line
 
 
 @pytest.mark.parametrize(('key', 'allowed'), [
@@ -188,14 +164,6 @@ def test_the_same_station_with_other_bases_is_another_drive(tmp_path: Path) -> N
     assert found(tmp_path, text) == []
 
 
-def test_the_same_station_on_another_bus(tmp_path: Path) -> None:
-    text = changed(BOTH, '    drives:\n', '      other: {interface: virtual, channel: b}\n'
-                                          '    drives:\n')
-    text = changed(text, '        station: 2', '        station: 1').replace(
-        'lift:\n        bus: main', 'lift:\n        bus: other')
-    assert found(tmp_path, text) == []
-
-
 @pytest.mark.parametrize(('first', 'second'), [('1', '1'), ('15', '15'), ('1', '127')])
 def test_equal_numbers_with_29_and_11_bits_do_not_collide(tmp_path: Path, first: str,
                                                           second: str) -> None:
@@ -286,12 +254,6 @@ def test_reads_of_a_round(tmp_path: Path, response: str, frames: int) -> None:
 # -- lists ----------------------------------------------------------------------------------------
 
 
-def test_eeprom_parameters_are_no_setpoints(tmp_path: Path) -> None:
-    text = changed(MIXED, 'cyclic_request: [speed, limit]', 'cyclic_request: [speed, ramp]')
-    assert found(tmp_path, text) == [
-        at('f.yaml:16: drives.conveyor.cyclic_request', 'kept_in_eeprom', name='ramp')]
-
-
 def test_there_has_to_be_something_to_poll(tmp_path: Path) -> None:
     line = '        cyclic_response: [actual, current, status]\n'
     empty = changed(MIXED, line, '        cyclic_response: []\n')
@@ -317,12 +279,6 @@ def test_more_than_four_of_each(tmp_path: Path) -> None:
     assert len(loaded(tmp_path, text).drives['conveyor'].cyclic_response) == 6
 
 
-def test_write_only_parameters_are_not_polled(tmp_path: Path) -> None:
-    text = changed(MIXED, '[actual, current, status]', '[actual, order]')
-    assert found(tmp_path, text) == [
-        at('f.yaml:17: drives.conveyor.cyclic_response', 'write_only', name='order')]
-
-
 def test_32_bits_do_not_exist(tmp_path: Path) -> None:
     table = changed(TABLE, 'position: {number: 214, type: int16', 'position: {number: 214, '
                                                                   'type: int32')
@@ -345,28 +301,4 @@ def test_load_of_mixed_drives(tmp_path: Path) -> None:
     assert found_shares['lift'] == pytest.approx((2 * 160 / 0.02 + 640) / 125_000)  # 13.3 %
 
 
-def test_overload_of_mixed_drives(tmp_path: Path) -> None:
-    text = changed(MIXED, 'bitrate: 125000', 'bitrate: 50000')
-    assert warnings(tmp_path, text, TABLE) == [
-        at('f.yaml:5: buses.main', 'high_load', load=87.28, bitrate=50000,
-           parts=parts(conveyor=54.0, lift=33.3), most=70.0)]
-    text = changed(MIXED, 'bitrate: 125000', 'bitrate: 40000')
-    assert found(tmp_path, text) == [
-        at('f.yaml:5: buses.main', 'overload', load=109.1, bitrate=40000,
-           parts=parts(conveyor=67.5, lift=41.6), most=100.0)]
-
-
 # -- names ----------------------------------------------------------------------------------------
-
-
-def test_raw_names(drive: DriveConfiguration) -> None:
-    parameter = FAMILY.raw_parameter(drive, 'p30')
-    assert parameter is not None
-    assert (parameter.number, parameter.type, parameter.access) == (
-        30, ParameterType.UINT16, Access.READ_WRITE)
-    assert (parameter.storage, parameter.listed) == (None, False)
-    for name in ('p65536', 'p-1', 'p30.1', 'x1000.1', 'P30', 'speed', ''):
-        assert FAMILY.raw_parameter(drive, name) is None
-    moved = replace(drive, options=replace(drive.options, parameter_offset=-1))
-    assert FAMILY.raw_parameter(moved, 'p0') is None
-    assert FAMILY.raw_parameter(moved, 'p1') is not None

@@ -71,7 +71,11 @@ def test_lines(story: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     ([], ''), (['validat', 'a'], ''), (['--nothing'], ''), (['validate'], ' validate'),
     (['validate', 'a', 'b'], ' validate'), (['validate', '--nothing', 'a'], ' validate'),
     (['validate', 'a', '--a\nb'], ' validate'), (['simulate'], ' simulate'),
-    (['simulate', '--params-file'], ' simulate'), (['profile', 'show'], ' profile show')])
+    (['simulate', '--params-file'], ' simulate'), (['profile', 'show'], ' profile show'),
+    (['monitor', '--namespace', 'no-name'], ' monitor'), (['monitor', 'something'], ' monitor'),
+    (['monitor', '--speed'], ' monitor'), (['panel', '--namespace', 'no-name'], ' panel'),
+    (['panel', '--port', '70000'], ' panel'), (['panel', '--port', 'x'], ' panel'),
+    (['panel', 'something'], ' panel')])
 def test_wrong_usage(arguments: list[str], program: str) -> None:
     done = run(*arguments)
     assert done.returncode == 2
@@ -86,26 +90,6 @@ def test_version_and_help() -> None:
     assert done.returncode == 0
     for name in ('validate', 'simulate', 'demo'):
         assert f'\n  {name} ' in done.stdout
-        help_ = run(name, '--help')
-        assert (help_.returncode, help_.stderr) == (0, '')
-        assert help_.stdout.startswith(f'usage: drive_can {name}')
-
-
-def test_json(tmp_path: Path) -> None:
-    file = write(tmp_path)
-    done = run('validate', str(file), '--json')
-    documents = [json.loads(line) for line in done.stdout.splitlines()]
-    assert (done.returncode, done.stderr) == (0, '')
-    assert [(each['drive'], each['protocol'], each['station']) for each in documents] == [
-        ('conveyor', 'datamodel_extended', 1), ('lift', 'datamodel_extended', 2)]
-    text = file.read_text(encoding='utf-8')
-    file.write_text(text.replace('station: 1', 'station: 1000'), encoding='utf-8')
-    done = run('validate', str(file), '--json')
-    document, = [json.loads(line) for line in done.stdout.splitlines()]
-    assert (done.returncode, done.stderr) == (1, '')
-    line = 1 + text[:text.index('station: 1')].count('\n')
-    assert (document['level'], document['file'], document['line'], document['key']) == (
-        'error', str(file), line, 'drives.conveyor.station')
 
 
 @pytest.mark.parametrize('name', EXAMPLES)
@@ -121,27 +105,6 @@ def test_shipped_examples(name: str) -> None:
     assert [line.split(':')[0] for line in lines] == drives
     for line in lines:
         assert re.fullmatch(LINE, line)
-
-
-def test_problem_in_a_profile(tmp_path: Path) -> None:
-    path = write(tmp_path)
-    table = tmp_path / 'table.yaml'
-    lines = table.read_text(encoding='utf-8').splitlines(keepends=True)
-    place = next(number for number, line in enumerate(lines) if 'int16' in line)
-    lines[place] = lines[place].replace('int16', 'int8')
-    table.write_text(''.join(lines), encoding='utf-8')
-    done = run('validate', str(path))
-    assert done.returncode == 1
-    assert re.match(rf'{re.escape(str(table))}:{place + 1}: parameters\.\w+\.type: ', done.stderr)
-
-
-@pytest.mark.parametrize('content', ['', 'other: {ros__parameters: {x: 1}}'])
-def test_what_is_no_parameter_file(tmp_path: Path, content: str) -> None:
-    path = write(tmp_path, content)
-    done = run('validate', str(path))
-    assert (done.returncode, done.stdout) == (1, '')
-    assert done.stderr
-    assert all(str(path) in line for line in done.stderr.splitlines())
 
 
 @pytest.mark.usefixtures('programs')
