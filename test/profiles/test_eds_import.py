@@ -115,14 +115,6 @@ def bring(folder: Path, old: str = '', new: str = '', name: str = 'small.eds') -
     return bring_in(folder, EDS.replace(old, new, 1) if old else EDS, name)
 
 
-def line_of(text: str, occurrence: int = 1) -> int:
-    """Return the line of a text in the file."""
-    place = -1
-    for _ in range(occurrence):
-        place = EDS.index(text, place + 1)
-    return EDS.count('\n', 0, place) + 1
-
-
 def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     made = bring(tmp_path)
     assert made.profile.description == DRIVE
@@ -212,22 +204,11 @@ def test_an_object_that_stands_twice(tmp_path: Path) -> None:
     assert told(made) == TOLD['twice']
 
 
-@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16', 'cp1252', 'latin-1'])
-def test_encodings(tmp_path: Path, encoding: str) -> None:
-    made = bring_in(tmp_path, EDS.replace('\n', '\r\n').encode(encoding), 'small.eds')
-    assert made.profile.description == DRIVE
-    assert len(made.parameters) == 9
-
-
 @pytest.mark.parametrize('content', ['', 'just text', '[DeviceInfo]\nVendorName=x\n',
                                      '<?xml version="1.0"?>', 'Nr;Name\n1;a\n'])
 def test_no_eds(tmp_path: Path, content: str) -> None:
     with pytest.raises(ImportFailed, match='small.eds: '):
         bring_in(tmp_path, content, 'small.eds')
-
-
-def test_the_same_file_gives_the_same_text(tmp_path: Path) -> None:
-    assert bring(tmp_path).built.text == bring(tmp_path).built.text
 
 
 def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
