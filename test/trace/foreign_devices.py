@@ -115,3 +115,12 @@ def canopen(node: int, *, operational: bool = True, sdo: bool = True) -> Device:
         return Frame(0x580 + node, b'\x43' + frame.data[1:4] + bytes(4), False)
 
     return Device(f'canopen {node}', obeys, answers)
+
+
+#: one of each that there may be on a bus with 11-bit identifiers of inverters
+CROWD = (
+    *(datamodel_extended(station) for station in range(128)),
+    *(datamodel_standard(station) for station in range(16)),
+    *(cannord(address) for address in range(256)),
+    *(canopen(node) for node in range(1, 128)),
+)

@@ -1,8 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Settling open keys: what is concluded from which bytes, and that nothing is guessed."""
 
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 import io
 from itertools import cycle
@@ -10,13 +9,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+from asked_bus import AskedBus, drive_can, takes_nothing
 from builders import parameter
-from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard
+from foreign_devices import CROWD
 import pytest
 from transcripts import replayed, stories
 from world import World
 
-from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.cli.probe import AnotherMaster, Asker
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
@@ -28,7 +27,6 @@ from drive_can_bridge.protocols.scanner import Finding
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.drive import SimulatedDrive
 from drive_can_bridge.simulation.simulation import SIMULATED_DRIVES, Simulation
-from drive_can_bridge.transport.end_point import EndPoint
 
 STORIES = stories(__file__, 'probe.yaml')
 #: what the command says
@@ -46,32 +44,8 @@ SAID = {
 Device = Callable[[Frame], list[Frame]]
 
 
-class Bench(EndPoint):
-    """A bus with one device, and a clock of its own."""
-
-    def __init__(self, device: Device) -> None:
-        super().__init__()
-        self._device = device
-        self.now = 0.0
-        self.sent: list[Frame] = []
-        self.arriving: deque[Frame] = deque()
-
-    def clock(self) -> float:
-        return self.now
-
-    def receive(self, timeout: float) -> Frame | None:
-        if self.arriving:
-            self.now += 0.001
-            return self.arriving.popleft()
-        self.now += max(timeout, 1e-4)
-        return None
-
-    def send(self, frame: Frame, timeout: float) -> None:
-        self.sent.append(frame)
-        self.arriving.extend(self._device(frame))
-
-    def close(self) -> None:
-        pass
+class Bench(AskedBus):
+    """A bus with one device."""
 
     def probe(self, drive: DriveConfiguration) -> dict[str, Finding]:
         asker = Asker(BusConfiguration('main', 'virtual', 'x'), self, [drive], self.clock)
@@ -92,24 +66,6 @@ LIFT = configured('datamodel_standard.yaml', 'lift')
 ELEVEN = configured('datamodel_standard.yaml', 'conveyor')
 
 
-def scripted(answers: Mapping[str, str], request: int, response: int) -> Device:
-    """Answer requests by their bytes, with one answer or several in turn; others get nothing."""
-    table = {bytes.fromhex(key): cycle(map(bytes.fromhex, value.split()))
-             for key, value in answers.items()}
-
-    def device(frame: Frame) -> list[Frame]:
-        if frame.identifier == SDO:
-            return []
-        assert frame.identifier == request
-        if frame.data not in table:
-            return []
-        return [Frame(response, next(table[frame.data]), frame.extended)]
-    return device
-
-
-SDO = 0x605     # of node 5; not every device answers it
-
-
 def values(findings: Mapping[str, Finding]) -> dict[str, Any]:
     return {key: finding.value for key, finding in findings.items()}
 
@@ -122,9 +78,16 @@ def bare(drive: DriveConfiguration) -> DriveConfiguration:
 
 
 
+def limited(drive: DriveConfiguration) -> DriveConfiguration:
+    """Return a drive whose profile limits all values of 32 bits to 1000."""
+    return replace(drive, profile=replace(drive.profile, parameters={
+        name: replace(each, maximum=1000.0) if each.type.bits == 32 else each
+        for name, each in drive.profile.parameters.items()}))
+
+
 #: drives of probe.yaml
 TOLD = {'inverter': bare(INVERTER), 'starter': STARTER, 'axis': AXIS, 'lift': LIFT,
-        'eleven': ELEVEN}
+        'eleven': ELEVEN, 'limited': limited(STARTER)}
 
 
 def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
@@ -139,95 +102,11 @@ def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
     assert list(dict.fromkeys(asked)) == [400, 514, 513, 401, 402, 102, 700]
 
 
-
-@pytest.mark.parametrize(('answers', 'reason'), [
-    ({}, 'no answer to parameter tasks'),
-    # error 0, an unknown number: no byte tells anything
-    ({'0262000000000000': '0272000000000000'}, 'no array read was refused with an error number'),
-    # error 4 in one word, then in the other
-    ({'0262000000000000': '0272000004000000 0272000000000400'},
-     'no array read was refused with an error number'),
-    # error 4 in the low word, and a value in the high one
-    ({'0262000000000000': '0272000000000400', '0212000000000000': '0212000004000000'},
-     'answers contradict each other'),
-    # what is no error number of the manual is not taken for one
-    ({'0262000000000000': '0272000000003412'}, 'no array read was refused'),
-])
-def test_cannord_undecided_order(answers: dict[str, str], reason: str) -> None:
-    found = Bench(scripted(answers, 0x264, 0x265)).probe(bare(INVERTER))
-    assert found['value_order'].value is None
-    assert found['value_order'].reason.startswith(reason)
-
-
-@pytest.mark.parametrize('answers', [
-    {'6660FF0000000000': '6670FF0000000300', '666000FF00000000': '667000FF00000300'},
-    {'6660FF0000000000': '6640FF0000006700', '666000FF00000000': '664000FF00006700'},
-    {'6660FF0000000000': '6670FF0000000300'},
-    {'6660FF0000000000': '6670FF0000000400', '666000FF00000000': '667000FF00000400'},
-])
-def test_cannord_undecided_index(answers: dict[str, str]) -> None:
-    found = Bench(scripted(answers, 0x264, 0x265)).probe(bare(INVERTER))
-    assert found['index_byte'].value is None
-
-
-def test_cannord_a_value_may_change_between_two_reads() -> None:
-    found = Bench(scripted({
-        '6660FF0000000000': '6670FF0000000300', '666000FF00000000':
-        '664000FF00006700 664000FF00006800'}, 0x264, 0x265)).probe(bare(INVERTER))
-    assert found['index_byte'].value == 'low'
-
-
-# reads of 455 and refusals of 9999 as the protocol notes write them down, for node 5
-READS = {
-    'word_le': {
-        'C701002500000000': 'C701002583200000', 'C70100A500000000': 'C70100A583200000',
-        '0F27002500000000': '0F27004E00000206'},
-    'dword_swapped': {
-        '0025C70100000000': '0025C70100008320', '00A5C70100000000': '00A5C70100008320',
-        '00250F2700000000': '004E0F2702060000'},
-    'word_be': {
-        '01C7250000000000': '01C7250020830000', '01C7A50000000000': '01C7A50020830000',
-        '270F250000000000': '270F4E0000000602'},
-}
-
-
-@pytest.mark.parametrize('layout', list(READS))
-def test_pkw_by_the_bytes_of_the_notes(layout: str) -> None:
-    found = Bench(scripted(READS[layout], 0x505, 0x485)).probe(STARTER)
-    assert values(found) == {
-        'layout': layout, 'word_order': None, 'abort_code_order': 'low_first'}
-    assert '06020000h' in found['abort_code_order'].reason
-
-
-def test_pkw_abort_code_the_other_way_round() -> None:
-    answers = {**READS['word_le'], '0F27002500000000': '0F27004E02060000'}
-    found = Bench(scripted(answers, 0x505, 0x485)).probe(STARTER)
-    assert found['abort_code_order'].value == 'high_first'
-
-
-@pytest.mark.parametrize(('refusal', 'reason'), [
-    (None, 'nothing was refused'),
-    ('0F27004E03000000', 'refused without a code'),     # a PROFIBUS device's number
-    ('0F27004E00000000', 'refused without a code'),
-])
-def test_pkw_undecided_abort_code(refusal: str | None, reason: str) -> None:
-    answers = {**READS['word_le'], '0F27002500000000': refusal}
-    found = Bench(scripted({key: value for key, value in answers.items() if value}, 0x505, 0x485),
-                  ).probe(STARTER)
-    assert found['layout'].value == 'word_le'
-    assert found['abort_code_order'].value is None
-    assert found['abort_code_order'].reason.startswith(reason)
-
-
 def test_pkw_an_echo_is_no_proof() -> None:
     # a device of another layout may repeat what starts nothing there
     found = Bench(lambda frame: [Frame(0x485, frame.data, False)] if frame.identifier == 0x505
                   else []).probe(STARTER)
     assert values(found) == {'layout': None, 'word_order': None, 'abort_code_order': None}
-    found = Bench(scripted({
-        'C701002500000000': 'C701002500000000', 'C70100A500000000': 'C70100A500000000'},
-        0x505, 0x485)).probe(STARTER)
-    assert found['layout'].value is None
 
 
 def test_pkw_a_frame_of_another_request_is_no_answer() -> None:
@@ -250,38 +129,6 @@ def test_a_frame_that_is_not_quite_the_answer_is_none(
     assert set(values(found).values()) == {None}
     assert all('no answer' in finding.reason for finding in found.values()
                if 'comes first' not in finding.reason)
-
-
-
-@pytest.mark.parametrize(('currents', 'order'), [
-    (('00008403', '00008503'), 'high_first'),   # 9.00 A, section 8 of the notes
-    (('84030000', '85030000'), 'low_first'),
-    (('00008403', '84030000'), None),
-    (('00008403', '00000000'), None),           # one value might be chance
-    (('84038503', '84038503'), None),
-])
-def test_pkw_word_order(currents: tuple[str, str], order: str | None) -> None:
-    numbers = [each.number for each in STARTER.profile.parameters.values()
-               if each.type.bits == 32][:2]
-    answers = {}
-    for number, current in zip(numbers, currents, strict=True):
-        for function in '26', 'A6':
-            head = f'{(number or 0).to_bytes(2, "little").hex()}00{function}'
-            answers[f'{head}00000000'] = f'{head}{current}'
-    found = Bench(scripted({**READS['word_le'], **answers}, 0x505, 0x485)).probe(STARTER)
-    assert found['word_order'].value == order
-
-
-def test_pkw_limits_of_the_profile_make_one_value_enough() -> None:
-    current = next(each for each in STARTER.profile.parameters.values() if each.type.bits == 32)
-    limited = replace(STARTER, profile=replace(STARTER.profile, parameters={
-        **STARTER.profile.parameters, current.name: replace(current, maximum=1000.0)}))
-    answers = {}
-    for function in '26', 'A6':
-        head = f'{(current.number or 0).to_bytes(2, "little").hex()}00{function}'
-        answers[f'{head}00000000'] = f'{head}01003412'  # 701.96 A, or 3,053,977.61 A
-    found = Bench(scripted({**READS['word_le'], **answers}, 0x505, 0x485)).probe(limited)
-    assert found['word_order'].value == 'high_first'
 
 
 # the maps of the seed's examples, 29 bits, station 1: Reg.122 = 50, Reg.126 = 209, 210
@@ -356,7 +203,7 @@ def test_simulated_inverter(value_order: str, index_byte: str, told: DriveConfig
 
 @pytest.mark.parametrize('abort_code_order', ORDERS)
 @pytest.mark.parametrize('word_order', ORDERS)
-@pytest.mark.parametrize('layout', list(READS))
+@pytest.mark.parametrize('layout', ['word_le', 'dword_swapped', 'word_be'])
 def test_simulated_starter(layout: str, word_order: str, abort_code_order: str) -> None:
     options = {'layout': layout, 'word_order': word_order, 'abort_code_order': abort_code_order}
 
@@ -400,17 +247,21 @@ class Story:
     """Does the steps of a transcript."""
 
     def __init__(self) -> None:
-        self.answers: dict[tuple[int, bytes], list[Frame]] = {}
-        self.device: Device = lambda frame: self.answers.get((frame.identifier, frame.data), [])
+        self.answers: dict[tuple[int, bytes], Iterator[list[Frame]]] = {}
+        self.device: Device = lambda frame: next(
+            self.answers.get((frame.identifier, frame.data), iter(())), [])
 
     def step(self, step: str) -> list[str]:
         first, *words = step.split()
         if first == 'answers':
+            self.answers.clear()
+        if first in ('answers', 'also'):
             self.request, self.response = (int(word, 16) for word in words)
         elif first == 'answer':
-            request, *answers = map(bytes.fromhex, words)
-            self.answers[self.request, request] = [
-                Frame(self.response, data, self.response > 0x7FF) for data in answers]
+            request, *answers = words
+            self.answers[self.request, bytes.fromhex(request)] = cycle([
+                [Frame(self.response, bytes.fromhex(data), self.response > 0x7FF)
+                 for data in turn.split()] for turn in ' '.join(answers).split('|')])
         elif first == 'simulated':
             registers = [word.split('=') for word in words[1:]]
 
@@ -442,14 +293,6 @@ def test_a_node_that_says_nothing_and_one_that_has_nothing() -> None:
 
 
 # -- nobody is moved ------------------------------------------------------------------------------
-
-CROWD = (
-    *(datamodel_extended(station) for station in range(128)),
-    *(datamodel_standard(station) for station in range(16)),
-    *(cannord(address) for address in range(256)),
-    *(canopen(node) for node in range(1, 128)),
-)
-
 
 @pytest.mark.parametrize('drive', [LIFT, ELEVEN, STARTER, INVERTER],
                          ids=lambda each: each.protocol)
@@ -513,22 +356,16 @@ def test_another_master_ends_it(drive: DriveConfiguration, request_frame: Frame)
 
 
 def test_a_bus_that_takes_nothing() -> None:
-    def full(frame: Frame) -> list[Frame]:
-        raise TransportError('send: transmit queue full')
     with pytest.raises(TransportError, match='no other node acknowledges'):
-        Bench(full).probe(LIFT)
+        Bench(takes_nothing).probe(LIFT)
 
 
 def test_a_telegram_time_out_is_told() -> None:
-    answers = {'0112000000000000': '0112000000003200'}      # P513 = 0.5 s
+    question, answer = map(bytes.fromhex, ('0112000000000000', '0112000000003200'))  # 0.5 s
     prober = FAMILIES['cannord'].make_prober(INVERTER)
-    bench = Bench(scripted(answers, 0x264, 0x265))
+    bench = Bench(lambda frame: [Frame(0x265, answer, False)] if frame.data == question else [])
     Asker(BusConfiguration('main', 'virtual', 'x'), bench, [INVERTER], bench.clock).probe(prober)
     assert prober.notes == [SAID['timeout']]
-
-
-def drive_can(*arguments: object) -> int:
-    return front_end.main([str(argument) for argument in arguments])
 
 
 def file_with(tmp_path: Path, name: str, options: str) -> Path:

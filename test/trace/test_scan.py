@@ -1,30 +1,29 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Finding drives: what is found, what is asked, and that nobody is moved by it."""
 
-from collections import deque
 from dataclasses import replace
 import json
 from pathlib import Path
 from random import Random
 
-from foreign_devices import cannord, canopen, datamodel_extended, datamodel_standard, Device
+from asked_bus import AskedBus, drive_can, takes_nothing
+from foreign_devices import (
+    cannord, canopen, CROWD as CROWD_OF_ALL, datamodel_extended, datamodel_standard, Device,
+)
 import pytest
 from test_trace_agrees import running
 from transcripts import replayed, stories
 from world import World
 
-from drive_can_bridge.cli import main as front_end
 from drive_can_bridge.cli.scan import LOAD_MAX, Survey, write_parameter_file
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel.extended import DIR
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.simulation.simulation import Simulation
-from drive_can_bridge.transport.end_point import EndPoint
 
 STORIES = stories(__file__, 'scan.yaml')
 #: what is said of a bus, and of what was asked
@@ -49,36 +48,12 @@ SAID = {
 BITRATE = 125_000
 
 
-class Bench(EndPoint):
-    """A bus with devices that obey, and a clock of its own."""
+class Bench(AskedBus):
+    """A bus with devices that obey."""
 
-    def __init__(self, *devices: Device, deaf: bool = False) -> None:
-        super().__init__()
-        self.devices = devices
-        self.now = 0.0
-        self.sent: list[tuple[float, Frame]] = []
-        self.answers: deque[Frame] = deque()
-        self._deaf = deaf
-
-    def clock(self) -> float:
-        return self.now
-
-    def receive(self, timeout: float) -> Frame | None:
-        if self.answers:
-            self.now += 0.001
-            return self.answers.popleft()
-        self.now += max(timeout, 1e-4)
-        return None
-
-    def send(self, frame: Frame, timeout: float) -> None:
-        if self._deaf:
-            raise TransportError('send: transmit queue full')
-        self.sent.append((self.now, frame))
-        self.answers.extend(answer for device in self.devices
-                            if (answer := device.hear(frame)) is not None)
-
-    def close(self) -> None:
-        pass
+    def __init__(self, *devices: Device) -> None:
+        super().__init__(lambda frame: [answer for device in devices
+                                        if (answer := device.hear(frame)) is not None])
 
     def survey(self) -> Survey:
         return Survey(BusConfiguration('main', 'virtual', 'x', BITRATE), self, self.clock)
@@ -86,13 +61,7 @@ class Bench(EndPoint):
 
 SAFE = [name for name, family in FAMILIES.items() if family.make_scanner().unmistakable]
 NAMED = [name for name in FAMILIES if name not in SAFE]
-CROWD = (
-    *(datamodel_extended(station) for station in range(128)),
-    *(datamodel_standard(station) for station in range(16)),
-    *(cannord(address) for address in range(256)),
-    *(cannord(address, extended=True) for address in range(256)),
-    *(canopen(node) for node in range(1, 128)),
-)
+CROWD = (*CROWD_OF_ALL, *(cannord(address, extended=True) for address in range(256)))
 
 
 def fresh(devices: tuple[Device, ...]) -> tuple[Device, ...]:
@@ -215,7 +184,7 @@ def test_noise_makes_no_drive() -> None:
 def test_one_frame_before_all_stations_are_asked_makes_no_drive() -> None:
     bench = Bench(datamodel_extended(3))
     survey = bench.survey()
-    bench.answers += frame_of(ANSWER_42), frame_of(ANSWER_1)
+    bench.arriving += frame_of(ANSWER_42), frame_of(ANSWER_1)
     survey.listen(0.5)
     survey.ask('datamodel_extended')
     assert [(each.station, each.certainty) for each in survey.sightings] == [
@@ -271,7 +240,7 @@ def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
     sighting, = survey.sightings
     assert sighting == ('cia402', 6, SAID['servo'], Certainty.CERTAIN)
     # what is known is not asked again
-    assert not [frame for _, frame in bench.sent[asked:] if frame.identifier == 0x606 and (
+    assert not [frame for frame in bench.sent[asked:] if frame.identifier == 0x606 and (
         frame.data[1:4].hex() == '001000')]
     assert not survey.master
     assert survey.scanners['cia402'].settings(6) == {'mode': 'pv'}
@@ -303,23 +272,22 @@ def test_a_slow_answer_to_a_question_of_ours_is_one() -> None:
 def test_questions_leave_most_of_the_bus_to_others(protocol: str) -> None:
     bench = Bench()
     bench.survey().ask(protocol)
-    times = [at for at, _ in bench.sent]
-    longest = 160 if bench.sent[0][1].extended else 135     # with an answer each, worst stuffing
-    load = 2 * longest * (len(times) - 1) / BITRATE / (times[-1] - times[0])
+    longest = 160 if bench.sent[0].extended else 135     # with an answer each, worst stuffing
+    load = 2 * longest * (len(bench.sent) - 1) / BITRATE / (bench.times[-1] - bench.times[0])
     assert load < LOAD_MAX * 1.15   # 11 % stuff bits are reckoned with, not the worst case
 
 
 def test_a_master_that_comes_while_asking_ends_it() -> None:
     bench = Bench()
     survey = bench.survey()
-    bench.answers.append(Frame(0x003FFFF0, bytes(8), True))
+    bench.arriving.append(Frame(0x003FFFF0, bytes(8), True))
     survey.ask('datamodel_extended')
     assert survey.master == SAID['requests'].format(1)
     assert len(bench.sent) <= 2
 
 
 def test_a_bus_that_takes_nothing() -> None:
-    survey = Bench(deaf=True).survey()
+    survey = Bench(Device('deaf', lambda frame: False, takes_nothing)).survey()
     survey.ask('datamodel_extended')
     assert survey.trouble == SAID['alone']
 
@@ -328,7 +296,7 @@ def test_a_bus_that_takes_nothing() -> None:
 def test_a_canopen_node_that_boots_ends_asking_by_name(protocol: str) -> None:
     bench = Bench()
     survey = bench.survey()
-    bench.answers.append(Frame(0x704, b'\x00', False))
+    bench.arriving.append(Frame(0x704, b'\x00', False))
     survey.ask(protocol)
     assert survey.nodes == {4: 'heartbeat boot-up'}
     assert len(bench.sent) <= 1
@@ -358,14 +326,10 @@ def test_mailboxes_alone_are_read(mapped: str, identifier: str, read: bool) -> N
     bench = Bench(Device('node 5', lambda frame: False, answers))
     survey = bench.survey()
     survey.ask('canopen_pkw')
-    sent = [frame.data.hex() for _, frame in bench.sent if frame.identifier == 0x505]
+    sent = [frame.data.hex() for frame in bench.sent if frame.identifier == 0x505]
     assert sent == (['c701002500000000', 'c70100a500000000'] if read else [])
     assert ('PKW answers' in survey.nodes[5]) is read
     assert not survey.master
-
-
-def drive_can(*arguments: object) -> int:
-    return front_end.main([str(argument) for argument in arguments])
 
 
 def test_simulated_drives_are_found_and_written(bench: World, tmp_path: Path,

@@ -2,17 +2,16 @@
 """``drive_can record`` and ``drive_can decode``, as a user runs them."""
 
 from collections.abc import Callable, Iterator
-import csv
 import json
 import os
 from pathlib import Path
 
+from asked_bus import drive_can
 from builders import frame
 import pytest
 from transcripts import replayed, shown, stories
 from world import World
 
-from drive_can_bridge.cli import main as front_end
 
 STORIES = stories(__file__, 'commands.yaml')
 FILE = """
@@ -53,10 +52,6 @@ def trace(tmp_path: Path) -> Path:
     return path
 
 
-def drive_can(*arguments: object) -> int:
-    return front_end.main([str(argument) for argument in arguments])
-
-
 @pytest.mark.parametrize('story', STORIES)
 def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
                monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,43 +71,16 @@ def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
             Path(words[0]).symlink_to(words[1])
         elif first == 'files':
             return [' '.join(sorted(os.listdir()))]
+        elif first == 'show':
+            return Path(words[0]).read_text().splitlines()
         elif first == 'unchanged':
             return [str(all(Path(name).read_text() == written[name] for name in words))]
         else:
             code = drive_can(first, *words, '--params-file', file.name)
             out, err = capsys.readouterr()
-            return shown(out.splitlines(), err.splitlines(), code)
+            return shown(out.splitlines(), err.replace(file.parent.name, '…').splitlines(), code)
         return []
     assert replayed(STORIES[story], step) == STORIES[story]
-
-
-def test_summary(file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert drive_can('decode', trace, '--summary', '--json', '--params-file', file) == 0
-    conveyor, main = map(json.loads, capsys.readouterr().out.splitlines())
-    assert {key: conveyor[key] for key in (
-        'drive', 'exchanges', 'missed', 'latency_mean_ms', 'period_max_ms', 'unanswered')} == {
-            'drive': 'conveyor', 'exchanges': 2, 'missed': 1, 'latency_mean_ms': 1.0,
-            'period_max_ms': 160.0, 'unanswered': 1}
-    assert {key: main[key] for key in ('bus', 'frames', 'error_frames', 'foreign_frames')} == {
-        'bus': 'main', 'frames': 8, 'error_frames': 1, 'foreign_frames': 1}
-    # 7 frames of 67 + 64 bits and one of 47 + 8, in 0.2 s of 500 kbit/s, with stuff bits
-    assert main['load_percent'] == round(100 * 1.11 * (7 * 131 + 55) / (0.2 * 500_000), 1)
-    assert drive_can('decode', trace, '--summary', '--params-file', file) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[1].split()[:3] == ['conveyor', '2', '1']
-    assert lines[4].split()[:3] == ['main', '0.200', '8']
-
-
-def test_summary_of_a_bus_that_the_file_does_not_have(
-        file: Path, trace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    trace.write_text(TRACE.replace(' can0 ', ' can7 ') + TRACE.replace(' can0 ', ' main '))
-    assert drive_can('decode', trace, '--summary', '--json', '--params-file', file) == 0
-    *_, main, foreign = map(json.loads, capsys.readouterr().out.splitlines())
-    assert main['bus'] == 'main' and main['load_percent'] > 0
-    assert {key: foreign[key] for key in ('bus', 'load_percent', 'peak_load_percent')} == {
-        'bus': 'can7', 'load_percent': None, 'peak_load_percent': None}
-    assert drive_can('decode', trace, '--summary', '--params-file', file) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split()[::3] == ['can7', '–']
 
 
 def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
@@ -137,17 +105,6 @@ def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
     assert 'conveyor.actual_speed' in picture.read_text()
 
 
-def test_csv(file: Path, trace: Path, tmp_path: Path) -> None:
-    table = tmp_path / 'values.csv'
-    assert drive_can('decode', trace, '--csv', table, '--params-file', file) == 0
-    rows = list(csv.DictReader(table.open()))
-    assert list(rows[0]) == ['time', 'conveyor/speed_setpoint', 'conveyor/torque_limit',
-                             'conveyor/actual_speed', 'conveyor/motor_current',
-                             'conveyor/status_word']
-    assert [row['conveyor/speed_setpoint'] for row in rows] == ['500', '', '500', '', '0', '0']
-    assert list(rows[1].values()) == ['0.001000', '', '', '-150', '0.05', '3']
-
-
 def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
                                   capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('matplotlib')
@@ -155,17 +112,6 @@ def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
     picture.symlink_to('/dev/full')
     assert drive_can('decode', trace, '--params-file', file, '--plot', picture) == 1
     assert capsys.readouterr() == ('', f'drive_can decode: {picture}: No space left on device\n')
-
-
-def test_nothing_is_replaced_for_a_trace_that_cannot_be_read(file: Path, trace: Path,
-                                                             tmp_path: Path) -> None:
-    table = tmp_path / 'values.csv'
-    table.write_text('of yesterday')
-    (tmp_path / 'empty.log').touch()
-    for wrong, code in ((tmp_path / 'absent.log', 1), (trace.with_suffix('.pcap'), 2),
-                        (tmp_path / 'empty.log', 1)):
-        assert drive_can('decode', wrong, '--csv', table, '--params-file', file) == code
-        assert table.read_text() == 'of yesterday'
 
 
 def test_a_format_whose_module_is_not_there(file: Path, trace: Path,
@@ -193,41 +139,6 @@ def test_plot(file: Path, trace: Path, tmp_path: Path,
         assert reason in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(('arguments', 'code', 'line'), [
-    ([], 2, 'drive_can decode: give a trace file, or --live'),
-    (['trace.log', '--live'], 2, 'drive_can decode: give a trace file, or --live'),
-    (['trace.log', '--drive', 'lift'], 2,
-     'drive_can decode: --drive lift: no such drive; drives: conveyor'),
-    (['trace'], 2, 'drive_can decode: trace: no trace format has the suffix (none); known are '
-     '.asc, .blf, .candump, .csv, .db, .log, .mf4, .trc, .txt, and .gz behind those of text'),
-    (['absent.log'], 1, 'drive_can decode: absent.log: No such file or directory'),
-    (['empty.log'], 1, 'empty.log: there is no frame in it'),
-    (['empty.log', '--summary'], 1, 'empty.log: there is no frame in it'),
-])
-def test_wrong_usage(file: Path, trace: Path, monkeypatch: pytest.MonkeyPatch,
-                     capsys: pytest.CaptureFixture[str], arguments: list[str], code: int,
-                     line: str) -> None:
-    monkeypatch.chdir(trace.parent)
-    Path('empty.log').write_text('')
-    assert drive_can('decode', *arguments, '--params-file', file) == code
-    assert capsys.readouterr() == ('', f'{line}\n')
-
-
-@pytest.mark.parametrize('option', ['', '--summary', '--csv', '--plot'])
-def test_buses_are_not_mixed(file: Path, trace: Path, capsys: pytest.CaptureFixture[str],
-                             option: str) -> None:
-    """Nothing is written where nobody knows which of two channels is the bus."""
-    trace.write_text(TRACE + TRACE.replace(' can0 ', ' can1 '))
-    output = trace.with_name('values.png')
-    words = [option, output] if option in ('--csv', '--plot') else [option] if option else []
-    assert drive_can('decode', trace, '--params-file', file, *words) == 1
-    told = capsys.readouterr()
-    assert not told.out and not output.exists()
-    assert told.err == (
-        'drive_can decode: the trace has the channels can0, can1; which of them is bus main of '
-        f'the parameter file? Name it there: buses.main.channel (now trace_{trace.parent.name})\n')
-
-
 def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     """Names of channels come from whoever made the trace."""
@@ -238,22 +149,6 @@ def test_a_trace_does_not_write_on_the_terminal(file: Path, trace: Path,
     *when, channel, shown = line.split()
     assert (when, shown) == (['0.300000', '+0.000'], '123#00') and len(line) < 300
     assert channel.startswith('ma\\x1b[31minnn') and channel.endswith('n…')
-
-
-def test_a_clock_that_was_set_back(file: Path, trace: Path,
-                                   capsys: pytest.CaptureFixture[str]) -> None:
-    """Time goes on: no answer comes before its question, and what is missing is still missed."""
-    trace.write_text("""(1700000000.000000) can0 003FFFF0#138803E800000000 T
-(1699996400.500000) can0 103FFFF0#FA24000500030000 R
-(1699996400.520000) can0 003FFFF0#138803E800000000 T
-(1699996400.521000) can0 103FFFF0#FA24000500030000 R
-(1699996400.540000) can0 123#00 R
-(1699996400.539999) can0 003FFFF0#138803E800000000 T
-(1699996400.600000) can0 123#00 R
-""")
-    assert drive_can('decode', trace, '--params-file', file, '--summary', '--json') == 0
-    summary = json.loads(capsys.readouterr().out.splitlines()[0])
-    assert (summary['exchanges'], summary['latency_max_ms']) == (2, 1.0)
 
 
 @pytest.fixture

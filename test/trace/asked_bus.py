@@ -1,0 +1,56 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A bus that is asked, by a scan or for the keys of a drive, and its own time."""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+
+from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.core.errors import TransportError
+from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.transport.end_point import EndPoint
+
+
+class AskedBus(EndPoint):
+    """
+    A bus with devices that answer at once, and a clock of its own.
+
+    :param device: says what is answered to a frame.
+    :ivar sent: what was sent, :ivar times: and when.
+    :ivar arriving: what is heard next.
+    """
+
+    def __init__(self, device: Callable[[Frame], Iterable[Frame]]) -> None:
+        super().__init__()
+        self._device = device
+        self.now = 0.0
+        self.sent: list[Frame] = []
+        self.times: list[float] = []
+        self.arriving: deque[Frame] = deque()
+
+    def clock(self) -> float:
+        return self.now
+
+    def receive(self, timeout: float) -> Frame | None:
+        if self.arriving:
+            self.now += 0.001
+            return self.arriving.popleft()
+        self.now += max(timeout, 1e-4)
+        return None
+
+    def send(self, frame: Frame, timeout: float) -> None:
+        self.sent.append(frame)
+        self.times.append(self.now)
+        self.arriving.extend(self._device(frame))
+
+    def close(self) -> None:
+        pass
+
+
+def takes_nothing(frame: Frame) -> list[Frame]:
+    """Fail, as a bus on which nobody acknowledges."""
+    raise TransportError('send: transmit queue full')
+
+
+def drive_can(*arguments: object) -> int:
+    """Do what a user types."""
+    return front_end.main([str(argument) for argument in arguments])
