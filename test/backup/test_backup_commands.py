@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can backup``, ``restore`` and ``compare`` as a user types them, directly on a bus."""
 
-import os
 from pathlib import Path
 
 from backup_builders import BY_HAND, Command, Shop
@@ -59,32 +58,10 @@ class TestOneDriveOfEachFamily:
         assert head.identity == said.documents[3]['identity']
 
 
-class TestBackup:
-
-    @pytest.mark.parametrize(('output', 'error'), [
-        ('nowhere/b.yaml', 'nowhere: no such directory'),
-        ('/proc/b.yaml', '/proc/b.yaml: '), ('/dev/full', '/dev/full: No space left on device'),
-    ])
-    def test_a_place_that_takes_nothing(self, shop: Shop, command: Command, output: str,
-                                        error: str) -> None:
-        said = command('backup', 'conveyor', '-o', output)
-        assert said.code == 1
-        assert len(said.errors) == 1
-        assert error in said.errors[0]
-        assert os.listdir() == ['all_families.yaml']
-
-    @pytest.mark.parametrize(('words', 'error'), [
-        (['-o', 'b.yaml'], "which drive? '*' means all; there are: conveyor, lift, mixer, pump"),
-        (['conveyor', 'lift', '-o', 'b.yaml'],
-         '2 drives (conveyor, lift) do not go into one file: write -o b.yaml/'),
-        (['conv', '-o', 'b.yaml'], "no drive 'conv'; there are: conveyor, lift, mixer, pump"),
-    ])
-    def test_wrong_usage(self, shop: Shop, command: Command, words: list[str],
-                         error: str) -> None:
-        said = command('backup', *words)
-        assert said.code == 2
-        assert error in said.errors[0]
-        assert all(drive.requests == 0 for drive in shop.drives.values())
+def test_a_place_where_no_file_can_be_made(shop: Shop, command: Command) -> None:
+    said = command('backup', 'conveyor', '-o', '/proc/b.yaml')
+    assert (said.code, len(said.errors)) == (1, 1)
+    assert '/proc/b.yaml: ' in said.errors[0]   # why depends on who runs it
 
 
 class TestRestore:
@@ -103,42 +80,3 @@ class TestRestore:
         assert [line for line in said.errors if 'loses power' in line] == told
         shop.drives['mixer'].fault('restart=0')
         assert shop.values('mixer', 'acceleration_time') == (1.0 if told else 5.0,)
-
-    @pytest.mark.parametrize(('words', 'code', 'error'), [
-        (['b.yaml'], 1, 'b.yaml: No such file or directory'),
-        (['all_families.yaml'], 1, 'all_families.yaml: is a parameter file of a bridge'),
-        (['crane.yaml'], 2, 'crane.yaml is of drive crane, which is not here: say which one is '
-                            'meant; there are: conveyor, lift, mixer, pump'),
-        (['crane.yaml', 'c*', 'x'], 2, 'allowed is FILE [DRIVE]'),
-        (['crane.yaml', '*'], 2, "'*' names several drives: conveyor, lift, mixer, pump"),
-    ])
-    def test_wrong_usage(self, shop: Shop, command: Command, words: list[str], code: int,
-                         error: str) -> None:
-        shop.write_backup('crane', ramp_time=5.0)
-        said = command('restore', *words, '--yes')
-        assert said.code == code
-        assert error in said.errors[0]
-        assert all(drive.requests == 0 for drive in shop.drives.values())
-
-
-class TestCompare:
-
-    @pytest.mark.parametrize(('words', 'error'), [
-        (['a.yaml', 'b.yaml'], 'a.yaml: No such file or directory'),
-        (['conveyor'], 'allowed are two, A and B'),
-        (['conveyor', 'crane'], "no drive 'crane'"),
-        (['conveyor', 'wrong.yaml'], 'wrong.yaml:3: ramp_time: wrong type: true is a bool'),
-    ])
-    def test_trouble(self, shop: Shop, command: Command, words: list[str], error: str) -> None:
-        shop.write_backup('wrong', ramp_time=True)
-        said = command('compare', *words)
-        assert said.code == 2
-        assert error in said.errors[0]
-
-    def test_two_drives(self, shop: Shop, command: Command) -> None:
-        said = command('compare', 'conveyor', 'lift', '--json')
-        assert said.code == 1
-        found = {each['parameter']: each for each in said.documents}
-        assert 'ramp_time' not in found
-        assert found['torque_limit'] == {
-            'parameter': 'torque_limit', 'unit': '%', 'a': None, 'b': 100.0}

@@ -41,13 +41,14 @@ class Story:
         self.shop.drives[name].fault(fault)
 
     def _set(self, name: str, register: str, value: str) -> None:
-        self.shop.drives[name].set_value(register, int(value))
+        self.shop.drives[name].set_value(register, int(value, 0))
 
     def _values(self, name: str, *registers: str) -> str:
         return ' '.join(map(str, self.shop.values(name, *registers)))
 
-    def _requests(self, name: str) -> int:
-        return self.shop.drives[name].requests
+    def _requests(self, *names: str) -> int:
+        """Return how often drives were asked; without a name: all of them."""
+        return sum(self.shop.drives[name].requests for name in names or self.shop.drives)
 
     def _writes(self, name: str) -> int:
         """Return how often cells of the EEPROM were written."""

@@ -10,7 +10,7 @@ import waiting
 
 from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.backup.restore import (
-    LeftAlone, names_to_read, plan_restore, problems_in, RestorePlan, strangers,
+    names_to_read, plan_restore, problems_in, RestorePlan, strangers,
 )
 from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive
@@ -44,14 +44,6 @@ def restored(drive: Drive, file: Path, *, stopped: Callable[[], bool] = lambda: 
 
 class TestSettings:
 
-    def test_only_what_differs_is_written(self, shop: Shop) -> None:
-        file = shop.write_backup('conveyor', ramp_time=1.0, maximum_speed=3000.0, rated_current=5)
-        with shop.reached('conveyor') as drive:
-            result = restored(drive, file)
-        assert (result.complete, result.written) == (True, ['rated_current'])
-        assert shop.drives['conveyor'].wear == {'rated_current': 1}
-        assert shop.values('conveyor', 'rated_current') == (5.0,)
-
     @pytest.mark.parametrize(('name', 'first', 'second', 'value'), [
         ('mixer', 'acceleration_time', 'torque_current_limit', 12),
         ('pump', 'motor_trip_class', 'network_fallback', 10),
@@ -68,41 +60,6 @@ class TestSettings:
             result = restored(drive, file)
         assert (result.complete, result.written) == (True, [second, first])
         assert shop.values(name, first, second) == (value, value)
-
-    def test_refused_one_is_listed_and_keeps_nobody_from_being_written(self, shop: Shop) -> None:
-        shop.drives['mixer'].fault('refuse=acceleration_time')
-        file = shop.write_backup('mixer', acceleration_time=5.0, deceleration_time=6.0)
-        with shop.reached('mixer') as drive:
-            result = restored(drive, file)
-        assert not result.complete
-        assert result.written == ['deceleration_time']
-        wrong, = result.wrong
-        assert (wrong.name, wrong.wanted, wrong.found) == ('acceleration_time', 5.0, 1.0)
-        assert 'refused' in wrong.reason
-
-    def test_what_is_not_taken_in_silence_is_listed(self, shop: Shop) -> None:
-        shop.drives['pump'].set_value('general_configuration', 0)
-        shop.drives['pump'].fault('stuck=network_fallback')     # acknowledged, and nothing happens
-        file = shop.write_backup('pump', network_fallback=3, flc2_ratio=40)
-        with shop.reached('pump') as drive:
-            result = restored(drive, file)
-        assert [(each.name, each.found, each.reason) for each in result.wrong] == [
-            ('network_fallback', 0, '')]
-        assert result.written == ['flc2_ratio', 'network_fallback']
-
-    def test_protected_and_cyclic_ones_are_left_alone(self, shop: Shop) -> None:
-        file = shop.write_backup('mixer', can_address=7, acceleration_time=2.0)
-        with shop.reached('mixer') as drive:
-            plan = planned(drive, file)
-            assert [(each.name, each.left_alone) for each in plan.kept] == [
-                ('can_address', LeftAlone.PROTECTED)]
-            assert restored(drive, file).written == ['acceleration_time']
-            result = restored(drive, file, include_protected=True)
-        assert (result.complete, result.written) == (True, ['can_address'])
-        assert shop.values('mixer', 'can_address') == (7,)
-        file = shop.write_backup('conveyor', torque_limit=50.0)
-        with shop.reached('conveyor') as drive:
-            assert planned(drive, file).words == {}
 
     def test_maps_are_restored_directly(self, shop: Shop) -> None:
         shop.drives['conveyor'].set_value('p126', 210)
@@ -139,59 +96,6 @@ class TestMode:
         assert (result.complete, result.written) == (True, ['flc1_ratio', 'general_configuration'])
         assert self.mode(shop) == 0x0020
         assert shop.drives['pump'].wear['general_configuration'] == 2
-
-    def test_nothing_to_restore_is_no_reason_for_a_mode(self, shop: Shop) -> None:
-        file = shop.write_backup('pump', general_configuration=0x0011, flc1_ratio=33.0)
-        with shop.reached('pump') as drive:
-            assert planned(drive, file).changes == ()
-
-    @pytest.mark.parametrize(('found', 'values', 'told', 'end'), [
-        (0x0011, {'general_configuration': 0x0010}, '', 0x0010),
-        (0x0011, {'general_configuration': 0x0011}, 'becomes 16: the mode', 0x0010),
-        (0x0011, {'general_configuration': 0x0021}, 'becomes 32: the mode', 0x0020),
-        (0x0011, {}, 'becomes 16: the mode', 0x0010),       # whatever is in the file
-    ])
-    def test_a_drive_that_was_left_in_it_is_taken_out(
-            self, shop: Shop, found: int, values: dict[str, object], told: str, end: int) -> None:
-        pump = shop.drives['pump']
-        pump.set_value('general_configuration', found)
-        file = shop.write_backup('pump', flc1_ratio=33.0, **values)
-        with shop.reached('pump') as drive:
-            change, = planned(drive, file).changes
-            assert (change.name, change.found) == ('general_configuration', found)
-            assert change.wanted == values.get('general_configuration')
-            assert change.note.startswith(told) and bool(change.note) == bool(told)
-            result = restored(drive, file)
-            assert planned(drive, file).changes == ()
-        assert (result.complete, result.written) == (True, ['general_configuration'])
-        assert self.mode(shop) == end
-        assert pump.wear == {'general_configuration': 1}
-
-    def test_that_does_not_end_is_told(self, shop: Shop) -> None:
-        shop.drives['pump'].set_value('general_configuration', 0x0011)
-        shop.drives['pump'].fault('stuck=general_configuration')
-        file = shop.write_backup('pump', flc1_ratio=33.0)
-        with shop.reached('pump') as drive:
-            wrong, = restored(drive, file).wrong
-        assert (wrong.name, wrong.wanted, wrong.found) == ('general_configuration', 0x10, 0x11)
-
-    def test_in_a_file_it_is_left_alone_and_not_as_in_the_file(self, shop: Shop) -> None:
-        file = shop.write_backup('pump', general_configuration=0x0011, flc1_ratio=33.0)
-        with shop.reached('pump') as drive:
-            plan = planned(drive, file)
-        assert [(each.name, each.left_alone) for each in plan.kept] == [
-            ('general_configuration', LeftAlone.MODE)]
-        assert plan.same == ('flc1_ratio',)
-
-    def test_that_is_refused(self, shop: Shop) -> None:
-        shop.drives['pump'].fault('refuse=general_configuration')
-        file = shop.write_backup('pump', flc1_ratio=50.0)
-        with shop.reached('pump') as drive:
-            result = restored(drive, file)
-        assert 'general_configuration: ' in result.steps[0]
-        assert [each.name for each in result.wrong] == ['flc1_ratio']
-        assert result.written == []
-        assert shop.drives['pump'].wear == {}
 
     @pytest.mark.parametrize('after', [0, 1, 2])
     def test_interrupted(self, shop: Shop, after: int) -> None:
@@ -293,25 +197,6 @@ class TestMode:
 
 
 class TestFile:
-
-    @pytest.mark.parametrize(('values', 'problem'), [
-        ({'rampe': 1.0}, 'conveyor.yaml:3: rampe: unknown parameter rampe, did you mean '
-                         'ramp_time?'),
-        ({'actual_speed': 1.0}, 'conveyor.yaml:3: actual_speed: read-only'),
-        ({'ramp_time': True}, 'conveyor.yaml:3: ramp_time: wrong type: bool, expected double'),
-        ({'ramp_time': 61.0}, 'conveyor.yaml:3: ramp_time: 61 is out of range: 0.01 to 60 s'),
-        ({'torque_limit': True}, 'conveyor.yaml:3: torque_limit: wrong type: true is a bool, '
-                                 'allowed is a number'),
-        ({'torque_limit': 1e9}, ''),    # whatever it is, it is not written
-    ])
-    def test_what_is_wrong_is_found_before_anything_is_asked(
-            self, shop: Shop, values: dict[str, object], problem: str) -> None:
-        file = shop.write_backup('conveyor', **values)
-        with shop.reached('conveyor') as drive:
-            before = shop.drives['conveyor'].requests
-            found = problems_in(read_backup(file), drive)
-            assert shop.drives['conveyor'].requests == before
-        assert found == ([f'{shop.folder}/{problem}'] if problem else [])
 
     def test_of_another_drive(self, shop: Shop) -> None:
         with shop.reached('pump') as drive:
