@@ -17,7 +17,7 @@ from waiting import wait_for
 from world import World, world
 
 from drive_can_bridge.cli import monitor as command
-from drive_can_bridge.cli.main import main, understood
+from drive_can_bridge.cli.main import understood
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 
@@ -213,15 +213,6 @@ def test_a_drive_whose_bridge_says_nothing_is_noticed(tmp_path: Path) -> None:
         for source in sources:
             source.close()
         silent.close()
-
-
-@pytest.mark.parametrize('arguments', [['--namespace', 'no-name'], ['something'], ['--speed']])
-def test_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ending:
-        main(['monitor', *arguments])
-    assert ending.value.code == 2
-    line, = capsys.readouterr().err.splitlines()
-    assert line.startswith('drive_can monitor: ')
 
 
 def test_without_ros_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from transcripts import replayed, stories
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Status
 from drive_can_bridge.monitor.summary import (
-    counts, counts_in_words, in_order, silence, Tone, tone_of, troubles,
+    counts_in_words, in_order, silence, Tone, tone_of, troubles,
 )
 
 STORIES = stories(__file__, 'summary.yaml')
@@ -35,20 +35,6 @@ def test_many_are_sorted_and_few_are_not() -> None:
         3, 8, 13, 14, 1, 4, 6, 7, 2, 5, 0, 9, 10, 11, 12)]
     assert [drive.label for drive in in_order(seen(three_drives()).drives)] == [
         'conveyor', 'lift', 'turntable']
-
-
-def test_counts() -> None:
-    drives = seen(fifteen_drives()).drives
-    assert counts(drives) == [
-        (Tone.ERROR, 'fault', 1), (Tone.ERROR, 'offline', 3), (Tone.WARN, 'not armed', 4),
-        (Tone.OFF, 'disabled', 2), (Tone.OK, 'online', 5)]
-
-
-def test_of_a_silent_bridge_drives_tell_nothing() -> None:
-    snapshot = three_drives().look(NOW + 7.0, AT)
-    assert silence(seen(three_drives()), str) == []
-    assert troubles(snapshot) == []
-    assert {tone_of(drive) for drive in snapshot.drives} == {Tone.UNKNOWN}
 
 
 def alike(text: str, *others: Status) -> Model:

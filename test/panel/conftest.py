@@ -3,7 +3,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from panel_builders import Run, Site
 import pytest
@@ -11,6 +11,7 @@ from running import Running
 
 if TYPE_CHECKING:
     from panel_bench import House
+    from panel_somebody import Somebody
 
 
 @pytest.fixture(scope='module')
@@ -21,6 +22,26 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator['House']:
     import panel_bench
     with panel_bench.house(tmp_path_factory.mktemp('house')) as made:
         yield made
+
+
+@pytest.fixture
+def page() -> Iterator[Any]:
+    """Return a page, with nobody who looks at it."""
+    from nicegui.client import Client
+    from nicegui.page import page as kind
+    client = Client(kind(''))
+    with client:
+        yield client
+    client.delete()
+
+
+@pytest.fixture
+def somebody(site: Site) -> Iterator['Somebody']:
+    """Return somebody else, who enables drives and moves them."""
+    from panel_somebody import Somebody
+    other = Somebody()
+    yield other
+    other.close()
 
 
 @pytest.fixture(scope='module')

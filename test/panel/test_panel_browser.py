@@ -39,14 +39,6 @@ def phone(tmp_path: Path) -> Iterator[Browser]:
     assert opened.complaints == []
 
 
-@pytest.fixture
-def somebody(site: Site) -> Iterator[Somebody]:
-    """Return somebody else who moves drives."""
-    other = Somebody()
-    yield other
-    other.close()
-
-
 @pytest.mark.alone
 def test_the_page_is_live_within_two_seconds_and_values_move(
         site: Site, browser: Browser, somebody: Somebody) -> None:
@@ -142,13 +134,6 @@ def test_a_viewer_sees_no_buttons_and_no_fields(site: Site, browser: Browser) ->
         return fetch('/do/quick_stop', {method: 'POST', body: '{"drive": "/lift"}',
             headers: {'Content-Type': 'application/json'}}).then((answer) => answer.json())""")
     assert said['success'] is False
-
-
-def test_without_token_a_page_says_what_to_do(site: Site, browser: Browser) -> None:
-    browser.expected = ' 401 '
-    browser.open(f'http://{site.host}/')
-    browser.shows('open the address that drive_can panel has printed')
-    assert browser.find_all('button') == []
 
 
 def test_two_browsers_see_the_same(site: Site, browser: Browser, phone: Browser,

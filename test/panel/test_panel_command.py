@@ -18,7 +18,7 @@ import pytest
 from world import world
 
 from drive_can_bridge.cli import panel as command
-from drive_can_bridge.cli.main import main, understood
+from drive_can_bridge.cli.main import understood
 from drive_can_bridge.core.errors import DriveCanError
 
 pytest.importorskip('rclpy')
@@ -29,16 +29,6 @@ def serve(*words: str, ended: Callable[[], bool] = lambda: False) -> bool:
     _, args = understood(['panel', *words])
     args.clock = REAL
     return command._serve(args, ended)
-
-
-@pytest.mark.parametrize('arguments', [
-    ['--port', '70000'], ['--port', 'x'], ['--namespace', 'no-name'], ['something']])
-def test_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ending:
-        main(['panel', *arguments])
-    assert ending.value.code == 2
-    line, = capsys.readouterr().err.splitlines()
-    assert line.startswith('drive_can panel: ')
 
 
 @pytest.mark.parametrize(('missing', 'by', 'words'), [

@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What the overview shows of many drives, of few, and of those of a silent bridge."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -20,17 +19,6 @@ STATES = {
     'offline': (Level.STALE, 'not seen since start'),
     'not armed': (Level.WARN, 'not armed: publish 0 to /{}/command/speed')}
 HIDDEN = 'hidden-now'
-
-
-@pytest.fixture
-def page() -> Iterator[Any]:
-    """Return a page, with nobody who looks at it."""
-    from nicegui.client import Client
-    from nicegui.page import page as kind
-    client = Client(kind(''))
-    with client:
-        yield client
-    client.delete()
 
 
 def seen(*states: str, silent: bool = False) -> Snapshot:

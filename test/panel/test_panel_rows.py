@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Rows of parameters: what they show, and what becomes of names that mean no good."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -13,17 +12,6 @@ from drive_can_bridge.monitor.values import ParameterInfo
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
 RAMP = ParameterInfo('ramp_time', ValueKind.DOUBLE, facts={'unit': 's', 'scale': '0.01'})
-
-
-@pytest.fixture
-def page() -> Iterator[object]:
-    """Return a page, with nobody who looks at it."""
-    from nicegui.client import Client
-    from nicegui.page import page as kind
-    client = Client(kind(''))
-    with client:
-        yield client
-    client.delete()
 
 
 def drive(text: str, name: str = RAMP.name) -> DriveSnapshot:

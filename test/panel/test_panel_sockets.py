@@ -26,17 +26,6 @@ def goes_on(site: Site) -> Iterator[None]:
     site.check_alive()
 
 
-def test_a_websocket_with_the_cookie_is_let_in(site: Site) -> None:
-    with socket.create_connection(('127.0.0.1', site.port), timeout=10.0) as connection:
-        connection.sendall((
-            'GET /_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1\r\n'
-            f'Host: {site.host}\r\nOrigin: http://{site.host}\r\nConnection: Upgrade\r\n'
-            'Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n'
-            'Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n'
-            f'Cookie: {site.cookie("viewer")["Cookie"]}\r\n\r\n').encode())
-        assert connection.recv(4096).startswith(b'HTTP/1.1 101 ')
-
-
 def test_a_body_without_end_is_not_taken(site: Site) -> None:
     with socket.create_connection(('127.0.0.1', site.port), timeout=30.0) as connection:
         connection.sendall((

@@ -2,7 +2,7 @@
 """What a drive without a quick stop is offered, and what becomes of it when all are stopped."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 import html
@@ -25,14 +25,6 @@ if TYPE_CHECKING:
 
 pytest.importorskip('rclpy')
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
-
-
-@pytest.fixture
-def somebody(site: Site) -> Iterator[Somebody]:
-    """Return somebody else who enables drives."""
-    other = Somebody()
-    yield other
-    other.close()
 
 
 def offered(house: 'House', page: str, drive: str) -> set[str]:
