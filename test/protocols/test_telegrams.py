@@ -10,6 +10,7 @@ which has to be seen.
 
 import ast
 from collections.abc import Callable, Iterator
+from functools import partial
 import json
 from pathlib import Path
 import re
@@ -262,20 +263,31 @@ def check_extended(module: Any) -> None:
              'acyclic_write': module.Write, 'read_request': module.ReadRequest,
              'read_response': module.ReadResponse}
     for row in DATAMODEL['vectors']:
-        if row['protocol'] != 'extended' or row['is_remote_frame'] or row['use'] == 'encode':
+        fields = row['fields']
+        if row['protocol'] != 'extended' or row['is_remote_frame']:
+            continue
+        if row['use'] == 'encode':
+            station, number, count = (fields.get(name, usual) for name, usual in (
+                ('station', 1), ('param', 30), ('count', 1)))
+            assert rejects(module.encode_write, station, number, [fields.get('value', 0)] * count)
+            assert 'value' in fields or rejects(
+                module.encode_read_request, station, number, count)
             continue
         made = Frame(int(row['can_id_hex'], 16), octets(row), row['is_extended_id'])
-        fields = row['fields']
-        if row['expect'] != 'ok':
-            assert rejects(lambda made=made: module.decode(made, strict=True))
+        count = len(effective(fields['mapping'])) if 'mapping' in fields else 4
+        lenient, strict = (partial(module.decode, made, count=count, strict=each)
+                           for each in (False, True))
+        assert rejects(lenient) is (row['expect'] == 'reject')
+        assert rejects(strict) is (row['expect'] != 'ok')
+        if rejects(lenient):
             continue
         words, station, number = tuple(row['words_u16']), fields['station'], fields['param']
         kind = kinds[row['kind']]
-        count = len(effective(fields['mapping'])) if 'mapping' in fields else 4
+        telegram = kind(words) if row['kind'].startswith('cyclic') else kind(
+            number, fields['count'] if row['kind'] == 'read_request' else words)
         assert module.station_of(made.identifier) == station
-        assert module.decode(made, count=count) == (
-            kind(words) if row['kind'].startswith('cyclic') else kind(
-                number, fields['count'] if row['kind'] == 'read_request' else words))
+        assert lenient() == telegram
+        assert row['expect'] != 'ok' or strict() == telegram
         if row['use'] == 'both':
             request = module.encode_read_request(station, number, fields['count']) if (
                 row['kind'].startswith('read')) else module.encode_write(
@@ -289,9 +301,8 @@ def check_extended(module: Any) -> None:
     assert masks == {
         'DIR': module.DIR, 'STATION': module.STATION_MASK, 'BIT20': module.W,
         'PARAM': module.PARAMETER_MASK, 'COUNT': module.COUNT_MASK, 'CYCLIC_LOW': module.CYCLIC}
-    assert rejects(module.encode_read_request, 128, 1, 1)
-    assert rejects(module.encode_read_request, 1, 1, 5)
     assert rejects(module.encode_write, 1, 0xFFFF, (1,))
+    assert rejects(module.encode_write, 1, -1, (1,))
     assert not rejects(module.encode_read_request, 127, 0xFFFF, 1)
 
 
@@ -300,15 +311,27 @@ def check_standard(module: Any) -> None:
     assert module.RESPONSE_ID_BASE == DATAMODEL['defaults']['std_tx_base']
     for row in DATAMODEL['vectors']:
         fields = row['fields']
-        if row['protocol'] != 'standard' or row['use'] == 'config':
+        if row['protocol'] != 'standard':
+            continue
+        if row['name'] == 'std-addr16':
+            assert rejects(module.identifier, fields['tx_base'], fields['address'])
+            continue
+        if row['name'] == 'std-collision':
+            first, second = fields['stations']
+            assert module.identifier(fields['tx_base'], first) == module.identifier(
+                fields['rx_base'], second) == int(row['can_id_hex'], 16)
             continue
         made = Frame(int(row['can_id_hex'], 16), octets(row), False)
         if row['expect'] != 'ok':
             assert rejects(module.decode_request, made)
             continue
         words = tuple(row['words_u16'])
+        base = fields['tx_base' if row['kind'] == 'std_read_response' else 'rx_base']
+        assert module.identifier(base, fields['address']) == made.identifier
         if row['kind'] == 'std_read_response':
-            assert module.decode_read_response(made, fields['expected_count']) == words
+            for strict in (False, True):
+                assert module.decode_read_response(
+                    made, fields['expected_count'], strict=strict) == words
             again = module.encode_read_response(made.identifier, words)
         elif row['kind'] == 'std_write':
             assert module.decode_request(made) == extended.Write(fields['pnu'], words)
