@@ -3,27 +3,13 @@
 A process that stands still for a moment: answers wait in buffers until somebody takes them.
 
 The silence after an unanswered read is worth nothing when nobody listened to it. The timer thread
-may be the first to go on; what the reader thread finds then is from before.
+may be the first to go on; what the reader thread finds then is from before. By chance:
+``test_standard_late.py``.
 """
 
-import heapq
-import random
-
-from builders import Conversation, drive, frame, GAIN, read
+from builders import Conversation, frame, GAIN, read
 import pytest
 from standard_builders import ANSWER, ASK, online, polling
-from test_standard_late import ASKED, LateDrive, POLLED
-
-from drive_can_bridge.core.events import ProcessDataReceived, RequestCompleted
-from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import ReadRequest, ReadValue
-
-
-class SlowDrive(LateDrive):
-    """Answers late or not at all, but never twice."""
-
-    def latenesses(self) -> list[float]:
-        return super().latenesses()[:1]
 
 
 def test_an_answer_from_before_the_question_is_none() -> None:
@@ -104,56 +90,3 @@ def test_setpoints_do_not_wait_for_that() -> None:
     talk.until(10.15)
     talk.commands(0, 150.0, 10.4)
     assert talk.at(10.42) == ['3F1#063200DC05000000']
-
-
-@pytest.mark.parametrize('seed', [1, 2])
-def test_no_answer_is_taken_for_another_by_somebody_who_stumbles(seed: int) -> None:
-    """As in the run without stalls; here a tenth of all timers come up to 0.4 s too late."""
-    chance = random.Random(seed)
-    partner = SlowDrive(chance)
-    session = Conversation(drive(
-        'datamodel_standard', table=(*POLLED, *ASKED), request=(), response=POLLED,
-        parameter_retries=1)).session
-    now = 10.0
-    session.bus_up(now)
-    session.activate(now)
-    samples = good = open_requests = 0
-    while partner.reads < 3000:
-        due = session.next_timer()
-        stalled = chance.random() < 0.1
-        if stalled:  # first the timer, then what lay in the buffer
-            now = max(now, due) + chance.uniform(0.0, 0.4)
-            session.handle_timer(now)
-        elif partner.answers and partner.answers[0][0] <= due:
-            now, _, heard = heapq.heappop(partner.answers)
-            session.receive_frame(heard, now)
-        else:
-            now = max(now, due)
-            session.handle_timer(now)
-        buffered: list[Frame] = []
-        while stalled and partner.answers and partner.answers[0][0] <= now:
-            buffered.append(heapq.heappop(partner.answers)[2])
-        for place in range(len(buffered) + 1):
-            if open_requests < 3 and chance.random() < 0.3:
-                open_requests += 1
-                session.services.submit(ReadRequest(tuple(
-                    chance.sample(ASKED, chance.randint(1, 4)))), now)
-            for sent in session.take_frames():
-                partner.hear(sent, now)
-            for event in session.take_events():
-                if isinstance(event, ProcessDataReceived):
-                    samples += 1
-                    for parameter_, raw in zip(POLLED, event.raws):
-                        assert raw in partner.history[parameter_.number]
-                elif isinstance(event, RequestCompleted):
-                    open_requests -= 1
-                    assert isinstance(event.request, ReadRequest)
-                    for parameter_, outcome in zip(event.request.parameters, event.outcomes):
-                        if isinstance(outcome, ReadValue):
-                            good += 1
-                            assert outcome.raw in partner.history[parameter_.number]
-            if place < len(buffered):
-                now += 0.0005
-                session.receive_frame(buffered[place], now)
-    assert samples > 50
-    assert good > 100
