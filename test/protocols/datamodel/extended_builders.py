@@ -12,8 +12,14 @@ ASK_RESPONSE_MAP = f'002007E4#{ZEROS}'
 REQUEST_MAP = '102007A4#0032003300000000'
 RESPONSE_MAP = '102007E4#00D100D200D30000'
 NEUTRAL = f'003FFFF0#{ZEROS}'
-#: 100.0 rpm, 2.50 A, ready
+RUNNING = '003FFFF0#03E8000000000000'
+#: 100.0 rpm, 2.50 A, ready; and enabled
 ANSWER = '103FFFF0#03E800FA00010000'
+ENABLED = '103FFFF0#03E800FA00030000'
+#: speed_setpoint (50), torque_limit (51) and control_word (52) by number, and what asks for them
+SPEED_ZERO, LIMIT_ZERO, DISABLE = f'00300321#{ZEROS}', f'00300331#{ZEROS}', f'00300341#{ZEROS}'
+ASK_SPEED, ASK_LIMIT, ASK_WORD = f'00200321#{ZEROS}', f'00200331#{ZEROS}', f'00200341#{ZEROS}'
+SPEED_IS_ZERO, LIMIT_IS_ZERO = f'10200321#{ZEROS}', f'10200331#{ZEROS}'
 
 #: why a drive is lost that three cycles were sent to
 SILENT = says('silent_for_cycles', cycles=3, what='no cyclic response')

@@ -110,13 +110,6 @@ def test_axis_that_is_driven_stays_latched_without_its_position() -> None:
     assert talk.commands(0, 7.0, 10.165) is CommandOutcome.ARMED
 
 
-def test_first_position_is_read_before_the_first_cycle() -> None:
-    talk = checking()
-    assert talk.until(10.08) == []      # however long that takes
-    assert talk.hears('10200D41#0046000000000000', 10.085) == []
-    assert cycle(talk, 4.25, 1, 70) == request(0, 70)
-
-
 def test_no_cycle_without_a_position() -> None:
     """Nobody answers the read: the maps are looked at again, and then the position."""
     talk = checking()

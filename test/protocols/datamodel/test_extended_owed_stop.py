@@ -13,21 +13,16 @@ from builders import (
     CONTROL, Conversation, drive, GAIN, LIMIT, parameter, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
-    ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
-    RESPONSE_MAP, TICK,
+    ANSWER, ASK_LIMIT, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, ASK_SPEED, checked, DISABLE, ENABLED,
+    exchange, LIMIT_IS_ZERO, LIMIT_ZERO, NEUTRAL, online, REQUEST_MAP, RESPONSE_MAP, RUNNING,
+    SPEED_IS_ZERO, SPEED_ZERO, TICK,
 )
 import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.events import DriveState, Noted, StationLost
 
-RUNNING = '003FFFF0#03E8000000000000'
-#: speed_setpoint (50) and torque_limit (51) by number, and what asks for them
-SPEED_ZERO, LIMIT_ZERO = '00300321#0000000000000000', '00300331#0000000000000000'
-ASK_SPEED, ASK_LIMIT = '00200321#0000000000000000', '00200331#0000000000000000'
-SPEED_IS_ZERO, LIMIT_IS_ZERO = '10200321#0000000000000000', '10200331#0000000000000000'
-ENABLED = '103FFFF0#03E800FA00030000'
 #: what is told of a stop that nobody has answered
 UNHEARD = may_run('stop_failed', what=[
     says('write_unanswered', what='speed_setpoint (P50)'),
@@ -57,24 +52,10 @@ def confirmed(talk: Conversation, now: float) -> list[str]:
 # -- the process stood still ----------------------------------------------------------------------
 
 
-def test_stop_right_after_a_stall() -> None:
-    """What a closing terminal does: SIGSTOP, then SIGTERM together with SIGCONT."""
-    talk = running()
-    sent = talk.time_lost(12.0)
-    sent += talk.deactivate(12.0001)
-    assert not talk.session.stopped
-    sent += [text for _, text in talk.until(12.004)]
-    assert [text for text in sent if text != ASK_REQUEST_MAP] == [
-        SPEED_ZERO, *STOPPED_BY_NUMBER]
-    assert confirmed(talk, 12.005) == []
-    assert talk.session.stopped
-    assert talk.until(20.0) == []
-    assert warnings(talk) == []
-
-
 def test_stop_under_way_is_not_begun_anew() -> None:
     talk = running()
     assert talk.time_lost(12.0) == [SPEED_ZERO]
+    assert talk.events() == [StationLost(says('bridge_stood_still'))]
     assert talk.until(12.004) == [(12.001, LIMIT_ZERO), (12.002, ASK_SPEED)]
     assert talk.time_lost(12.05) == []
     assert talk.until(12.06) == []
@@ -140,11 +121,17 @@ def look(talk: Conversation, speed: float = 100.0, request: str = RUNNING) -> No
     talk.events()
 
 
-def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
+def response_map_differs() -> Conversation:
+    """Return a drive whose response map was found to differ while it ran, at 11.004 s."""
     talk = running()
     look(talk)
     assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
     assert talk.hears(OTHER_RESPONSE, 11.004) == []
+    return talk
+
+
+def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
+    talk = response_map_differs()
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.until(11.9) == [(11.02, NEUTRAL), (11.04, NEUTRAL), (11.06, NEUTRAL)]
     assert not talk.session.duty.owed
@@ -163,10 +150,7 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
 
 def answered_neutral_cycles(request_map: str) -> Conversation:
     """Return a drive whose response map differs, and what it says to the look after, at 12.02."""
-    talk = running()
-    look(talk)
-    talk.hears(REQUEST_MAP, 11.003)
-    talk.hears(OTHER_RESPONSE, 11.004)
+    talk = response_map_differs()
     for at in (11.02, 11.04, 11.06):
         assert talk.until(at + TICK) == [(at, NEUTRAL)]
         talk.hears(ANSWER, at + 0.002)
@@ -194,10 +178,7 @@ def test_neutral_cycles_that_went_elsewhere_are_followed_by_writes() -> None:
 
 def neutral_cycles_without_an_answer() -> Conversation:
     """Return a drive whose response map differs, at 11.9 s."""
-    talk = running()
-    look(talk)
-    talk.hears(REQUEST_MAP, 11.003)
-    talk.hears(OTHER_RESPONSE, 11.004)
+    talk = response_map_differs()
     assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
     return talk
 
@@ -236,29 +217,6 @@ def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() ->
 
 
 def test_response_map_that_differs_disables_too() -> None:
-    talk = cycling_with_word()
-    assert talk.hears('102007A4#0034003200000000', 11.003) == [ASK_RESPONSE_MAP]
-    assert talk.hears(OTHER_RESPONSE, 11.004) == []
-    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
-    assert not talk.session.duty.owed
-
-
-def cycling_with_word() -> Conversation:
-    """Return an enabled drive with its word in slot 0, asked for its request map at 11.002 s."""
-    talk = cycling_raw()
-    talk.asks(ControlAction.ENABLE, 10.003)
-    for cycle in range(1, 50):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(ENABLED if cycle > 1 else ANSWER, 10.002 + 0.02 * cycle)
-    talk.until(11.0 + TICK)
-    assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.session.duty.owed
-    talk.events()
-    return talk
-
-
-def cycling_raw() -> Conversation:
     talk = Conversation(drive(control=CONTROL, request=(WORD, SPEED)))
     talk.bus_up(9.0)
     assert talk.activate(9.998) == [ASK_REQUEST_MAP]
@@ -266,6 +224,24 @@ def cycling_raw() -> Conversation:
     assert talk.hears(RESPONSE_MAP, 10.0) == []
     assert talk.at(10.0) == [NEUTRAL]
     talk.hears(ANSWER, 10.002)
+    enabled_at_a_look(talk)
+    assert talk.hears('102007A4#0034003200000000', 11.003) == [ASK_RESPONSE_MAP]
+    assert talk.hears(OTHER_RESPONSE, 11.004) == []
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+    assert not talk.session.duty.owed
+
+
+def enabled_at_a_look(talk: Conversation) -> Conversation:
+    """Have a drive enabled that was found at 10.002 s; its request map is asked for at 11.002."""
+    talk.asks(ControlAction.ENABLE, 10.01)
+    for cycle in range(1, 50):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
+    talk.until(11.0 + TICK)
+    assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.session.duty.owed
+    talk.events()
     return talk
 
 
@@ -284,22 +260,13 @@ def test_what_is_kept_in_ram_is_stopped_before_what_may_be_an_eeprom() -> None:
     """Of two without ``storage`` the second waits 20 ms for the first; a RAM value does not."""
     slow_word, slow_speed = replace(WORD, storage=None), replace(SPEED, storage=None)
     table = (*(entry for entry in TABLE if entry not in (WORD, SPEED)), slow_word, slow_speed)
-    talk = online(control=CONTROL, table=table, request=(slow_speed, LIMIT))
-    talk.hears('103FFFF0#03E800FA00010000', 10.002)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle in range(1, 50):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    talk.until(11.0 + TICK)
-    talk.hears(ENABLED, 11.002)
+    talk = enabled_at_a_look(online(control=CONTROL, table=table, request=(slow_speed, LIMIT)))
     sent = [(11.003, text) for text in talk.hears(OTHER_REQUEST, 11.003)]
     sent += talk.until(12.0)
-    word = '00300341#0000000000000000'
     assert [text for _, text in sent if text.startswith('003')] == [
-        LIMIT_ZERO, word, SPEED_ZERO] * 3
+        LIMIT_ZERO, DISABLE, SPEED_ZERO] * 3
     for (before, text), (after, _) in zip(sent, sent[1:]):  # nobody answers while it writes
-        assert after - before >= (0.02 if text in (word, SPEED_ZERO) else 0.0) - TICK
+        assert after - before >= (0.02 if text in (DISABLE, SPEED_ZERO) else 0.0) - TICK
 
 
 def test_maps_are_rewritten_after_the_stop() -> None:
@@ -312,13 +279,16 @@ def test_maps_are_rewritten_after_the_stop() -> None:
     assert confirmed(talk, 11.008) == ['002007A1#0000000000000000']
 
 
-def test_map_that_differs_under_a_drive_at_rest_needs_no_stop() -> None:
+@pytest.mark.parametrize('maps', [(OTHER_REQUEST,), (REQUEST_MAP, OTHER_RESPONSE)])
+def test_map_that_differs_under_a_drive_at_rest_needs_no_stop(maps: tuple[str, ...]) -> None:
     talk = online()
     for cycle in range(1, 50):
         exchange(talk, 10.0 + 0.02 * cycle)
     talk.until(11.0 + TICK)
     assert talk.hears(ANSWER, 11.002) == [ASK_REQUEST_MAP]
-    assert talk.hears(OTHER_REQUEST, 11.003) == []
+    asked = [text for answer in maps for text in talk.hears(answer, 11.003)]
+    assert asked == [ASK_RESPONSE_MAP] * (len(maps) - 1)
+    assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.until(11.9) == []
 
 
@@ -386,7 +356,7 @@ def test_word_that_was_refused_confirms_nothing() -> None:
 
 
 @pytest.mark.parametrize('refuses', [
-    lambda text: text == '00300341#0000000000000000', everything])
+    lambda text: text == DISABLE, everything])
 def test_written_disable_that_was_refused_is_written_again(
         refuses: Callable[[str], bool]) -> None:
     talk = online(control=CONTROL, mapping='assume')
@@ -398,7 +368,7 @@ def test_written_disable_that_was_refused_is_written_again(
     talk.refusing = refuses
     assert talk.asks(ControlAction.DISABLE, 10.063) == []
     talk.refusing = lambda text: False
-    assert '00300341#0000000000000000' in [text for _, text in talk.until(10.09)]
+    assert DISABLE in [text for _, text in talk.until(10.09)]
 
 
 def test_many_writes_that_are_refused_end_with_the_first() -> None:
@@ -413,16 +383,6 @@ def test_many_writes_that_are_refused_end_with_the_first() -> None:
     talk.submits(write(*((other, 1) for other in others)), 10.003)
     assert talk.outcomes() == [[says('not_sent')] * 20]
     assert len(refused) == 1
-
-
-# -- what the drive is not told again -------------------------------------------------------------
-
-
-def test_neutral_by_command_is_a_stop() -> None:
-    talk = running()
-    talk.commands(0, 0.0, 10.03)
-    assert exchange(talk, 10.04) == NEUTRAL
-    assert talk.time_lost(12.0) == [ASK_REQUEST_MAP]
 
 
 # -- the drive falls silent -----------------------------------------------------------------------
@@ -443,15 +403,9 @@ def test_look_at_the_maps_that_the_stop_has_overtaken_shows_nothing_of_it() -> N
 
 
 def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -> None:
-    talk = online(control=CONTROL)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle in range(1, 50):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
-    talk.until(11.0 + TICK)
-    assert talk.hears(ENABLED, 11.002) == [ASK_REQUEST_MAP]
+    talk = enabled_at_a_look(online(control=CONTROL))
     assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
-    assert talk.asks(ControlAction.DISABLE, 11.005) == ['00300341#0000000000000000']
+    assert talk.asks(ControlAction.DISABLE, 11.005) == [DISABLE]
     talk.hears(RESPONSE_MAP, 11.006)
     assert talk.session.duty.unshown
 

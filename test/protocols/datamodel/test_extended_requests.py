@@ -2,14 +2,14 @@
 """Conversations about parameter requests: acyclic frames, their pace, and what became of them."""
 
 from builders import (
-    ACTUAL, BOOL, CONTROL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, LIMIT, MAXIMUM, ORDER,
-    parameter, RAM, RAMP, read, SPEED, WORD, write,
+    ACTUAL, BOOL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, MAXIMUM, ORDER, parameter, RAM,
+    RAMP, read, SPEED, write,
 )
 from extended_builders import ANSWER, ASK_REQUEST_MAP, NEUTRAL, online, TICK, ZEROS
 import pytest
 from saying import says
 
-from drive_can_bridge.core.events import FrameRejected, RequestCompleted
+from drive_can_bridge.core.events import FrameRejected
 
 ASK_GAIN = f'00200281#{ZEROS}'
 ASK_DAMPING = f'00200291#{ZEROS}'
@@ -32,13 +32,6 @@ def test_read() -> None:
     assert talk.hears('10200281#1234FFFFFFFFFFFF', 10.101) == []
     assert talk.outcomes() == [[0x1234]]
     assert talk.session.statistics.requests_ok == 1
-
-
-def test_read_signed() -> None:
-    talk = quiet()
-    talk.submits(read(ACTUAL), 10.1)
-    talk.hears('10200D11#FF38000000000000', 10.101)
-    assert talk.outcomes() == [[-200]]
 
 
 def test_consecutive_numbers_share_frames() -> None:
@@ -354,35 +347,6 @@ def test_one_alone_is_written_like_any_other() -> None:
 
 
 # -- refusals -------------------------------------------------------------------------------------
-
-
-def test_every_request_is_answered_by_itself() -> None:
-    talk = quiet()
-    first, second = read(GAIN), read(GAIN)
-    talk.submits(first, 10.1)
-    talk.submits(second, 10.1)
-    talk.hears('10200281#0001000000000000', 10.11)
-    talk.hears('10200281#0002000000000000', 10.12)
-    done = talk.events(RequestCompleted)
-    assert [event.request for event in done] == [first, second]
-    assert [event.request is wanted for event, wanted in zip(done, (first, second))] == [True] * 2
-
-
-def test_what_may_not_be_written() -> None:
-    talk = online(control=CONTROL)
-    refusal = talk.session.services.write_refusal
-    assert refusal(SPEED) == says('sent_cyclically', name='speed_setpoint')
-    assert refusal(LIMIT) == says('sent_cyclically', name='torque_limit')
-    assert refusal(WORD) == 'use ~/enable'
-    assert refusal(GAIN) == ''
-    for number, refused in ((121, False), (122, True), (125, True), (126, True), (129, True),
-                            (130, False)):
-        text = refusal(parameter(f'p{number}', number, listed=False))
-        assert text == (says('mapping_parameter') if refused
-                        else '')
-    talk.deactivate(10.01)
-    talk.until(10.2)
-    assert refusal(parameter('p122', 122, listed=False)) == ''
 
 
 def test_moved_maps_are_guarded_too() -> None:

@@ -7,15 +7,15 @@ from builders import (
     CONTROL, Conversation, CURRENT, drive, GAIN, parameter, RAMP, read, SPEED, STATUS, TABLE, WORD,
     write,
 )
-from extended_builders import ANSWER, ASK_REQUEST_MAP, cycling, exchange, NEUTRAL, online, TICK
+from extended_builders import (
+    ANSWER, ASK_REQUEST_MAP, ASK_WORD, cycling, DISABLE, ENABLED, exchange, NEUTRAL, online, TICK,
+)
 import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
 
-DISABLE = '00300341#0000000000000000'
-ASK_WORD = '00200341#0000000000000000'
 #: an EEPROM cell is the default where the profile does not say
 SLOW_WORD = parameter('control_word', 52)
 SLOW_TABLE = (*(entry for entry in TABLE if entry.name != 'control_word'), SLOW_WORD)
@@ -135,7 +135,7 @@ def enabled(**options: object) -> Conversation:
     for step in range(10):
         now = 10.1 + 0.1 * step
         talk.until(now + TICK)
-        talk.hears('103FFFF0#03E800FA00030000' if step > 1 else ANSWER, now + 0.002)
+        talk.hears(ENABLED if step > 1 else ANSWER, now + 0.002)
         talk.until(now + 0.06)
         if talk.control_outcomes():
             return talk
@@ -148,8 +148,8 @@ def test_confirmed_disable_stops_no_setpoint_of_the_cycle() -> None:
     talk.commands(0, 100.0, talk.now)
     assert talk.until(10.41)[-1][1] == '003FFFF0#03E8000000000000'
     talk.refusing = lambda text: text.startswith('003FFFF0')
-    assert talk.deactivate(10.411) == ['00300341#0000000000000000']
-    assert [text for _, text in talk.until(10.413)] == ['00200341#0000000000000000']
+    assert talk.deactivate(10.411) == [DISABLE]
+    assert [text for _, text in talk.until(10.413)] == [ASK_WORD]
     assert talk.hears('10200341#0000000000000000', 10.414) == []
     talk.until(11.4)
     assert not talk.session.stopped
