@@ -307,9 +307,6 @@ def test_members_that_a_broadcast_alone_started_are_named(refused: str) -> None:
             leader.frames_left(bus.now, set(range(1, len(frames))))
         else:
             bus.now = leader.next_timer()
-        for _ in range(4):
-            if bus.coming:
-                break
         bus.look()
         bus.live(0.0)
         if not frames or not bus.devices[1].runs:

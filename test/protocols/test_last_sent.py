@@ -7,7 +7,6 @@ from test_contract import Partner, PARTNERS
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.protocols.families import make_sessions
 
 
@@ -122,14 +121,3 @@ def test_all_members_of_a_broadcast_group_are_told_the_same() -> None:
     assert [session.sent.raws for session in sessions] == [(0x047E, 0)] * 2
     assert [parameter.name for parameter in sessions[1].sent.parameters] == [
         'control_word', 'speed_setpoint']
-
-
-def test_words_and_raw_integers_alike() -> None:
-    sent = LastSent((SPEED, LIMIT))
-    sent.take((0xFA24,))
-    assert sent.raws == (-1500, None)
-    same = sent.raws
-    sent.take((-1500,))
-    assert sent.raws is same
-    sent.take((7,), 1)
-    assert sent.raws == (-1500, 7)

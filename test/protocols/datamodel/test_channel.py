@@ -85,14 +85,6 @@ class Line:
         return self.sent()
 
 
-def test_nothing_to_do() -> None:
-    line = Line()
-    assert line.channel.next_timer() == math.inf
-    assert line.at(1.0) == []
-    assert line.transactor.outstanding is None
-    assert line.channel.now == 1.0
-
-
 def test_procedure_that_wants_nothing_ends_at_once() -> None:
     line = Line()
     assert line.reads() == []
@@ -202,16 +194,6 @@ def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> Non
     assert left == [(52, 9), (52, 0), (50, 0)]
 
 
-def test_the_confirmation_of_a_stop_goes_before_everything_and_is_not_held() -> None:
-    line = Line()
-    line.channel.hold(5.0)
-    line.reads(1, priority=Priority.USERS)
-    line.reads(2)
-    assert line.reads(3, priority=Priority.STOP) == ['3?']
-    assert line.answer(7, 1.01) == []
-    assert line.results == [[(7,)]]
-
-
 def test_write_that_the_bus_refuses_was_not_sent() -> None:
     line = Line()
     found: list[object] = []
@@ -270,16 +252,6 @@ def test_clear_forgets_everything_but_the_eeprom() -> None:
     line.channel.clear()
     assert line.reads(4, now=1.019) == []
     assert line.at(1.02) == ['4?']
-
-
-def test_two_waiting_users() -> None:
-    line = Line()
-    line.reads(1, priority=Priority.USERS)
-    line.reads(2, priority=Priority.USERS)
-    line.reads(3, priority=Priority.USERS)
-    assert line.channel.waiting_users == 2
-    line.answer(0, 1.01)
-    assert line.channel.waiting_users == 1
 
 
 def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
