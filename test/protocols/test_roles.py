@@ -52,11 +52,14 @@ def raw(of: Session, name: str) -> Parameter:
 def test_another_name_of_a_setpoint(family: str) -> None:
     partner = PARTNERS[family]
     table = [partner.own(each) for each in (*TABLE, ALIAS, STATUS_ALIAS)]
-    one, = make_sessions([drive(family, table=table, request=table[:1],
+    one, = make_sessions([drive(family, table=table, request=table[:2],
                                 response=(partner.own(ACTUAL),), **MORE.get(family, {}))])
     for name in ('speed_setpoint', 'jog', partner.raw_name(50)):
         assert one.services.write_refusal(raw(one, name)) == CYCLIC, name
         assert one.roles.role(raw(one, name)) is Role.CYCLIC, name
+    for name in ('torque_limit', partner.raw_name(51)):
+        assert one.services.write_refusal(raw(one, name)) == (
+            says('sent_cyclically', name='torque_limit')), name
     for name in ('gain', partner.raw_name(40)):
         assert one.services.write_refusal(raw(one, name)) == '', name
         assert one.roles.role(raw(one, name)) is None, name
