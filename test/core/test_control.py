@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Conversations with the machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop``."""
 
-from collections.abc import Callable
 from dataclasses import FrozenInstanceError, replace
 import math
 
@@ -98,6 +97,7 @@ def test_what_is_reached_already_needs_no_word() -> None:
     control.request(ControlRequest(RESET_FAULT), 0.6)
     assert outcomes(control) == [
         (RESET_FAULT, False, says('no_reset_word'))]
+    assert (control.word, control.pending) == (OFF, False)
 
 
 def test_a_quick_stop_without_a_word_ends_an_enable_that_waits() -> None:
@@ -293,6 +293,50 @@ def test_state_in_words(table: ControlTable, raw: int | None, state: str) -> Non
     assert control.fault == (state == 'fault')
 
 
+# -- one request ----------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(('table', 'raw', 'action', 'state'), [
+    (NO_READY, READY, DISABLE, 'disabled'), (FULL, FAULT, DISABLE, 'fault'),
+    (FULL, READY, QUICK_STOP, 'ready'), (FULL, READY, RESET_FAULT, 'ready'),
+    (FULL, ENABLED, ENABLE, 'enabled'), (FULL, ENABLED, RESET_FAULT, 'enabled')])
+def test_what_is_so_already_succeeds_at_once(table: ControlTable, raw: int, action: ControlAction,
+                                             state: str) -> None:
+    control = enabled() if raw == ENABLED else machine(table)
+    cycle(control, raw, 1.0)
+    word = control.word
+    control.request(ControlRequest(action), 1.01)
+    assert outcomes(control) == [(action, True, state)]
+    assert word == (RUN if raw == ENABLED else OFF)
+    assert (control.word, control.pending) == (word, False)
+
+
+@pytest.mark.parametrize(('stop', 'remarks'), [
+    (DISABLE, [says('word_not_followed', word=OFF)]),
+    (QUICK_STOP, [says('word_not_followed', word=STOP), says('now_disable')])])
+def test_stop_that_is_not_confirmed_fails_and_it_stays_disabled(stop: ControlAction,
+                                                                remarks: list[says]) -> None:
+    control = enabled()
+    control.request(ControlRequest(stop), 1.0)
+    cycle(control, ENABLED, 1.02)
+    control.handle_timer(3.0)
+    assert outcomes(control) == [(stop, False, says(
+        'stuck', remarks=remarks, state='enabled', status=status_word(ENABLED), timeout=2.0))]
+    assert (control.word, control.pending) == (OFF, False)
+
+
+@pytest.mark.parametrize('stop', [DISABLE, QUICK_STOP])
+def test_stop_ends_a_fault_reset(stop: ControlAction) -> None:
+    control = faulted()
+    control.request(ControlRequest(RESET_FAULT), 0.01)
+    cycle(control, FAULT, 0.02)
+    assert control.word == RESET
+    control.request(ControlRequest(stop), 0.03)
+    assert control.word == OFF
+    cycle(control, FAULT, 0.04)
+    assert outcomes(control) == [
+        (RESET_FAULT, False, says('replaced', action=stop.value)), (stop, True, 'fault')]
+
+
 # -- enable ---------------------------------------------------------------------------------------
 
 def test_enable_waits_for_ready_then_for_enabled() -> None:
@@ -314,14 +358,6 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
     assert (control.word, control.state, control.pending) == (RUN, 'enabled', False)
     assert control.next_timer() == math.inf
     assert control.take_notes() == []
-
-
-def test_enable_of_a_drive_that_is_ready_goes_on_at_once() -> None:
-    control = machine()
-    cycle(control, READY, 0.0)
-    control.request(ControlRequest(ENABLE), 0.01)
-    assert control.word == RUN
-    assert control.pending
 
 
 def test_status_from_before_the_disable_word_left_confirms_nothing() -> None:
@@ -425,13 +461,6 @@ def test_a_member_that_drops_out_before_the_others_are_enabled_ends_the_enable()
     (_, success, why), = outcomes(control)
     assert not success
     assert why == says('dropped_out')
-
-
-def test_enable_of_an_enabled_drive_succeeds_at_once() -> None:
-    control = enabled()
-    control.request(ControlRequest(ENABLE), 1.0)
-    assert outcomes(control) == [(ENABLE, True, 'enabled')]
-    assert (control.word, control.pending) == (RUN, False)
 
 
 def test_enable_of_an_enabled_drive_waits_while_its_status_is_missing() -> None:
@@ -623,31 +652,6 @@ def test_disable_waits_until_not_enabled() -> None:
     assert control.take_notes() == []
 
 
-def test_disable_of_a_disabled_drive_succeeds_at_once() -> None:
-    control = machine(NO_READY)
-    cycle(control, READY, 0.0)
-    control.request(ControlRequest(DISABLE), 0.01)
-    assert outcomes(control) == [(DISABLE, True, 'disabled')]
-
-
-def test_disable_of_a_faulted_drive_names_the_fault() -> None:
-    control = faulted()
-    control.request(ControlRequest(DISABLE), 0.01)
-    assert outcomes(control) == [(DISABLE, True, 'fault')]
-
-
-def test_disable_that_is_not_confirmed_fails_and_stays() -> None:
-    control = enabled()
-    control.request(ControlRequest(DISABLE), 1.0)
-    cycle(control, ENABLED, 1.02)
-    control.handle_timer(3.0)
-    assert outcomes(control) == [(
-        DISABLE, False, says(
-            'stuck', remarks=[says('word_not_followed', word=0)], state='enabled',
-            status=status_word(ENABLED), timeout=2.0))]
-    assert control.word == OFF
-
-
 def test_disable_without_a_status_succeeds_when_sent() -> None:
     control = machine(BARE)
     control.request(ControlRequest(DISABLE), 0.0)
@@ -680,17 +684,6 @@ def test_disable_wins_over_a_quick_stop() -> None:
     assert outcomes(control) == [(QUICK_STOP, False, says('replaced', action='disable'))]
 
 
-def test_disable_wins_over_a_fault_reset() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
-    control.word_sent(0.02)
-    control.request(ControlRequest(DISABLE), 0.03)
-    assert control.word == OFF
-    cycle(control, FAULT, 0.04)
-    assert outcomes(control) == [
-        (RESET_FAULT, False, says('replaced', action='disable')), (DISABLE, True, 'fault')]
-
-
 # -- quick stop -----------------------------------------------------------------------------------
 
 def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
@@ -705,14 +698,6 @@ def test_quick_stop_brakes_until_not_enabled_then_disables() -> None:
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
     assert (control.word, control.pending) == (OFF, False)
     assert control.take_notes() == []
-
-
-def test_quick_stop_of_a_disabled_drive_succeeds_at_once() -> None:
-    control = machine()
-    cycle(control, READY, 0.0)
-    control.request(ControlRequest(QUICK_STOP), 0.01)
-    assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
-    assert (control.word, control.pending) == (OFF, False)
 
 
 @pytest.mark.parametrize('sent', [False, True])
@@ -755,18 +740,6 @@ def test_quick_stop_of_a_drive_nobody_knows_brakes() -> None:
     assert control.word == STOP
     cycle(control, READY, 0.02)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
-
-
-def test_quick_stop_that_is_not_confirmed_fails_and_disables() -> None:
-    control = enabled()
-    control.request(ControlRequest(QUICK_STOP), 1.0)
-    cycle(control, ENABLED, 1.02)
-    control.handle_timer(3.0)
-    assert outcomes(control) == [(
-        QUICK_STOP, False, says(
-            'stuck', remarks=[says('word_not_followed', word=2), says('now_disable')],
-            state='enabled', status=status_word(ENABLED), timeout=2.0))]
-    assert (control.word, control.pending) == (OFF, False)
 
 
 BRAKES = ENABLED | 0x0040
@@ -832,18 +805,6 @@ def test_second_quick_stop_joins_the_first() -> None:
     assert control.next_timer() == 3.0
     cycle(control, READY, 1.52)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')] * 2
-
-
-def test_quick_stop_ends_a_fault_reset() -> None:
-    control = faulted()
-    control.request(ControlRequest(RESET_FAULT), 0.01)
-    cycle(control, FAULT, 0.02)
-    assert control.word == RESET
-    control.request(ControlRequest(QUICK_STOP), 0.03)
-    assert control.word == OFF
-    cycle(control, FAULT, 0.04)
-    assert outcomes(control) == [
-        (RESET_FAULT, False, says('replaced', action='quick_stop')), (QUICK_STOP, True, 'fault')]
 
 
 def test_quick_stop_of_a_faulted_drive_that_still_runs_is_a_disable() -> None:
@@ -997,17 +958,6 @@ def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
 
 
-@pytest.mark.parametrize(('build', 'raw'), [(enabled, ENABLED), (machine, READY)])
-def test_reset_without_a_fault_succeeds_and_changes_nothing(
-        build: Callable[[], ControlMachine], raw: int) -> None:
-    control = build()
-    cycle(control, raw, 1.0)
-    word, state = control.word, control.state
-    control.request(ControlRequest(RESET_FAULT), 1.01)
-    assert outcomes(control) == [(RESET_FAULT, True, state)]
-    assert (control.word, control.pending) == (word, False)
-
-
 def test_reset_that_does_not_help_fails_and_disables() -> None:
     control = faulted()
     control.request(ControlRequest(RESET_FAULT), 0.0)
@@ -1065,14 +1015,6 @@ def test_reset_of_a_drive_nobody_knows_looks_first() -> None:
     control.request(ControlRequest(RESET_FAULT), 0.0)
     cycle(control, FAULT, 0.0)
     assert control.word == RESET
-
-
-def test_reset_without_a_word_is_refused() -> None:
-    control = faulted(replace(FULL, reset_fault=None))
-    control.request(ControlRequest(RESET_FAULT), 0.01)
-    assert outcomes(control) == [
-        (RESET_FAULT, False, says('no_reset_word'))]
-    assert (control.word, control.pending) == (OFF, False)
 
 
 @pytest.mark.parametrize('table', [SILENT, NO_FAULT])

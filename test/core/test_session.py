@@ -12,11 +12,10 @@ from drive_can_bridge.core.control import ControlAction, ControlCompleted, Contr
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.events import DriveState, RequestCompleted, StationLost
+from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import Failure, Request
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.setpoints import CommandOutcome
 
 
 class Idle(Session):
@@ -127,37 +126,6 @@ def test_empty_request_is_answered_at_once() -> None:
     assert made.waiting == 0
 
 
-def test_outboxes_are_emptied() -> None:
-    made = session()
-    made.receive_frame(Frame(1, b'', True), 1.0)
-    assert made.take_frames() == [Frame(1, b'', True)]
-    assert made.take_frames() == []
-    assert made.take_events() == []
-
-
-def test_states() -> None:
-    made = session(control=CONTROL, request=(WORD, SPEED), rearm_immediate=True)
-    assert made.state is DriveState.OFFLINE
-    made.online = True
-    assert made.state is DriveState.DISABLED
-    assert made.control is not None
-    made.activate(0.5)
-    made.bus_available = True
-    made.services.submit(ControlRequest(ControlAction.ENABLE), 1.0)
-    for raw in (1, 3):
-        assert made.services.command(0, 1.0, 1.0) is CommandOutcome.DISABLED
-        made.control.word_sent(1.0)
-        made.control.status_received(raw, 1.0)
-        made.control_changed(1.0)
-    assert made.state is DriveState.NOT_ARMED
-    assert made.services.command(0, 1.0, 1.0) is CommandOutcome.ARMED
-    assert made.state is DriveState.ONLINE
-    made.control.status_received(8, 1.0)
-    assert made.state is DriveState.FAULT
-    made.online = False
-    assert made.state is DriveState.OFFLINE
-
-
 def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
     plain = session(request=(WORD, SPEED))
     assert [item.parameter for item in plain.setpoints.items] == [WORD, SPEED]
@@ -166,15 +134,6 @@ def test_control_word_that_no_control_uses_is_a_setpoint() -> None:
     assert controlled.services.write_refusal(WORD) == 'use ~/enable'
     assert session(control=CONTROL).services.write_refusal(WORD) == 'use ~/enable'
     assert controlled.services.write_refusal(STATUS) == ''
-
-
-def test_refused_commands_are_counted() -> None:
-    made = session()
-    for value in (math.nan, 1e9, True):
-        with pytest.raises(ValueRefused):
-            made.services.command(0, value, 1.0)
-    made.services.command(0, 5.0, 1.0)
-    assert made.statistics.commands_refused == 3
 
 
 def test_a_command_of_any_size_is_refused_not_a_defect() -> None:
