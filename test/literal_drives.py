@@ -50,7 +50,7 @@ class ExtendedDrive:
 
 
 class StandardDrive:
-    """DataModel with 11-bit identifiers, station 1: 3 reads, 6 writes and is not answered."""
+    """DataModel with 11-bit identifiers: 3 reads, 6 writes and is not answered."""
 
     def __init__(self, registers: dict[int, int]) -> None:
         self.registers = registers
@@ -65,7 +65,7 @@ class StandardDrive:
         if any(entry not in self.registers for entry in numbers):
             return []
         answer = b''.join(self.registers[entry].to_bytes(2, 'little') for entry in numbers)
-        return [Frame(0x7F1, answer.ljust(8, b'\xA5'), False)]
+        return [Frame(sent.identifier + 0x400, answer.ljust(8, b'\xA5'), False)]
 
 
 class PkwNode:
@@ -136,7 +136,6 @@ class ServoDrive:
         self.fixed: dict[tuple[int, int], int] = {}     # (index, sub-index) -> abort code
         self.braking = 0                # SYNCs until a quick stop has ended
         self.ramp = 0                   # SYNCs that it takes to disable operation
-        self.heard_bridge = 0
         self._staged: list[tuple[int, bytes]] = []
         self.objects = {
             (0x1000, 0): bytes.fromhex('92010200'), (0x1005, 0): bytes.fromhex('80000000'),
@@ -165,8 +164,6 @@ class ServoDrive:
             return self._sync()
         elif identifier == 0x600 + self.node:
             return [] if data[0] == 0x80 else [Frame(0x580 + self.node, self._sdo(data), False)]
-        elif identifier & 0x780 == 0x700:
-            self.heard_bridge += 1
         elif self.operational:
             for pdo in range(4):
                 if self.number(0x1400 + pdo, 1) == identifier:

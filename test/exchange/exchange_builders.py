@@ -131,12 +131,16 @@ class Bench:
         self.exchange.frame_received(frame(text), age)
         return self.link.take()
 
+    def begin(self) -> None:
+        """Open the bus, and activate."""
+        self.exchange.bus_opened()
+        self.exchange.activate()
+
     def online(self) -> None:
         """Bring the drive of station 1 online, at 10.002 s."""
         self.now = 9.998
         self.exchange._last_pass = self.now
-        self.exchange.bus_opened()
-        self.exchange.activate()
+        self.begin()
         self.hears('102007A4#0032003300000000', 9.999)
         self.hears('102007E4#00D100D200D30000', 10.0)
         self.at(10.0)

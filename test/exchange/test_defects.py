@@ -13,7 +13,7 @@ from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, WORD
 from exchange_builders import Bench
-from literal_drives import ExtendedDrive, PkwNode
+from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -24,22 +24,6 @@ from drive_can_bridge.core.frame import Frame
 #: s: of the drives, and until an answer
 PERIOD, DELAY = 0.05, 0.001
 WORDS = dict.fromkeys((50, 51, 52), 0)
-
-
-class Standard:
-    """DataModel with 11-bit identifiers, of any station."""
-
-    def __init__(self, registers: dict[int, int]) -> None:
-        self.registers = registers
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        number = int.from_bytes(sent.data[1:3], 'little')
-        if sent.data[0] == 6:
-            self.registers[number] = int.from_bytes(sent.data[3:5], 'little')
-            return []
-        answer = b''.join(self.registers[entry].to_bytes(2, 'little')
-                          for entry in range(number, number + sent.data[3]))
-        return [Frame(sent.identifier + 0x400, answer.ljust(8, b'\0'), False)]
 
 
 class Inverter:
@@ -98,9 +82,9 @@ def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
 KINDS: dict[str, Callable[[], tuple[list[DriveConfiguration], list[Any]]]] = {
     '29 bit': lambda: _extended(False),
     '29 bit, word in its slot': lambda: _extended(True),
-    '11 bit': lambda: _single('datamodel_standard', lambda _, cells: Standard(cells)),
+    '11 bit': lambda: _single('datamodel_standard', lambda _, cells: StandardDrive(cells)),
     '11 bit, without control': lambda: _single(
-        'datamodel_standard', lambda _, cells: Standard(cells), control=False),
+        'datamodel_standard', lambda _, cells: StandardDrive(cells), control=False),
     'CANnord': lambda: _cannord('none'),
     'CANnord group': lambda: _cannord('group'),
     'PKW': lambda: _single('canopen_pkw', PkwNode),
@@ -120,8 +104,7 @@ class World:
         self.deaf = False
         self.bench.now = 10.0
         self.bench.exchange._last_pass = 10.0
-        self.bench.exchange.bus_opened()
-        self.bench.exchange.activate()
+        self.bench.begin()
         self.took()
         self.live(1.0)
 
@@ -145,7 +128,7 @@ class World:
         device, station = self.devices[index], index + 1
         if isinstance(device, ExtendedDrive):
             return sent.identifier >> 21 & 0x7F == station
-        if isinstance(device, Standard):
+        if isinstance(device, StandardDrive):
             return sent.identifier == 0x3F0 + station
         if isinstance(device, PkwNode):
             return sent.identifier == 0x500 + station or (

@@ -10,18 +10,15 @@ from collections.abc import Callable, Iterator
 import time
 import uuid
 
-from builders import drive, GAIN, read
+from builders import drive
 import can
 from clocks import REAL
 from exchange_builders import all_routes, Bench
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.events import (
-    ForeignMasterSeen, FrameRejected, RequestCompleted, StationFound,
-)
+from drive_can_bridge.core.events import ForeignMasterSeen, FrameRejected, StationFound
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.requests import ReadValue
 from drive_can_bridge.transport.port import open_port, Port
 
 ZEROS = '0000000000000000'
@@ -56,8 +53,7 @@ def online() -> Bench:
 
 def test_both_begin_at_once() -> None:
     bench = mixed()
-    bench.exchange.bus_opened()
-    bench.exchange.activate()
+    bench.begin()
     # whatever needs no timer goes at once, the first round with the timer
     assert bench.link.take() == [LONG_ASK_MAP]
     assert bench.at(10.0) == [SHORT_ASK]
@@ -117,18 +113,6 @@ def test_a_second_master_is_told_at_the_drive_it_means() -> None:
     assert [type(event) for event in bench.notes[1].events] == [StationFound, ForeignMasterSeen]
     assert [type(event) for event in bench.notes[0].events] == [StationFound]
     assert bench.exchange.frames_rejected == 0
-
-
-def test_parameters_of_both() -> None:
-    bench = online()
-    for session in bench.sessions:
-        bench.exchange.submit(session, read(GAIN))
-    assert bench.link.take() == [f'00200281#{ZEROS}', '3F1#0328000100000000']
-    bench.hears('7F1#0700FFFFFFFFFFFF', 10.011)
-    bench.hears('10200281#0008FFFFFFFFFFFF', 10.012)
-    outcomes = [[event.outcomes for event in notes.events if isinstance(event, RequestCompleted)]
-                for notes in bench.notes]
-    assert outcomes == [[(ReadValue(8),)], [(ReadValue(7),)]]
 
 
 def test_a_silent_11_bit_drive_does_not_hold_up_the_other() -> None:

@@ -40,8 +40,7 @@ def test_exchange_gives_every_drive_its_turn() -> None:
                   drive(name='second', station=2, mapping='assume'))
     bench.now = 100.0041
     bench.exchange._last_pass = bench.now
-    bench.exchange.bus_opened()
-    bench.exchange.activate()
+    bench.begin()
     sent = {}
     for tick in range(1, 80):
         now = 100.0041 + 0.001 * tick
