@@ -16,7 +16,7 @@ def _transition(number: int, label: str, begin: int, during: int, first: int,
               for place, (outcome, end) in enumerate(zip(_OUTCOMES, ends)))]
 
 
-#: number, label, from, to
+#: rcl_lifecycle's default_state_machine.c: number, label, from, to
 TRANSITIONS = [
     *_transition(1, 'configure', 1, 10, 10, 2, 1, 15),
     *_transition(2, 'cleanup', 2, 11, 20, 1, 2, 15),
