@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import builders
-from simulation_builders import EEPROM, frame, INT16, parameter, RAM, RO, WO
+from builders import EEPROM, frame, INT16, parameter, RAM, RO, WO
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType

@@ -8,7 +8,6 @@ import builders
 
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.resources import profiles_directory
@@ -33,12 +32,6 @@ def configuration(profile: Profile = LTMR, *, name: str = 'pump', station: int =
         response=names(*response, profile=profile), **options)
 
 
-def frame(text: str) -> Frame:
-    """Read a frame as candump writes it."""
-    identifier, _, data = text.partition('#')
-    return Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) == 8)
-
-
 class Ltmr:
     """
     One simulated controller, spoken to in hex and literal times.
@@ -58,7 +51,7 @@ class Ltmr:
 
     def ask(self, text: str, now: float) -> list[str]:
         """Send it a frame; return what it sends."""
-        self.drive.receive_frame(frame(text), now)
+        self.drive.receive_frame(builders.frame(text), now)
         return self.sent()
 
     def at(self, now: float) -> list[str]:

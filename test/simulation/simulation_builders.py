@@ -2,22 +2,23 @@
 """Configurations, drives and frames for the tests of the simulation."""
 
 from collections.abc import Iterable
+import json
+from pathlib import Path
 from typing import Any
 
 import builders
+from builders import ACTUAL, CURRENT, EEPROM, frame, INT16, parameter, STATUS
+import pytest
 
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
-from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.profile import ControlTable
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 from drive_can_bridge.simulation.registers import Mechanics
 
-RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
-RAM, EEPROM = Storage.RAM, Storage.EEPROM
-INT16 = ParameterType.INT16
 #: rules of the protocols that somebody may break, as they are told
 RULES = {
     'alone': 'frame that only this drive may send',
@@ -38,35 +39,18 @@ RULES = {
     'not operational': 'request while the node is not operational (ignored)',
 }
 
-
-def parameter(name: str, number: int, **options: Any) -> Parameter:
-    """Make a parameter; a unit or scale makes it a double, as in a profile."""
-    options.setdefault('scaled', bool({'scale', 'offset', 'unit'} & set(options)))
-    return Parameter(name=name, number=number, **options)
-
-
 # the example of the contract's section on profiles, with what its text adds
 SPEED_SETPOINT = parameter('speed_setpoint', 50, type=INT16, scale=0.1, unit='rpm',
                            minimum=-3000.0, maximum=3000.0, neutral=0.0)
 TORQUE_LIMIT = parameter('torque_limit', 51, scale=0.1, unit='%', minimum=0.0, maximum=300.0)
-ACTUAL_SPEED = parameter('actual_speed', 209, type=INT16, scale=0.1, unit='rpm', access=RO)
-MOTOR_CURRENT = parameter('motor_current', 210, type=INT16, scale=0.01, unit='A', access=RO)
-STATUS_WORD = parameter('status_word', 211, access=RO,
-                        bits=(('ready', 0), ('enabled', 1), ('fault', 3)))
 RAMP_TIME = parameter('ramp_time', 30, scale=0.01, unit='s', storage=EEPROM)
-CONTROL_WORD = parameter('control_word', 52, storage=RAM)
-EXAMPLE = (SPEED_SETPOINT, TORQUE_LIMIT, ACTUAL_SPEED, MOTOR_CURRENT, STATUS_WORD, RAMP_TIME)
-
-CONTROL = ControlTable(
-    parameter='control_word', disable=0x0000, enable=0x0001, quick_stop=0x0002,
-    reset_fault=0x0080, status_parameter='status_word', ready=StatusPattern(1, 1),
-    enabled=StatusPattern(2, 2), fault=StatusPattern(8, 8))
+EXAMPLE = (SPEED_SETPOINT, TORQUE_LIMIT, ACTUAL, CURRENT, STATUS, RAMP_TIME)
 
 
 def configuration(parameters: Iterable[Parameter] = EXAMPLE, *, name: str = 'conveyor',
                   station: int = 1, control: ControlTable | None = None,
                   request: Iterable[Parameter] = (SPEED_SETPOINT, TORQUE_LIMIT),
-                  response: Iterable[Parameter] = (ACTUAL_SPEED, MOTOR_CURRENT, STATUS_WORD),
+                  response: Iterable[Parameter] = (ACTUAL, CURRENT, STATUS),
                   protocol: str = 'datamodel_extended', **options: Any) -> DriveConfiguration:
     """Make the configuration of a drive; further keywords are its keys."""
     return builders.drive(protocol, name=name, station=station, table=parameters, control=control,
@@ -95,13 +79,33 @@ def bridge(*drives: DriveConfiguration, interface: str = 'virtual', channel: str
                                drives={d.name: d for d in drives or (configuration(),)})
 
 
-def frame(text: str) -> Frame:
-    """Read a frame as candump writes it."""
-    identifier, _, data = text.partition('#')
-    return Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) == 8)
-
-
 def ask(simulated: SimulatedDataModelDrive, text: str, now: float) -> list[str]:
     """Send a frame to a drive; return its answers as candump writes them."""
     simulated.receive_frame(frame(text), now)
     return [str(answer) for answer in simulated.take_frames()]
+
+
+# -- golden vectors of DataModel ------------------------------------------------------------------
+
+VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
+    encoding='utf-8'))['vectors']
+#: what a register holds that nobody has written
+UNTOUCHED = 0x5151
+
+
+def vectors(protocol: str, *kinds: str) -> list[Any]:
+    """Return the vectors of some kinds: ``extended`` or ``standard``."""
+    return [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in VECTORS
+            if row['protocol'] == protocol and row['kind'] in kinds
+            and row['can_id_hex'] is not None]
+
+
+def frame_of(row: dict[str, Any]) -> Frame:
+    """Return the frame of a vector."""
+    return Frame(int(row['can_id_hex'], 16), bytes.fromhex(row['data_hex']),
+                 row['is_extended_id'])
+
+
+def register_name(number: int) -> str:
+    """Return the name of a register of a drive of vectors; map entries have raw names only."""
+    return f'p{number}' if 122 <= number <= 129 else f'reg_{number}'

@@ -1,17 +1,17 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can simulate``: what it refuses, and as a process with output, signals and input."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
 import re
 import signal
 import subprocess
-import sys
 from typing import Any
 
 import can
 import pytest
+from running import Running
 from simulation_builders import RULES
 from waiting import wait_for
 
@@ -43,64 +43,27 @@ PARAMETERS = """
 """
 
 
-class Command:
-    """A running ``drive_can simulate``."""
-
-    def __init__(self, directory: Path, *arguments: str, **options: Any) -> None:
-        file = directory / 'bridge.yaml'
-        file.write_text(PARAMETERS, encoding='utf-8')
-        self.out, self.err = directory / 'out', directory / 'err'
-        options.setdefault('stdin', subprocess.PIPE)
-        with self.out.open('wb') as out, self.err.open('wb') as err:
-            self.process = subprocess.Popen(
-                [sys.executable, '-m', 'drive_can_bridge.cli.main', 'simulate',
-                 '--params-file', str(file), *arguments], stdout=out, stderr=err, **options)
-
-    @property
-    def lines(self) -> list[str]:
-        return self.out.read_text(encoding='utf-8').splitlines()
-
-    @property
-    def errors(self) -> list[str]:
-        return self.err.read_text(encoding='utf-8').splitlines()
-
-    def line(self, pattern: str, errors: bool = False) -> str:
-        """Wait for a line of the output."""
-        def find() -> str | None:
-            lines = self.errors if errors else self.lines
-            found = next((line for line in lines if re.search(pattern, line)), None)
-            if found is None and self.process.poll() is not None:
-                raise AssertionError(f'it ended without {pattern}: {self.errors}')
-            return found
-        return str(wait_for(find, f'line {pattern}'))
-
-    def write(self, text: str) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(text.encode())
-        self.process.stdin.flush()
-
-    def end(self, signum: int = signal.SIGTERM) -> int:
-        self.process.send_signal(signum)
-        return self.process.wait(30.0)
-
-    def close(self) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
-        if self.process.stdin is not None:
-            self.process.stdin.close()
-
-
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Any]:
-    running: list[Command] = []
+def start(tmp_path: Path) -> Iterator[Callable[..., Running]]:
+    running: list[Running] = []
+    file = tmp_path / 'bridge.yaml'
+    file.write_text(PARAMETERS, encoding='utf-8')
 
-    def make(*arguments: str, **options: Any) -> Command:
-        running.append(Command(tmp_path, *arguments, **options))
+    def make(*arguments: str, **options: Any) -> Running:
+        running.append(Running(tmp_path, 'drive_can', 'simulate', '--params-file', str(file),
+                               *arguments, **{'stdin': subprocess.PIPE, **options}))
         return running[-1]
     yield make
     for command in running:
         command.close()
+        if command.process.stdin is not None:
+            command.process.stdin.close()
+
+
+def write(command: Running, text: str) -> None:
+    assert command.process.stdin is not None
+    command.process.stdin.write(text.encode())
+    command.process.stdin.flush()
 
 
 @pytest.mark.real
@@ -121,7 +84,7 @@ def test_drives_behind_a_pseudo_terminal(start: Any, tmp_path: Path) -> None:
     command.line(r'^\([0-9]+\.[0-9]{6}\) main 003FFFF0#0{16} R$')
     assert command.line('103FFFF0').endswith(' T')
     assert command.end(signal.SIGINT) == 0
-    assert command.errors == []
+    assert command.errors == ''
     command.line(f'^conveyor: violation: {re.escape(RULES["undefined"])}: 1 times$')
     assert list((tmp_path / 'links').iterdir()) == []
 
@@ -132,17 +95,17 @@ def test_standard_input(start: Any) -> None:
                     'lift:load=0.3,noise=1')
     assert 'faults: late=0.15' in command.line('drive conveyor')
     assert 'faults: off' in command.line('drive lift')
-    command.write('conveyor ok\nlift nonsense\nstatus\nconv')
+    write(command, 'conveyor ok\nlift nonsense\nstatus\nconv')
     command.line('conveyor: no fault any more')
     command.line('^conveyor: datamodel_extended')
-    command.line("unknown fault 'nonsense'", errors=True)
-    command.write('eyor trip\n')
+    wait_for(lambda: "unknown fault 'nonsense'" in command.errors, 'complaint')
+    write(command, 'eyor trip\n')
     command.line('conveyor: fault trip')
     command.process.stdin.close()
     with pytest.raises(subprocess.TimeoutExpired):
         command.process.wait(0.3)
     assert command.end(signal.SIGTERM) == 0
-    assert len(command.errors) == 1
+    assert len(command.errors.splitlines()) == 1
 
 
 def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str) -> tuple[
@@ -186,25 +149,14 @@ def test_what_cannot_be(capsys: pytest.CaptureFixture[str], tmp_path: Path,
 @pytest.mark.real
 def test_reader_of_the_output_who_left(start: Any) -> None:
     reading, writing = os.pipe()
-    command = start('--pty')
-    command.close()
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'drive_can_bridge.cli.main', 'simulate', '--pty',
-         '--params-file', str(command.out.parent / 'bridge.yaml')],
-        stdout=writing, stderr=subprocess.PIPE, stdin=subprocess.PIPE)
+    command = start('--pty', stdout=writing, stderr=subprocess.PIPE)
     os.close(writing)
-    try:
-        assert os.read(reading, 4096).startswith(b'bus main: slcan')
-        os.close(reading)
-        assert process.stdin is not None
-        process.stdin.write(b'list\nlist\n')
-        process.stdin.flush()
-        process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=30.0)
-        assert (process.returncode, errors) == (0, b'')
-    finally:
-        process.kill()
-        process.wait()
+    assert os.read(reading, 4096).startswith(b'bus main: slcan')
+    os.close(reading)
+    write(command, 'list\nlist\n')
+    command.process.send_signal(signal.SIGTERM)
+    _, errors = command.process.communicate(timeout=30.0)
+    assert (command.process.returncode, errors) == (0, b'')
 
 
 class TestASerialPort:
@@ -241,4 +193,4 @@ class TestASerialPort:
         assert command.lines[0].split() == ['bus', 'main:', 'slcan', port]
         with pytest.raises(InUse, match=rf'{command.process.pid} \(drive_can simulate\)'):
             Ownership([(BusConfiguration('main', 'slcan', port), ())], 'x', END_FIRST)
-        assert command.end() == 0
+        assert command.end(signal.SIGTERM) == 0

@@ -10,9 +10,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from builders import INT16, parameter, RO
 from cannord_builders import configuration, word
 import pytest
-from simulation_builders import INT16, parameter, RO
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import ParameterType

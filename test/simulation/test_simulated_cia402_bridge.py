@@ -3,9 +3,8 @@
 
 from typing import Any
 
-from builders import read, write
 from cable import Cable
-from cia402_builders import BEGINNING, configuration, names
+from cia402_builders import BEGINNING, configuration
 from hypothesis import given, settings, strategies as st
 import pytest
 from saying import says
@@ -113,32 +112,6 @@ def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> No
         assert cable.speed == pytest.approx(1.0, rel=1e-3)
 
 
-def test_objects_by_sdo() -> None:
-    cable = Cable(configuration())
-    cable.run(1.0)
-    velocity, code, option = names('profile_velocity', 'fault_code', 'quick_stop_option')
-    assert cable.outcome(read(velocity, code)) == [100_000, 0]
-    assert cable.outcome(write((option, 6))) == ['written']
-    assert cable.drives[0].value('quick_stop_option') == 6
-    refused, = cable.outcome(write((names('mode_shown')[0], 1)))
-    assert refused != 'written'
-
-
-@pytest.mark.parametrize(('stored', 'kept'), [(True, 6), (False, 2)])
-def test_what_was_stored_survives_a_loss_of_power(stored: bool, kept: int) -> None:
-    cable = Cable(configuration())
-    cable.run(1.0)
-    option, store = names('quick_stop_option', 'store_parameters')
-    assert cable.outcome(write((option, 6)))[0] != 'no answer'
-    assert cable.drives[0].value('quick_stop_option') == 6
-    if stored:
-        assert 'refused' not in str(cable.outcome(write((store, 0x65766173)))[0])
-    cable.drives[0].fault('restart', cable.now)
-    cable.run(3.0)
-    assert cable.sessions[0].online
-    assert cable.drives[0].value('quick_stop_option') == kept
-
-
 # -- ways out, told by the motor ------------------------------------------------------------------
 
 
@@ -233,22 +206,6 @@ def test_homing_by_request_only(method: int, offset: float, shown: int, moved: b
     assert drive.value('mode_shown') == 8
     assert drive.plant.operation.enabled
     assert not drive.plant.operation.faulted
-
-
-def test_homing_that_fails_says_so_and_leaves_the_axis_in_its_mode() -> None:
-    cable = Cable(configuration(**CSP, homing=True), habits=Habits(home_switch=None))
-    drive = cable.drives[0]
-    cable.run(1.0)
-    drive.set_value('homing_method', 17)
-    assert cable.control(ControlAction.ENABLE)[0]
-    success, message = cable.control(ControlAction.HOME, 10.0)
-    assert not success
-    assert message
-    cable.run(0.5)
-    where = drive.plant.shaft.position
-    cable.run(1.0)
-    assert drive.plant.shaft.position == where
-    assert drive.value('mode_shown') == 8
 
 
 @pytest.mark.parametrize(('mode', 'setpoint', 'value', 'speed'), [

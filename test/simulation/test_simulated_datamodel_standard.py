@@ -7,14 +7,13 @@ compared here are the literal bytes of the vectors and of the manual's tables.
 """
 
 from collections.abc import Iterable
-import json
-from pathlib import Path
 from typing import Any
 
+from builders import ACTUAL, frame, parameter, RAM
 from hypothesis import given, strategies as st
 import pytest
 from simulation_builders import (
-    ACTUAL_SPEED, ask, configuration, EXAMPLE, frame, parameter, RAM, RULES,
+    ask, configuration, EXAMPLE, frame_of, register_name, RULES, UNTOUCHED, vectors,
 )
 
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -23,10 +22,7 @@ from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 
-VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
-    encoding='utf-8'))['vectors']
 NUMBERS = (30, 31, 50, 209, 0x1234, 0x1235, 0xFFFD, 0xFFFE, 0xFFFF)
-UNTOUCHED = 0x5151
 
 READ_RAMP = '3F1#031E000100000000'
 UNDEFINED = 'frame that the manual does not define (ignored)'
@@ -48,25 +44,6 @@ def drive(parameters: Iterable[Parameter] = EXAMPLE, *, neighbours: Iterable[Rou
 # -- golden vectors -------------------------------------------------------------------------------
 
 
-def rows(*kinds: str) -> list[Any]:
-    """Return the 11-bit vectors of some kinds."""
-    return [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in VECTORS
-            if row['protocol'] == 'standard' and row['kind'] in kinds]
-
-
-def data_of(row: dict[str, Any]) -> bytes:
-    return bytes.fromhex(row['data_hex'])
-
-
-def frame_of(row: dict[str, Any]) -> Frame:
-    return Frame(int(row['can_id_hex'], 16), data_of(row), row['is_extended_id'])
-
-
-def register_name(number: int) -> str:
-    """Return the name of a register of ``plain_drive``; map entries have raw names only."""
-    return f'p{number}' if 122 <= number <= 129 else f'reg_{number}'
-
-
 def plain_drive(row: dict[str, Any]) -> SimulatedDataModelDrive:
     """Make a drive whose parameters are plain registers, with the addresses of the vector."""
     fields = row['fields']
@@ -81,7 +58,7 @@ def plain_drive(row: dict[str, Any]) -> SimulatedDataModelDrive:
     return made
 
 
-@pytest.mark.parametrize('row', rows('std_read_request'))
+@pytest.mark.parametrize('row', vectors('standard', 'std_read_request'))
 def test_read_request(row: dict[str, Any]) -> None:
     made = plain_drive(row)
     fields = row['fields']
@@ -105,11 +82,11 @@ QUESTIONS = {
 }
 
 
-@pytest.mark.parametrize('row', rows('std_read_response'))
+@pytest.mark.parametrize('row', vectors('standard', 'std_read_response'))
 def test_read_response(row: dict[str, Any]) -> None:
     question, first = QUESTIONS[row['id']]
     made = plain_drive(row)
-    data = data_of(row)
+    data = bytes.fromhex(row['data_hex'])
     count = row['fields']['expected_count']
     for place in range(count):
         made.set_value(register_name(first + place),
@@ -124,13 +101,13 @@ def test_read_response(row: dict[str, Any]) -> None:
     assert answer.data[2 * count:] == b'\xA5' * (8 - 2 * count)
 
 
-@pytest.mark.parametrize('row', rows('std_write'))
+@pytest.mark.parametrize('row', vectors('standard', 'std_write'))
 def test_write(row: dict[str, Any]) -> None:
     made = plain_drive(row)
 
     made.receive_frame(frame_of(row), 0.0)
 
-    data = data_of(row)
+    data = bytes.fromhex(row['data_hex'])
     expected = dict.fromkeys(NUMBERS, UNTOUCHED)
     expected[row['fields']['pnu']] = data[3] + 256 * data[4]
     assert {number: made.value(f'reg_{number}') for number in NUMBERS} == expected
@@ -138,7 +115,7 @@ def test_write(row: dict[str, Any]) -> None:
     assert not made.violations
 
 
-@pytest.mark.parametrize('row', rows('invalid'))
+@pytest.mark.parametrize('row', vectors('standard', 'invalid'))
 def test_what_the_manual_does_not_define(row: dict[str, Any]) -> None:
     made = plain_drive(row)
 
@@ -252,8 +229,8 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, near: bool) -
 
 def test_setpoints_written_cyclically_take_no_eeprom_time() -> None:
     # their storage is not in the profile; what is sent again and again is volatile
-    made = drive([parameter('speed_setpoint', 50), ACTUAL_SPEED],
-                 request=(parameter('speed_setpoint', 50),), response=(ACTUAL_SPEED,))
+    made = drive([parameter('speed_setpoint', 50), ACTUAL],
+                 request=(parameter('speed_setpoint', 50),), response=(ACTUAL,))
     for place in range(5):
         ask(made, f'3F1#063200{place:02X}00000000', 0.001 * place)
     assert made.value('speed_setpoint') == 4

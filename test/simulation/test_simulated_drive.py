@@ -2,12 +2,10 @@
 """Conversations with the simulated DataModel drive, in literal bytes and literal times."""
 
 
+from builders import ACTUAL, CONTROL, EEPROM, parameter, RAM, STATUS, WO, WORD
 from hypothesis import given, strategies as st
 import pytest
-from simulation_builders import (
-    ACTUAL_SPEED, ask, CONTROL, CONTROL_WORD, drive, EEPROM, EXAMPLE, parameter, RAM, RULES,
-    SPEED_SETPOINT, STATUS_WORD, WO,
-)
+from simulation_builders import ask, drive, EXAMPLE, RULES, SPEED_SETPOINT
 
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
 
@@ -22,11 +20,6 @@ TOO_EARLY = 'read while an EEPROM write is under way (not answered)'
 
 
 class TestCyclicExchange:
-
-    def test_answers_at_once_with_junk_in_unused_bytes(self) -> None:
-        made = drive()
-        # 0.0 rpm; 2.00 A: an energised motor at rest; ready and enabled
-        assert ask(made, f'{CYCLIC}#0000000000000000', 0.0) == [f'{ANSWER}#000000C80003A5A5']
 
     def test_setpoint_beyond_the_limits_is_clamped(self) -> None:
         made = drive(response=(SPEED_SETPOINT,))
@@ -169,15 +162,15 @@ class TestEeprom:
 
 class TestControl:
 
-    request = (SPEED_SETPOINT, CONTROL_WORD)
-    response = (ACTUAL_SPEED, STATUS_WORD)
+    request = (SPEED_SETPOINT, WORD)
+    response = (ACTUAL, STATUS)
 
     def exchange(self, made: object, word: int, now: float, speed: str = '7530') -> str:
         answers = ask(made, f'{CYCLIC}#{speed}{word:04X}00000000', now)  # type: ignore[arg-type]
         return answers[0][9:17]
 
     def made(self) -> object:
-        return drive([*EXAMPLE, CONTROL_WORD], control=CONTROL, request=self.request,
+        return drive([*EXAMPLE, WORD], control=CONTROL, request=self.request,
                      response=self.response)
 
     def test_follows_only_while_enabled(self) -> None:
@@ -233,17 +226,6 @@ class TestControl:
         assert self.exchange(made, 0x0001, 1.5) == '75300003'
 
 
-class TestByHand:
-
-    def test_actual_value_is_held_until_released(self) -> None:
-        made = drive()
-        made.set_value('actual_speed', 12.3)
-        assert ask(made, f'{CYCLIC}#3A9803E800000000', 0.0)[0][9:13] == '007B'
-        assert ask(made, f'{CYCLIC}#3A9803E800000000', 1.0)[0][9:13] == '007B'
-        made.release('actual_speed')
-        assert made.value('actual_speed', 1.0) == 1500.0
-
-
 frames = st.builds(
     Frame, st.integers(0, EXTENDED_IDENTIFIER_MAX), st.binary(max_size=8), st.booleans())
 own_frames = st.builds(
@@ -258,7 +240,7 @@ read_and_write = st.builds(
 @given(st.lists(st.tuples(st.one_of(frames, own_frames, read_and_write),
                           st.floats(-1.0, 100.0)), max_size=30))
 def test_no_frame_ever_raises(conversation: list[tuple[Frame, float]]) -> None:
-    made = drive([*EXAMPLE, CONTROL_WORD], control=CONTROL)
+    made = drive([*EXAMPLE, WORD], control=CONTROL)
     for received, now in conversation:
         made.receive_frame(received, now)
         made.handle_timer(now)

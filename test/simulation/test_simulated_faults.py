@@ -3,11 +3,10 @@
 
 import math
 
+from builders import CONTROL, frame, parameter, RAM, WORD
 from hypothesis import given, strategies as st
 import pytest
-from simulation_builders import (
-    ask, bridge, configuration, CONTROL, CONTROL_WORD, drive, EXAMPLE, frame, parameter, RAM,
-)
+from simulation_builders import ask, bridge, configuration, drive, EXAMPLE
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.protocols.families import FAMILIES
@@ -253,7 +252,7 @@ class TestDrive:
         assert ask(made, '003FFFF0#753003E800000000', 9.0)[0][17:21] == '0003'
 
     def test_restart(self) -> None:
-        made = drive([*EXAMPLE, CONTROL_WORD, parameter('gain', 60, storage=RAM)],
+        made = drive([*EXAMPLE, WORD, parameter('gain', 60, storage=RAM)],
                      control=CONTROL)
         initial = made.value('gain')
         made.set_value('p126', 210)

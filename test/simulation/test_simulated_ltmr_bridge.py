@@ -7,15 +7,13 @@ from builders import drive, read, write
 from cable import Cable
 from hypothesis import given, Phase, settings, strategies as st
 from ltmr_builders import LTMR, names, NODE
-import pytest
-from saying import codes, says
+from saying import codes
 from simulation_builders import RULES
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import (
     FrameRejected, ProcessDataReceived, StationFound, StationLost,
 )
-from drive_can_bridge.core.frame import Frame
 
 FRAME_TIME = 0.001
 RATIO, TRIP_CLASS = names('flc1_ratio', 'motor_trip_class')
@@ -86,132 +84,6 @@ def test_run_trip_reset() -> None:
     # disable; run; disable after the trip; (enable refused;) reset, disable; run; disable
     assert line.writes('C002') == ['0000', '0100', '0000', '0800', '0000', '0100', '0000']
     assert not line.ltmr.violations
-
-
-def test_a_lost_answer_to_a_write() -> None:
-    line = Line()
-    line.until(1.0)
-    request = write((RATIO, 50))
-    line.fault('silent')
-    line.submit(request)
-    line.until(1.002)
-    # only this one answer is lost; whatever is sent again would be answered
-    line.fault('ok')
-    assert line.wait(request) == [says('no_answer', timeout=0.5, attempts=1)]
-    line.until(5.0)
-    assert line.session.online
-    assert line.writes('8C02') == ['3200']
-    assert line.ltmr.value('flc1_ratio') == 50.0
-    assert line.outcome(write((RATIO, 60))) == ['written']
-    assert line.ltmr.value('flc1_ratio') == 60.0
-
-
-def test_a_write_is_not_sent_into_the_unknown() -> None:
-    line = Line()
-    line.until(1.0)
-    line.fault('silent')
-    # a read of the round has not been answered: the last function byte is unknown
-    line.until(1.6)
-    answer, = line.outcome(write((RATIO, 50)))
-    assert str(answer).startswith('no answer')
-    assert line.writes('8C02') == []
-    assert line.ltmr.value('flc1_ratio') == 33.0
-
-
-@pytest.mark.parametrize('late', [0.05, 0.3, 0.6, 0.9])
-def test_late_answers_are_never_taken_for_others(late: float) -> None:
-    line = Line(missed_limit=10, parameter_retries=5)
-    line.until(1.0)
-    line.fault(f'late={late}')
-    for value in (50, 51, 52):
-        answer, = line.outcome(write((RATIO, value)), 60.0)
-        assert answer == 'written' or str(answer).startswith('no answer')
-        found, = line.outcome(read(RATIO), 60.0)
-        assert found == line.ltmr.registers.raw('flc1_ratio') or str(found).startswith('no answer')
-        if late < 0.5:
-            assert (answer, found) == ('written', value)
-
-
-@pytest.mark.parametrize('boot', [0.0, 0.02, 0.5, 3.0])
-def test_restart_in_the_middle_of_a_write(boot: float) -> None:
-    line = Line()
-    line.until(1.0)
-    assert line.control(ControlAction.ENABLE)[0]
-    line.until(2.05)
-    request = write((RATIO, 50))
-    line.submit(request)
-    # the write is on its way
-    line.fault(f'restart={boot}')
-    before = len(line.sent)
-    answer, = line.wait(request)
-    assert str(answer).startswith(('no answer', 'drive offline'))
-    line.until(line.now + 10.0)
-    assert line.session.online
-    assert line.found(StationLost)
-    assert len(line.writes('8C02')) == 1
-    # the boot-up frame was answered at once, and the drive was told to stand still
-    after = line.sent[before:]
-    assert (round(2.051 + boot, 6), '000#0105') in after
-    assert [text for _, text in after if text[:9] == '505#C0020' and text[11] == 'A']
-    # the motor is off, and stays so until somebody enables it
-    assert line.writes('C002')[-1] == '0000'
-    assert not line.ltmr.plant.operation.enabled
-    assert line.ltmr.value('flc1_ratio') in (33.0, 50.0)
-    assert line.outcome(read(RATIO)) == [line.ltmr.registers.raw('flc1_ratio')]
-    assert line.control(ControlAction.ENABLE)[0]
-
-
-@pytest.mark.parametrize('function', ['00', '80', '25', 'A5', '26', 'A6', '2A', 'AA', '2B', 'AB'])
-def test_unknown_last_function_byte(function: str) -> None:
-    line = Line()
-    line.ltmr.receive_frame(Frame(0x000, b'\x01\x05', False), 0.0)
-    line.ltmr.receive_frame(Frame(0x505, bytes.fromhex(f'C80100{function}00000000'), False), 0.0)
-    line.ltmr.take_frames()
-    line.until(2.0)
-    assert line.session.online
-    assert line.outcome(write((RATIO, 50))) == ['written']
-    assert line.ltmr.value('flc1_ratio') == 50.0
-
-
-def test_stopped_node_is_started_again() -> None:
-    line = Line()
-    line.until(1.0)
-    sent = len(line.sent)
-    line.ltmr.receive_frame(Frame(0x000, b'\x02\x05', False), 1.0)
-    line.until(5.0)
-    assert '000#0105' in [text for _, text in line.sent[sent:]]
-    assert line.session.online
-    assert line.session.facts()['nmt_state'] == 'operational'
-
-
-def test_lost_heartbeats() -> None:
-    line = Line(heartbeat_timeout=0.6, missed_limit=1000)
-    line.until(1.0)
-    line.fault('off')
-    line.until(3.0)
-    assert not line.session.online
-    lost, = (at for at, event in line.events if isinstance(event, StationLost))
-    # the last one came at 1.0 at the latest, 0.2 s apart
-    assert 1.4 <= lost <= 1.61
-    line.fault('ok')
-    line.until(6.0)
-    assert line.session.online
-
-
-def test_safe_stop() -> None:
-    line = Line()
-    line.until(1.0)
-    assert line.control(ControlAction.ENABLE)[0]
-    line.session.deactivate(line.now)
-    line._collect()
-    line.until(line.now + 2.0)
-    assert line.session.stopped
-    assert not line.ltmr.plant.operation.enabled
-    assert line.writes('C002')[-1] == '0000'
-    # nothing by NMT, and silence
-    last = line.sent[-1][0]
-    line.until(line.now + 5.0)
-    assert line.sent[-1][0] == last
 
 
 _STEPS = st.lists(st.tuples(

@@ -8,11 +8,12 @@ import sys
 import time
 from typing import Any
 
+from builders import frame
 import can
 from clocks import REAL
 from hypothesis import given, strategies as st
 import pytest
-from simulation_builders import bridge, frame
+from simulation_builders import bridge
 from waiting import wait_for
 
 from drive_can_bridge.core.errors import BusUnavailable

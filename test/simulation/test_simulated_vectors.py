@@ -6,33 +6,17 @@ It shares the codec with the bridge and would share its mistakes; so what goes i
 compared here are the literal bytes of the vectors.
 """
 
-import json
-from pathlib import Path
 from typing import Any
 
+from builders import parameter, RAM
 import pytest
-from simulation_builders import drive, parameter, RAM
+from simulation_builders import drive, frame_of, register_name, UNTOUCHED, vectors
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.simulation.datamodel import SimulatedDataModelDrive
 
-VECTORS = json.loads((Path(__file__).parents[1] / 'vectors' / 'datamodel.json').read_text(
-    encoding='utf-8'))['vectors']
 NUMBERS = (0, 30, 31, 50, 51, 52, 53, 63, *range(209, 213), *range(256, 259),
            *range(0x1234, 0x1238), *range(0xFFFC, 0x10000))
-UNTOUCHED = 0x5151
-
-
-def rows(*kinds: str) -> list[Any]:
-    """Return the 29-bit vectors of some kinds."""
-    return [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in VECTORS
-            if row['protocol'] == 'extended' and row['kind'] in kinds
-            and row['can_id_hex'] is not None]
-
-
-def frame(row: dict[str, Any]) -> Frame:
-    return Frame(int(row['can_id_hex'], 16), bytes.fromhex(row['data_hex']),
-                 row['is_extended_id'])
 
 
 def plain_drive(row: dict[str, Any]) -> SimulatedDataModelDrive:
@@ -59,14 +43,14 @@ def length_of(entries: list[int]) -> int:
     return entries.index(0) if 0 in entries else len(entries)
 
 
-@pytest.mark.parametrize('row', rows('cyclic_request'))
+@pytest.mark.parametrize('row', vectors('extended', 'cyclic_request'))
 def test_cyclic_request(row: dict[str, Any]) -> None:
     made = plain_drive(row)
     entries = row['fields']['mapping']
     set_map(made, 122, entries)
     set_map(made, 126, [212, 0, 209, 0])
 
-    made.receive_frame(frame(row), 0.0)
+    made.receive_frame(frame_of(row), 0.0)
 
     expected = dict.fromkeys(NUMBERS, UNTOUCHED)
     expected.update(zip(entries[:length_of(entries)], literal_words(row), strict=False))
@@ -76,7 +60,7 @@ def test_cyclic_request(row: dict[str, Any]) -> None:
     assert not made.violations
 
 
-@pytest.mark.parametrize('row', rows('cyclic_response'))
+@pytest.mark.parametrize('row', vectors('extended', 'cyclic_response'))
 def test_cyclic_response(row: dict[str, Any]) -> None:
     made = plain_drive(row)
     entries = row['fields']['mapping']
@@ -96,29 +80,28 @@ def test_cyclic_response(row: dict[str, Any]) -> None:
     assert answer.data[rest:] == b'\xA5' * (8 - rest)
 
 
-@pytest.mark.parametrize('row', rows('acyclic_write'))
+@pytest.mark.parametrize('row', vectors('extended', 'acyclic_write'))
 def test_write(row: dict[str, Any]) -> None:
     made = plain_drive(row)
 
-    made.receive_frame(frame(row), 0.0)
+    made.receive_frame(frame_of(row), 0.0)
 
     first = row['fields']['param']
     for step, word in enumerate(literal_words(row)[:row['fields']['count']]):
         number = first + step
-        name = f'p{number}' if 122 <= number <= 129 else f'reg_{number}'
-        assert made.value(name) == word
+        assert made.value(register_name(number)) == word
     assert made.take_frames() == []
     assert not made.violations
 
 
 @pytest.mark.parametrize('row', [
-    row for row in rows('read_response') if row.values[0]['expect'] == 'ok'])
+    row for row in vectors('extended', 'read_response') if row.values[0]['expect'] == 'ok'])
 def test_read(row: dict[str, Any]) -> None:
     made = plain_drive(row)
     count = row['fields']['count']
     for step, word in enumerate(literal_words(row)[:count]):
         number = row['fields']['param'] + step
-        made.set_value(f'p{number}' if 122 <= number <= 129 else f'reg_{number}', word)
+        made.set_value(register_name(number), word)
 
     made.receive_frame(Frame(int(row['can_id_hex'], 16) - 0x10000000, bytes(8), True), 0.0)
 
@@ -128,22 +111,22 @@ def test_read(row: dict[str, Any]) -> None:
     assert answer.data[2 * count:] == b'\xA5' * (8 - 2 * count)
 
 
-@pytest.mark.parametrize('row', rows('read_request'))
+@pytest.mark.parametrize('row', vectors('extended', 'read_request'))
 def test_read_request_is_answered_on_its_own_identifier(row: dict[str, Any]) -> None:
     made = plain_drive(row)
 
-    made.receive_frame(frame(row), 0.0)
+    made.receive_frame(frame_of(row), 0.0)
 
     answer, = made.take_frames()
     assert answer.identifier == int(row['can_id_hex'], 16) + 0x10000000
 
 
 @pytest.mark.parametrize('row', [
-    row for row in rows('invalid') if not row.values[0]['is_remote_frame']])
+    row for row in vectors('extended', 'invalid') if not row.values[0]['is_remote_frame']])
 def test_what_the_manual_does_not_define(row: dict[str, Any]) -> None:
     made = plain_drive(row)
 
-    made.receive_frame(frame(row), 0.0)
+    made.receive_frame(frame_of(row), 0.0)
 
     assert made.take_frames() == []
     assert {made.value(f'reg_{number}') for number in NUMBERS} == {UNTOUCHED}

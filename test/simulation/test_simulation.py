@@ -7,10 +7,11 @@ from dataclasses import replace
 import os
 from typing import Any
 
+from builders import frame, INT16, parameter, RO
 from clocks import REAL
 from jumping import JumpingClock
 import pytest
-from simulation_builders import bridge, configuration, frame, INT16, parameter, RO, RULES
+from simulation_builders import bridge, configuration, RULES
 from transcripts import replayed, shown, stories
 from waiting import wait_for
 from world import World
