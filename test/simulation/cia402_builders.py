@@ -79,19 +79,22 @@ class Servo:
 
     # -- objects ----------------------------------------------------------------------------------
 
-    def write(self, index: int, subindex: int, value: int, size: int) -> None:
-        """Write an object by SDO, as manuals print it."""
-        data = (value & (1 << 8 * size) - 1).to_bytes(4, 'little').hex().upper()
-        head = {1: '2F', 2: '2B', 4: '23'}[size]
-        place = f'{index & 0xFF:02X}{index >> 8:02X}{subindex:02X}'
-        assert self.ask(f'605#{head}{place}{data}') == [f'585#60{place}00000000']
-
-    def refused(self, index: int, subindex: int, value: int, size: int) -> int:
-        """Write an object, and return the abort code."""
+    def _download(self, index: int, subindex: int, value: int, size: int) -> tuple[str, str]:
+        """Write an object by SDO, as manuals print it; return its place, and the answer."""
         data = (value & (1 << 8 * size) - 1).to_bytes(4, 'little').hex().upper()
         head = {1: '2F', 2: '2B', 4: '23'}[size]
         place = f'{index & 0xFF:02X}{index >> 8:02X}{subindex:02X}'
         answer, = self.ask(f'605#{head}{place}{data}')
+        return place, answer
+
+    def write(self, index: int, subindex: int, value: int, size: int) -> None:
+        """Write an object."""
+        place, answer = self._download(index, subindex, value, size)
+        assert answer == f'585#60{place}00000000'
+
+    def refused(self, index: int, subindex: int, value: int, size: int) -> int:
+        """Write an object, and return the abort code."""
+        place, answer = self._download(index, subindex, value, size)
         assert answer.startswith(f'585#80{place}')
         return int.from_bytes(bytes.fromhex(answer[-8:]), 'little')
 
