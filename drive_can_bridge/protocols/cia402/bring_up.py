@@ -487,7 +487,8 @@ class BringUp:
         at, types = wanted.communication, self._types(transmit=transmit)
         kept = identifier & (pdo.NO_REMOTE | pdo.LONG_IDENTIFIER)
         fixed = yield from self._put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
-        refusal = NOTHING if fixed else (yield from self._map(wanted))
+        fits = fixed or not (yield from self._other_content(wanted))     # a fixed one may
+        refusal = NOTHING if fits else (yield from self._map(wanted))
         if refusal:
             yield from self._put(at, pdo.COB_ID, identifier, 4)     # as it was found
             raise _differs(refusal)
@@ -511,11 +512,11 @@ class BringUp:
         return fixed
 
     def _map(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
-        """Write what a PDO holds; return the refusal where it is fixed to something else."""
+        """Write what a PDO holds; return the refusal where it is fixed."""
         mapping = wanted.communication + pdo.MAPPING_OFFSET
         refusal = yield from self._put(mapping, 0, 0, 1)
         if refusal:
-            return refusal if (yield from self._other_content(wanted)) else NOTHING
+            return refusal
         for place, entry in enumerate(wanted.entries, 1):
             yield from self._must(mapping, place, entry, 4)
         yield from self._must(mapping, 0, len(wanted.entries), 1)

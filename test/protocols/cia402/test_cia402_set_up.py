@@ -63,8 +63,9 @@ class TestConfigure:
         sent = axis.take()
         first = sent.index('605#4000140100000000')
         assert sent[sent.index('000#8005'):first]       # pre-operational before
-        assert sent[first:first + 14] == [
+        assert sent[first:first + 15] == [
             '605#4000140100000000', '605#4000140200000000', '605#2300140105020080',
+            '605#4000160000000000',
             '605#2F00160000000000', '605#2300160110004060', '605#230016022000FF60',
             '605#2F00160002000000', '605#2F00140201000000', '605#2300140105020000',
             '605#4000140100000000', '605#4000140200000000', '605#4000160000000000',
@@ -427,3 +428,18 @@ class TestHeldAxes:
         axis.commands(1003.0, 1100.0)
         axis.live(0.02)
         assert '205#0F004C040000' in axis.take()
+
+
+class TestFixedEntries:
+    """The entries of a mapping are fixed; how many of them are in it can be written."""
+
+    ENTRIES = fixed(*((at, place) for at in (0x1600, 0x1A00) for place in (1, 2)))
+
+    @pytest.mark.parametrize('else_differs', [
+        {(0x1800, 2): b'\xFF'}, {(0x1800, 3): b'\x64\0'}, {TPDO: bytes.fromhex('85010080')}])
+    def test_those_that_fit_are_not_written(self, else_differs: dict[Any, Any]) -> None:
+        axis = Axis(objects={**FITS, **else_differs})
+        axis.drive.fixed = self.ENTRIES
+        axis.start()
+        assert axis.session.online, axis.session.offline_advice
+        assert not any(text[2:4] in ('16', '1A') for text in written(axis))
