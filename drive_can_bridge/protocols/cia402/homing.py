@@ -25,6 +25,10 @@ from drive_can_bridge.protocols.cia402.states import State
 #: a mode that changes now would change how the drive brakes
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 _DONE = states.BIT_12 | states.TARGET_REACHED
+#: s within arming_tolerance that are *it stands*, where 606Ch is 0, or the drive has none
+_STILL = 0.1
+#: likewise where it says otherwise, which may be noise: so much of control_timeout
+_STILL_ANYWAY = 0.5
 
 
 class Step(Enum):
@@ -54,7 +58,9 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = Step.NONE
         self._deadline = math.inf
-        self._before: list[int | None] = []     # where held axes were a sample ago
+        self._stay: list[int] = []      # where held axes are, and since when
+        self._since = -math.inf
+        self._looking = self._no_velocity = False       # 606Ch says so, or nothing
         self._now = -math.inf           # of the last sample
         self._fresh = self._lowered = False
         self._failure = NOTHING
@@ -158,20 +164,41 @@ class Homing:
         self._deadline = self._now + (
             self._session.configuration.control_timeout if failure else math.inf)
         self._rules.homing_bits = 0
+        self._stay, self._looking, self._no_velocity = [], False, False
         self._go(Step.LATCHING)
 
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
         """Take where the axis is, as soon as it stands: unless it is homed, it has to brake."""
         setpoints = self._session.setpoints
-        before, self._before = self._before, [
-            raws[each.place] if each.place < len(raws) else None for each in setpoints.held]
         setpoints.measure(raws, driven=False)
-        if None in self._before:    # a sample that was cut short says nothing
+        if not setpoints.known:     # a sample that was cut short says nothing
             return
-        # not by bit 10: behind a homing that was ended it says no more than that
-        if not self._failure or behind and self._before == before:
+        where = [each.neutral for each in setpoints.held]
+        if not behind or not self._stay or any(
+                abs(position - stay) * abs(each.parameter.scale) > each.parameter.arming_tolerance
+                for position, stay, each in zip(where, self._stay, setpoints.held)):
+            self._stay, self._since, self._no_velocity = where, self._now, False
+        still = self._now - self._since
+        # not by bit 10: with bit 4 low it says no more than that homing was ended
+        stands = self._no_velocity and still >= _STILL or (
+            still >= _STILL_ANYWAY * self._session.configuration.control_timeout)
+        if not self._failure or (stands if where else behind):
             self._deadline = math.inf
             self._go(Step.HOLDING)
+        elif where and still >= _STILL and not self._looking:
+            self._looking = True
+            self._channel.run(self._look_at_velocity(), self._looked, self._now)
+
+    def _look_at_velocity(self) -> Generator[Ask, Reply, bool]:
+        """Return whether 606Ch is 0, or the drive has none."""
+        reply = yield Ask(states.VELOCITY, attempts=1)
+        if reply.abort is not None or reply.data is not None and not any(reply.data):
+            return True
+        yield Ask(pause=LOOK_PERIOD)
+        return False
+
+    def _looked(self, no_velocity: bool) -> None:
+        self._looking, self._no_velocity = False, no_velocity
 
     def _left(self, failure: Sentence) -> None:
         if self._step is not Step.LEAVING:

@@ -1,12 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Targets that are handed over (pp), and homing."""
 
+from dataclasses import replace
 from typing import Any
 
 from literal_drives import ServoDrive
 import pytest
 from saying import says
-from servo_builders import Axis, OBJECTS
+from servo_builders import Axis, OBJECTS, POSITION, TARGET
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, Noted
@@ -377,3 +378,61 @@ class TestHomingThatEndsOnTheWay:
         back = sent.index(f'605#2F606000{number:02X}000000')
         assert [text[4:8] for text in sent[:back] if text.startswith('205#')][-1] == '0700'
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+
+
+class Creeps(PositionDrive):
+    """
+    Of few steps: it goes one each four SYNCs behind an error in homing, and 606Ch says so.
+
+    :ivar steps: that it goes.
+    :ivar noise: increments by which its encoder is off, one way and the other, for ever.
+    """
+
+    steps, noise = 12, 0
+    syncs = gone = 0
+
+    def runs_down(self) -> None:
+        super().runs_down()
+        if self.number(0x6060) != 6:
+            return
+        self.syncs += 1
+        self.gone += self.gone < self.steps and not self.syncs % 4
+        noise = self.noise if self.syncs % 2 else -self.noise
+        self.objects[0x6064, 0] = (1000 + self.gone + noise).to_bytes(4, 'little')
+        if (0x606C, 0) in self.objects:
+            self.objects[0x606C, 0] = (25 * (self.gone < self.steps) + abs(noise)).to_bytes(
+                4, 'little')
+
+
+class TestWhetherItStands:
+    """Behind a homing that failed."""
+
+    def meet(self, tolerance: float, timeout: float = 1.0) -> tuple[Axis, Creeps]:
+        target = replace(TARGET, arming_tolerance=tolerance)
+        axis = Axis('csp', homing=True, control_timeout=timeout, request=(target,),
+                    table=(target, POSITION))
+        drive = axis.drive = Creeps(5, OBJECTS)
+        axis.enabled()
+        drive.homing = -2
+        return axis, drive
+
+    @pytest.mark.parametrize(('tolerance', 'told'), [(0.0, True), (0.0, False), (10.0, True)])
+    def test_few_steps_are_no_standing(self, tolerance: float, told: bool) -> None:
+        axis, drive = self.meet(tolerance)
+        if not told:
+            del drive.objects[0x606C, 0]
+        assert home(axis, 1.5) == [('home', False, says('homing_failed'))]
+        assert (drive.gone, drive.number(0x607A)) == (12, 1012)
+        assert drive.number(0x6060) == 8
+
+    def test_noise_is_no_motion(self) -> None:
+        axis, drive = self.meet(10.0)
+        drive.steps, drive.noise = 0, 3
+        assert home(axis, 1.0) == [('home', False, says('homing_failed'))]
+        assert (drive.state, drive.number(0x6060)) == (drive.ENABLED, 8)
+
+    def test_one_that_never_stands_is_disabled(self) -> None:
+        axis, drive = self.meet(0.0)
+        drive.steps = 1000
+        assert home(axis, 1.2) != []
+        assert drive.state == drive.READY
