@@ -101,7 +101,8 @@ class Homing:
             self._end(sentences.homing_timed_out(self._timeout, self._step.value))
             return
         self._deadline = math.inf
-        failure = sentences.together((self._failure, sentences.homing_moves_on()))
+        failure = sentences.together((
+            self._failure, self._session.setpoints.untold_text or sentences.homing_moves_on()))
         self._machine.drop(failure)     # in its mode it would jump back
         self._answer(False, failure)
         self._session.control_changed(now)
@@ -161,8 +162,7 @@ class Homing:
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
         self._failure = failure
-        self._deadline = self._now + (
-            self._session.configuration.control_timeout if failure else math.inf)
+        self._deadline = self._now + self._session.configuration.control_timeout
         self._rules.homing_bits = 0
         self._stay, self._looking, self._no_velocity = [], False, False
         self._go(Step.LATCHING)

@@ -436,3 +436,19 @@ class TestWhetherItStands:
         drive.steps = 1000
         assert home(axis, 1.2) != []
         assert drive.state == drive.READY
+
+    @pytest.mark.parametrize('found', [5, -2])
+    def test_one_that_does_not_tell_where_it_is_is_disabled(self, found: int) -> None:
+        axis, drive = self.meet(0.0)
+        drive.homing, takes = found, drive.takes
+
+        def cuts(sent: Frame) -> list[Frame]:
+            return [each._replace(data=each.data[:2]) if each.identifier == 0x185 and (
+                drive.bits or drive.number(0x6060) != 6) else each for each in takes(sent)]
+        drive.takes = cuts      # type: ignore[method-assign]
+        axis.take()
+        (_, success, text), = home(axis, 2.0)
+        assert not success
+        assert 'would_jump' in (text.code, *(    # type: ignore[attr-defined]
+            part.code for part in text.fields.get('parts', ())))    # type: ignore[attr-defined]
+        assert drive.state == drive.READY
