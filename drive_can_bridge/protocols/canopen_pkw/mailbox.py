@@ -19,11 +19,20 @@ A device that has just started has 00h as its last function byte already and nee
 function 00h. So a read is sent all the same: it does no harm, and its answer synchronises. A
 write that was sent like this might be executed although it seems lost; it is reported as *not
 sent*, unless the caller says that this does not matter (:attr:`Write.blind`).
+
+Blind writes do not wait for function 00h, so that the answer to a write that was given up may
+still come. There are two toggles only: it fits the last but one as well, and may say that a drive
+runs where a drive is to stop. As a device answers in order, an answer is that to the oldest write
+that it fits. It proves a blind one only if nothing else was written since; otherwise that is
+written again at once: a device that keeps nothing but the newest request while it is busy takes
+no notice of one that has the function byte of the request that it was busy with.
 """
 
+from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import partial
+from itertools import dropwhile
 import math
 from typing import Any, NamedTuple, Union
 
@@ -41,6 +50,8 @@ from drive_can_bridge.protocols.transactor import Transactor
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
+#: so many writes whose answers may still come are remembered
+OPEN_MAX = 16
 #: s until the bus is asked again to take a write that waits for nobody
 REFUSED_PAUSE = 0.01
 
@@ -124,7 +135,7 @@ Procedure = Generator[Step, Reply, Any]
 
 class MailboxTransactor(Transactor[Step, Reply]):
     """
-    One exchange at a time. Late answers have the wrong toggle.
+    One exchange at a time. Late answers have the wrong toggle, or are seen through.
 
     :param send: takes a request that leaves now, and who is told whether it did.
     :param order: of the halves of abort codes: ``auto``, ``low_first``, ``high_first``.
@@ -141,6 +152,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._synchronised = False
         self._toggle = False            # of the last request
         self._request: Message | None = None
+        #: writes in order, the one under way included, whose answers may still come
+        self._open: deque[Message] = deque(maxlen=OPEN_MAX)
         self._until = math.inf          # an answer counts; the deadline may be a moment before
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
@@ -170,7 +183,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self.deadline = min(self.deadline, until)
 
     def receive(self, answer: Message, now: float) -> Reply | bool:
-        request, step = self._request, self.step
+        request, step, since = self._request, self.step, self._writes_since(answer)
         if request is None or step is None:
             return False
         if request.code == Function.NONE:
@@ -183,6 +196,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._send_step(step, now)
             return True
         if not pkw.answers(answer, request):
+            return False
+        if isinstance(step, Read):
+            self._open.clear()
+        elif step.blind and any(each.words != request.words and each.address == request.address
+                                for each in since):
+            if not self._abandoned and self._refused_at is None:
+                self._send_step(step, now)
             return False
         self._synchronised = True
         self.finish()
@@ -216,6 +236,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._abandoned = self._late = False
         self._refused_at = None
 
+    def _writes_since(self, answer: Message) -> list[Message]:
+        """Take an answer: it is to the oldest write that it fits. Return that and those since."""
+        found = list(dropwhile(lambda each: not pkw.answers(answer, each), self._open))
+        if found:
+            self._open = deque(found[1:], maxlen=OPEN_MAX)
+        return found
+
     def _left(self, sent: bool, now: float) -> None:
         """Record a request that the bus refused; or took, if late, after all."""
         if self._request is None:
@@ -230,6 +257,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
+            if self._open and self._open[-1] is self._request:
+                self._open.pop()
 
     def _patience(self, step: Step | None) -> float:
         """Return how many s the answer to a step has."""
@@ -260,6 +289,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._request = pkw.read_request(step.address, step.count, self._toggle)
         else:
             self._request = pkw.write_request(step.address, step.words, self._toggle)
+            self._open.append(self._request)
             left = partial(self._write_left, step)
         self.deadline = self._until = now + self._patience(step)
         self._send(self._request, left)

@@ -5,15 +5,18 @@ from collections.abc import Callable
 
 from builders import Conversation, read, write
 from pkw_builders import (
-    CLASS, DISABLE_0, DISABLE_1, driven, echo, FLC, running, SPEED, TORQUE,
+    CLASS, DISABLE_0, DISABLE_1, driven, echo, FLC, online, running, SPEED, SPEED_1, STILL_0,
+    STILL_1, TORQUE,
 )
 import pytest
+from saying import says
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
     Noted, ProcessDataReceived, RequestCompleted, StationLost,
 )
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 DISABLE = ControlAction.DISABLE
 #: function bytes of reads
@@ -205,3 +208,49 @@ def test_a_repetition_that_the_bus_refused_is_made_up_for(asked: bool) -> None:
     drive.live(24.5)
     assert drive.when(DISABLE_0, DISABLE_1)
     assert control.disregard, 'it still runs, and diagnostics say so'
+
+
+# -- the answer to what made it run, late ---------------------------------------------------------
+
+
+def hurried() -> Conversation:
+    """
+    Return a drive without a control word that runs, or will, and has to stop.
+
+    10 Hz have toggle 1 and are given up, 0 has toggle 0 and is given up, 0 has toggle 1.
+    """
+    talk = online(request=(SPEED,))
+    assert talk.commands(0, 0.0, 10.06) is CommandOutcome.ARMED
+    assert talk.commands(0, 10.0, 10.06) is CommandOutcome.ACCEPTED
+    assert talk.until(10.0701) == [(10.07, SPEED_1)]
+    assert talk.asks(ControlAction.QUICK_STOP, 10.08) == []
+    assert talk.until(10.19) == [
+        (pytest.approx(10.13), STILL_0), (pytest.approx(10.18), STILL_1)]
+    return talk
+
+
+@pytest.mark.parametrize('late', [0.0, 0.12])
+def test_the_answer_to_a_command_proves_no_stop(late: float) -> None:
+    """The device, busy with 10 Hz, heard of both 0 the last one, and saw the same function."""
+    talk = hurried()
+    assert talk.hears(echo(SPEED_1), 10.2) == [STILL_0]
+    assert talk.control_outcomes() == []
+    assert talk.session.owed
+    talk.hears(echo(STILL_0), 10.21 + late)
+    assert talk.control_outcomes() == [('quick_stop', True, says('neutral_without_control'))]
+    assert not talk.session.owed
+
+
+def test_a_stop_whose_commands_answer_was_lost_is_written_once_more() -> None:
+    talk = hurried()
+    assert talk.hears(echo(STILL_1), 10.19) == [STILL_0]
+    talk.hears(echo(STILL_0), 10.2)
+    assert talk.control_outcomes() == [('quick_stop', True, says('neutral_without_control'))]
+
+
+def test_a_stop_whose_answers_come_in_order_is_proven_by_its_own() -> None:
+    """A device that keeps all requests, and needs 55 ms for each, once."""
+    talk = hurried()
+    assert talk.hears(echo(STILL_0), 10.185) == []
+    talk.hears(echo(STILL_1), 10.24)
+    assert talk.control_outcomes() == [('quick_stop', True, says('neutral_without_control'))]

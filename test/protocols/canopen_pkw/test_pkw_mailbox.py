@@ -243,3 +243,100 @@ def test_one_exchange_at_a_time(box: Box) -> None:
     box.begin(READ, 1.0)
     with pytest.raises(RuntimeError):
         box.begin(READ, 1.1)
+
+
+# -- late answers to what was given up, which have the toggle of the last but one -----------------
+
+
+def blind(value: int, register: Address = REGISTER) -> Write:
+    return Write(register, (value,), blind=True, timeout=0.05)
+
+
+@pytest.fixture(name='told')
+def _told(box: Box) -> Box:
+    """Return a mailbox that gave up on 1 with toggle 0, then on 0 with 1, and waits for 0."""
+    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
+    box.box.abandon(1.05)
+    assert box.box.handle_timer(1.05) == Silence(sent=True)
+    assert box.begin(blind(0), 1.05) == ['C70100AA00000000']
+    assert box.box.handle_timer(1.1) == Silence(sent=True)
+    assert box.begin(blind(0), 1.1) == ['C701002A00000000']
+    return box
+
+
+@pytest.mark.parametrize('late', ['C701002A00000000', 'C701004E22000008'])
+def test_the_answer_to_another_value_proves_nothing(told: Box, late: str) -> None:
+    """A device that was busy with 1 takes no notice of a request with the same function byte."""
+    assert told.hears(late, 1.13) is False
+    assert told.take() == ['C70100AA00000000']
+    assert told.box.deadline == pytest.approx(1.18)
+    assert told.hears('C701002A00000000', 1.14) is False
+    assert told.take() == []
+    assert told.hears('C70100AA00000000', 1.15) == Answered((0, 0))
+    assert not told.box.busy
+
+
+def test_the_answer_to_the_same_value_is_as_good(told: Box) -> None:
+    """The device got both 0, in order; the answer to the first of them comes in between."""
+    assert told.hears('C701002A00000000', 1.13) is False
+    assert told.take() == ['C70100AA00000000']
+    assert told.hears('C70100AA00000000', 1.14) == Answered((0, 0))
+
+
+def test_a_late_answer_that_fits_nothing_under_way_is_over(told: Box) -> None:
+    """It is to the first 0: after that no answer to 1 can come."""
+    assert told.hears('C70100AA00000000', 1.13) is False
+    assert told.take() == []
+    assert told.hears('C701002A00000000', 1.14) == Answered((0, 0))
+
+
+def test_a_late_answer_while_nothing_is_asked_is_over(told: Box) -> None:
+    assert told.box.handle_timer(1.16) == Silence(sent=True)
+    assert told.hears('C701002A00000000', 1.17) is False
+    assert told.begin(blind(0), 1.2) == ['C70100AA00000000']
+    assert told.hears('C70100AA00000000', 1.21) == Answered((0, 0))
+
+
+def test_another_register_has_answers_of_its_own(told: Box) -> None:
+    assert told.box.handle_timer(1.16) == Silence(sent=True)
+    other = Address(456)
+    assert told.begin(blind(7, other), 1.16) == ['C80100AA07000000']
+    assert told.box.handle_timer(1.22) == Silence(sent=True)
+    assert told.begin(blind(7, other), 1.22) == ['C801002A07000000']
+    assert told.hears('C801002A00000000', 1.23) == Answered((0, 0))
+
+
+def test_after_the_answer_to_a_read_none_to_older_writes_comes(told: Box) -> None:
+    assert told.box.handle_timer(1.16) == Silence(sent=True)
+    assert told.begin(READ, 1.16) == ['0000000000000000']
+    assert told.hears('0000000000000000', 1.17) is True
+    assert told.take() == ['C70100A500000000']
+    assert told.hears('C70100A583200000', 1.18) == Answered((0x2083, 0))
+    assert told.begin(blind(0), 1.2) == ['C701002A00000000']
+    assert told.hears('C701002A00000000', 1.21) == Answered((0, 0))
+
+
+def test_what_the_bus_refused_is_not_answered(box: Box) -> None:
+    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
+    box.left(False, 1.0)
+    assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+    assert box.begin(blind(0), 1.1) == ['C701002A00000000']
+    assert box.hears('C701002A00000000', 1.11) == Answered((0, 0))
+
+
+def test_what_has_to_make_room_is_not_sent_again(told: Box) -> None:
+    told.box.abandon(1.14)
+    assert told.hears('C701002A00000000', 1.13) is False
+    assert told.take() == []
+    assert told.box.handle_timer(1.14) == Silence(sent=True)
+
+
+def test_what_must_not_be_executed_twice_is_sent_once(told: Box) -> None:
+    """Function 00h has been answered before: an answer to what is older cannot come any more."""
+    assert told.box.handle_timer(1.16) == Silence(sent=True)
+    write = Write(REGISTER, (7,))
+    assert told.begin(write, 1.2) == ['0000000000000000']
+    assert told.hears('0000000000000000', 1.21) is True
+    assert told.take() == ['C70100AA07000000']
+    assert told.hears('C70100AA00000000', 1.22) == Answered((0, 0))
+    assert told.take() == []
