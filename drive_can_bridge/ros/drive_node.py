@@ -161,11 +161,13 @@ class DriveNode(DriveListener):
 
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
+        self._spinner.leaves()
         self._spinner.executor.remove_node(self.node)
         self.commands.destroy()
         for services in self._services:
             services.destroy()
         self.node.destroy_node()
+        self._spinner.leaves()
 
     # -- log --------------------------------------------------------------------------------------
 

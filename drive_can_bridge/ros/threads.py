@@ -14,11 +14,14 @@ coroutine, the one that answers goes on with it.
 """
 
 from collections.abc import Callable, Coroutine, Generator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
+import math
 import threading
 from typing import Any, Generic, TypeVar
 
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
@@ -35,12 +38,14 @@ from drive_can_bridge.ros.polled_topics import PolledGroup
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
+#: s after which nothing can be missing any more because a drive has left
+LEAVING = 1.0
 #: share of the processor's time for a thread that anybody can keep busy
 MODEST = 0.3
 #: calls of one service that are taken in a row
 TAKE_MAX = 8
 
-#: takes the response; to be called once, from any thread
+#: takes the response, or the error that there is none for; to be called once, from any thread
 Answer = Callable[[Any], None]
 #: takes a request, and whatever is to be called with the response
 Callback = Callable[[Any, Answer], None]
@@ -67,6 +72,7 @@ class ExecutorThread:
         self.executor = SingleThreadedExecutor(context=context)
         self._report = report
         self._stopping = False
+        self._left_at = -math.inf
         self._ending = threading.Lock()
         self._thread = clock.worker(self._run, name)
 
@@ -79,6 +85,10 @@ class ExecutorThread:
         with self._ending:
             if not self._stopping:
                 self.executor.create_task(job, *arguments)
+
+    def leaves(self) -> None:
+        """Record that a drive leaves: what was to be served next may be gone. From any thread."""
+        self._left_at = self._clock.now()
 
     def stop(self) -> None:
         """Stop to serve and wait for the callback that is running."""
@@ -98,13 +108,13 @@ class ExecutorThread:
                 self.executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 return
-            except InvalidHandle:  # what was to be served is gone: a drive's node, after cleanup
-                self._clock.wait(self._clock.now() + ERROR_PAUSE)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._stopping:
                     return
-                self._report(f'internal error in a callback: {type(error).__name__}: {error}')
-                self._clock.wait(self._clock.now() + ERROR_PAUSE)
+                now = self._clock.now()
+                if not isinstance(error, InvalidHandle) or now > self._left_at + LEAVING:
+                    self._report(f'internal error in a callback: {type(error).__name__}: {error}')
+                self._clock.wait(now + ERROR_PAUSE)
 
 
 class PeriodicThread:
@@ -311,21 +321,27 @@ class ServiceThread:
             if header is None:
                 return
             callback, answered = served
-            callback(request, partial(self._answer, service, header, answered))
+            callback(request, partial(self._answer, service, request, header, answered))
 
     # -- the thread that answers ------------------------------------------------------------------
 
-    def _answer(self, service: Service, header: Any, answered: Callable[[], None],
-                message: Any) -> None:
+    def _answer(self, service: Service, request: Any, header: Any,
+                answered: Callable[[], None], message: Any) -> None:
         """Have an answer sent. From any thread."""
-        self._jobs.put(partial(self._send, service, header, answered, message))
+        self._jobs.put(partial(self._send, service, request, header, answered, message))
 
-    def _send(self, service: Service, header: Any, answered: Callable[[], None],
+    def _send(self, service: Service, request: Any, header: Any, answered: Callable[[], None],
               message: Any) -> None:
+        if isinstance(message, Exception):
+            message = _response_to(service, request, message)
         try:
             self._send_response(service, message, header)
         except GONE:   # service or context are gone
             pass
+        except Exception as error:  # the answer cannot be sent as it is
+            with suppress(*GONE):
+                self._send_response(service, _response_to(service, request, error), header)
+            raise
         finally:
             answered()
 
@@ -344,6 +360,19 @@ class ServiceThread:
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
             self._report(f'internal error in an answer: {type(error).__name__}: {error}')
         return True
+
+
+def _response_to(service: Service, request: Any, error: Exception) -> Any:
+    """Return what tells a caller that there is no answer, where the response has words for it."""
+    kind: Any = service.srv_type
+    response, text = kind.Response(), f'internal error: {type(error).__name__}: {error}'
+    if hasattr(response, 'message'):
+        response.message = text
+    elif kind is SetParametersAtomically:
+        response.result.reason = text
+    elif kind is SetParameters:     # as many as were asked for
+        response.results = [SetParametersResult(reason=text) for _ in request.parameters]
+    return response
 
 
 class Question(Generic[AnswerT]):
@@ -406,13 +435,13 @@ class CoroutineServices:
                 partial(self._go_on, coroutine, answer, what)))
         except StopIteration as end:
             answer(end.value)
-        except BaseException:
+        except Exception as error:
             coroutine.close()
-            self._ended()
+            answer(error)
             raise
 
     def _ended(self) -> None:
-        """Record that one caller less waits: it was answered, or nothing comes of it."""
+        """Record that one caller less waits: it was answered, or is out of reach."""
         with self._counting:
             self.calls -= 1
 

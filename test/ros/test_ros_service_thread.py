@@ -6,12 +6,16 @@ from typing import Any
 
 from clients import Client, ClientContext, wait_until
 import pytest
+from rcl_interfaces.msg import Parameter, SetParametersResult
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
 from waiting import clock
 
 from drive_can_bridge.ros.polled_topics import PolledGroup
-from drive_can_bridge.ros.threads import Answer, ServiceThread
+from drive_can_bridge.ros.threads import (
+    Answer, CoroutineServices, ExecutorThread, Question, ServiceThread)
 
 
 @pytest.fixture(name='errors')
@@ -54,3 +58,76 @@ def test_answers_when_the_callback_says(client: Client, thread: ServiceThread,
     wait_until(lambda: len(sent) == 2 and all(future.done() for future in futures))
     assert [future.result().message for future in futures] == ['0', '1']
     assert not broken.done() and not gone.done()
+
+
+def test_who_asks_for_what_has_a_defect_is_told(client: Client, thread: ServiceThread,
+                                                errors: list[str]) -> None:
+    """At once, after a wait, and where the answer is none; by words where there is room."""
+    async def at_once(*_: Any) -> Any:
+        raise ZeroDivisionError('a defect')
+
+    async def after_a_wait(*_: Any) -> Any:
+        await Question[int](lambda answer: answer(1))
+        raise ZeroDivisionError('a defect')
+
+    async def none(*_: Any) -> Any:
+        return 'none'
+    values = [Parameter(name=name) for name in 'ab']
+    calls = {
+        'at_once': (Trigger, at_once, Trigger.Request()),
+        'after_a_wait': (Trigger, after_a_wait, Trigger.Request()),
+        'none': (Trigger, none, Trigger.Request()),
+        'each': (SetParameters, at_once, SetParameters.Request(parameters=values)),
+        'all': (SetParametersAtomically, at_once,
+                SetParametersAtomically.Request(parameters=values)),
+        'get': (GetParameters, at_once, GetParameters.Request(names=['a']))}
+    services = CoroutineServices(client.node, thread, {
+        name: (kind, callback) for name, (kind, callback, _) in calls.items()})
+    services.serve()
+    found: dict[str, Any] = {}
+    for name, (kind, _, request) in calls.items():
+        caller = client.node.create_client(kind, f'{client.full_name}/{name}',
+                                           qos_profile=qos_profile_parameters)
+        wait_until(caller.service_is_ready)
+        future = caller.call_async(request)
+        wait_until(future.done)
+        found[name] = future.result()
+    wait_until(lambda: services.calls == 0)
+    text = 'internal error: ZeroDivisionError: a defect'
+    for name in ('at_once', 'after_a_wait'):
+        assert found[name] == Trigger.Response(success=False, message=text)
+    assert not found['none'].success
+    assert found['none'].message.startswith('internal error: TypeError')
+    assert found['each'].results == [SetParametersResult(successful=False, reason=text)] * 2
+    assert found['all'].result == SetParametersResult(successful=False, reason=text)
+    assert found['get'] == GetParameters.Response()
+    assert len(errors) == len(calls)
+
+
+class Broken:
+    """A spinner whose executor looks for something that was destroyed, each time."""
+
+    def __init__(self, context: ClientContext, errors: list[str],
+                 monkeypatch: pytest.MonkeyPatch) -> None:
+        self.spinner = ExecutorThread('services', errors.append, context.context, clock())
+        self.failures = 0
+        monkeypatch.setattr(self.spinner.executor, 'spin_once', self.fail)
+
+    def fail(self) -> None:
+        self.failures += 1
+        raise InvalidHandle('destroyed')
+
+
+@pytest.mark.parametrize('leaves', [False, True])
+def test_what_is_gone_is_told_unless_a_drive_leaves(
+        leaves: bool, _client_context: ClientContext, errors: list[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = Broken(_client_context, errors, monkeypatch)
+    if leaves:
+        broken.spinner.leaves()
+    broken.spinner.start()
+    wait_until(lambda: broken.failures >= 2)
+    told = set(errors)
+    broken.spinner.stop()
+    assert told == (set() if leaves else {
+        'internal error in a callback: InvalidHandle: destroyed'})
