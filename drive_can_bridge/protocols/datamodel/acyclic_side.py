@@ -67,6 +67,10 @@ class AcyclicSide:
             together=codec.together))
         word = control_word(drive, controlled=session.control is not None)
         status = status_word(drive)
+        # what a drive that hears a stop can be asked, where it cannot be asked what it was told
+        heard = (*filter(None, (status,)), *drive.cyclic_response)
+        self._witnesses = tuple(dict.fromkeys(
+            self.numbers.number(each) for each in heard if each.readable))
         self.control_slot = _slot(drive.cyclic_request, word)
         self.status_slot = _slot(drive.cyclic_response, status)
         word = word if self.control_slot is None else None
@@ -182,7 +186,8 @@ class AcyclicSide:
         stop.running = True     # before the first of them leaves
         for _, write in writes:
             self.transactor.write_now(write, lambda sent, then: None, now)
-        stop.begin(confirm(writes, stop.answer_time), now, setpoints=setpoints, again=again)
+        stop.begin(confirm(writes, stop.answer_time, self._witnesses), now,
+                   setpoints=setpoints, again=again)
 
     def _stop_writes(self, setpoints: bool) -> list[StopWrite]:
         return self.stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
@@ -194,19 +199,26 @@ class AcyclicSide:
 
 
 def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
-            ) -> Generator[Step, Words | None, list[Sentence]]:
+            witnesses: Sequence[int]) -> Generator[Step, Words | None, list[Sentence]]:
     """
     Read back what stops a drive, since nobody acknowledges it, and write it again as needed.
 
+    What cannot be read is written as often as possible. A drive that answers anything behind that
+    counts as one that has heard it.
+
     :param writes: what was written.
+    :param witnesses: numbers that can be read.
     :return: what failed, in words.
     """
     blind = [each for each in writes if not each[0].readable]
-    wrong = [each for each in writes if each[0].readable]
+    readable = wrong = [each for each in writes if each[0].readable]
     failed: list[Sentence] = []
+    taken: set[Write] = set()
+    silent = True
     for attempt in range(STOP_ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
-            yield each[1]
+            if (yield each[1]) is not None:
+                taken.add(each[1])
         doubtful, failed, silent = wrong, [], False
         wrong = []
         for parameter, write in doubtful:
@@ -220,7 +232,21 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
             failed.append(sentences.write_unanswered(what) if reply is None else
                           sentences.write_read_back(what, reply[0], write.words[0]))
         if not wrong and not blind:
-            break
+            return failed
+    if not doubtful:    # nothing was read behind the last write
+        silent = True
+        numbers = *(write.number for _, write in readable), *witnesses
+        for number in numbers[:STOP_ATTEMPTS]:
+            silent = (yield Read(
+                number, attempts=1, late_will_do=True, timeout=timeout)) is None
+            if not silent:
+                break
+    for parameter, write in blind:
+        what = f'{parameter.name} ({parameter.address})'
+        if write not in taken:
+            failed.append(sentences.write_not_taken(what))
+        elif silent:
+            failed.append(sentences.write_unanswered(what))
     return failed
 
 
