@@ -104,8 +104,11 @@ class Quarantine:
         self._until[key] = now + CATCHING_UP, False
         return True
 
-    def time_lost(self, now: float) -> None:
-        """Listen on where nobody did at the end of a quarantine."""
+    def time_lost(self, before: float, now: float) -> None:
+        """Listen on where nobody did at the end of a quarantine, or while answers may come."""
+        self._begun = deque((
+            (max(until, now) if before < until + LATE_MAX else until, key)
+            for until, key in self._begun), maxlen=REMEMBERED)
         for key, (until, unheard) in self._until.items():
             if unheard:
                 self._until[key] = max(until, now + CATCHING_UP), unheard
@@ -224,6 +227,12 @@ class Channel(Generic[StepT, ReplyT]):
                 return max(0.0, received_at - at)
         return None
 
+    def doubtful(self, step: StepT) -> int:
+        """Return how many late answers may be taken for that to a step of a stop."""
+        transactor = self._transactor
+        return 0 if transactor.anonymous else (
+            self._quarantine.late(transactor.doubted(step), self.now))
+
     # -- queueing ---------------------------------------------------------------------------------
 
     def run(self, procedure: Generator[StepT, ReplyT, Any], done: Done, now: float,
@@ -299,7 +308,7 @@ class Channel(Generic[StepT, ReplyT]):
         self.now = now
         step = None if self._serving is None else self._serving.step
         if step is not None:
-            self._quarantine.answered(self._transactor.key(step))
+            self._quarantine.answered(self._transactor.doubted(step))
         if self._serving is self._stop and self._doubtful:
             self._doubtful -= 1
             self._hurried, reply = True, self._transactor.silent
@@ -318,8 +327,8 @@ class Channel(Generic[StepT, ReplyT]):
 
     def time_lost(self, now: float) -> None:
         """Record that nobody listened until now: an answer may lie in some buffer."""
+        self._quarantine.time_lost(self.now, now)
         self.now = now
-        self._quarantine.time_lost(now)
         if self._transactor.busy:
             self._deadline = max(self._deadline, now)
             reply = self._transactor.time_lost(now)
@@ -385,8 +394,7 @@ class Channel(Generic[StepT, ReplyT]):
                 self._quarantine.holds(key, now, now - ready_at)):
             return False
         if queue is self._stop and not queue.repeated:
-            self._doubtful = 0 if transactor.anonymous else (
-                self._quarantine.late(transactor.key(step), now))
+            self._doubtful = self.doubtful(step)
         self._serving = queue
         queue.attempts_left -= 1
         transactor.begin(step, now)

@@ -113,6 +113,10 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """Return what a late answer to the step could be mistaken for; None: nothing."""
         return None
 
+    def doubted(self, step: StepT) -> Hashable | None:
+        """Return by which key late answers to others can be taken for that to a stop."""
+        return self.key(step)
+
     def ready_at(self, step: StepT, *, stop: bool) -> float:
         """
         Return when a step may begin.

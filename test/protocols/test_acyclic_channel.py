@@ -264,3 +264,12 @@ class TestStopsInQuarantine:
         assert line.at(1.2001) == ['A']
         assert line.answer('there', 1.21) == []
         assert line.results == [['there']]
+
+    @pytest.mark.parametrize('idle_until, first', [(1.0, ['A']), (2.0, [])])
+    def test_an_answer_may_have_waited_through_a_stall(
+            self, idle_until: float, first: list[str]) -> None:
+        line = self.forgotten()
+        line.at(idle_until)
+        line.channel.time_lost(5.0)
+        assert line.asks('A', now=5.01, priority=Priority.STOP) == ['A']
+        assert line.answer('first', 5.02) == first

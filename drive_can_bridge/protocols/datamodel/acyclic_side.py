@@ -164,7 +164,9 @@ class AcyclicSide:
         if self.transactor.anonymous:   # each silence, and that of what was asked before
             silence = self.transactor.silence
             longest += self._session.retry.timeout + (STOP_ATTEMPTS + 2) * silence
-        return longest
+        # late answers are not believed, and what others ask now may be answered late, too
+        asked = {self.numbers.number(each.parameter) for each in told}.union(self._witnesses)
+        return longest + answer * (1 + sum(self.channel.doubtful(Read(each)) for each in asked))
 
     def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """

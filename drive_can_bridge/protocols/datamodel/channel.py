@@ -50,7 +50,8 @@ class Read:
     Read ``count`` consecutive parameters.
 
     :param attempts: None: as configured.
-    :param late_will_do: the late answer to the same question is as good as any: no quarantine.
+    :param late_will_do: the late answer to the same question is as good as any: no quarantine. A
+        stop does not believe those to what others have asked all the same.
     :param timeout: s to wait for the answer; None: as configured.
     """
 
@@ -198,6 +199,12 @@ class ParameterTransactor(Transactor[Step, Reply]):
         if self.anonymous:
             return ANYTHING
         return None if step.late_will_do else step.key
+
+    def doubted(self, step: Step) -> Hashable | None:
+        # one that was asked before the stop was written proves nothing
+        if self.anonymous or not isinstance(step, Read):
+            return self.key(step)
+        return step.key
 
     def ready_at(self, step: Step, *, stop: bool) -> float:
         # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
