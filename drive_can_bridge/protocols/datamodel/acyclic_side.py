@@ -104,11 +104,14 @@ class AcyclicSide:
 
     # -- frames from the drive, or its address ----------------------------------------------------
 
-    def receive(self, frame: Frame, now: float) -> None:
-        """Take an answer: to the outstanding read, or to nothing."""
+    def receive(self, frame: Frame, now: float, age: float = 0.0) -> None:
+        """Take an answer that has waited for ``age``: to the outstanding read, or to nothing."""
         session, self.shows_up = self._session, True
         try:
             asked = self.transactor.outstanding
+            if (asked is not None and asked.late_will_do and not self.stop.running
+                    and now - age < self.transactor.asked_at):
+                asked = None    # maps as they were before a stall
             words = self._decode(frame, None if asked is None else asked.key)
         except Unasked as error:
             late = self.channel.late(now, partial(self._answers, frame))

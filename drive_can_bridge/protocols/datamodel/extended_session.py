@@ -351,7 +351,7 @@ class ExtendedSession(Session):
         if frame.extended and frame.identifier & FROM_WHOM == self._request_identifier & FROM_WHOM:
             self._side.foreign_master(frame)
         else:
-            self._side.receive(frame, now)
+            self._side.receive(frame, now, age)
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
         """Take a cyclic response. The fast path of the reader."""

@@ -3,7 +3,7 @@
 
 import math
 
-from builders import ACTUAL, Conversation, drive, GAIN, RAMP, read, SPEED, write
+from builders import ACTUAL, Conversation, drive, frame, GAIN, RAMP, read, SPEED, write
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
     RESPONSE_MAP, TICK, ZEROS,
@@ -492,3 +492,13 @@ def test_only_one_look_at_a_time() -> None:
     assert talk.bus_up(10.0005) == []
     assert talk.hears(REQUEST_MAP, 10.001) == [ASK_RESPONSE_MAP]
     assert talk.hears(RESPONSE_MAP, 10.002) == [ASK_REQUEST_MAP]
+
+
+def test_map_from_before_the_question_is_not_believed() -> None:
+    """It has waited in a buffer, for a process that stood still for all anybody knows."""
+    talk = asked()
+    assert talk.until(10.15) == [(10.1, ASK_REQUEST_MAP)]
+    talk.session.receive_frame(frame(REQUEST_MAP), 10.15, age=0.06)
+    assert talk.sent() == []
+    talk.session.receive_frame(frame(REQUEST_MAP), 10.152, age=0.01)
+    assert talk.sent() == [ASK_RESPONSE_MAP]
