@@ -484,42 +484,70 @@ class BringUp:
 
         :return: the refusal of one that is fixed: it may fit as it is, but for type and times.
         """
-        at, types = wanted.communication, self._types(transmit=transmit)
+        at = wanted.communication
         kept = identifier & (pdo.NO_REMOTE | pdo.LONG_IDENTIFIER)
         fixed = yield from self._put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
-        fits = fixed or not (yield from self._other_content(wanted))     # a fixed one may
-        refusal = NOTHING if fits else (yield from self._map(wanted))
+        undo: list[tuple[int, int]] = []
+        refusal = NOTHING if fixed else (yield from self._map(wanted, undo))
+        refusal = refusal or (yield from self._pace(at, fixed=bool(fixed), transmit=transmit))
+        if not fixed:
+            refusal = refusal or (yield from self._put(
+                at, pdo.COB_ID, wanted.identifier | kept, 4))
+        if refusal and not fixed:       # as it was found
+            for place, content in reversed(undo):
+                if (yield from self._put_entry(at + pdo.MAPPING_OFFSET, place, content)):
+                    break       # it stays off, rather than with something else in it
+            else:
+                yield from self._put(at, pdo.COB_ID, identifier, 4)
         if refusal:
-            yield from self._put(at, pdo.COB_ID, identifier, 4)     # as it was found
             raise _differs(refusal)
+        return fixed
+
+    def _map(self, wanted: Pdo, undo: list[tuple[int, int]]) -> Generator[Ask, Reply, Sentence]:
+        """
+        Write what a PDO holds, unless it holds that: it may be fixed.
+
+        :param undo: gets the sub-indices that were written, and what they held.
+        :return: the refusal.
+        """
+        entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
+        count = (yield from self._read(mapping, 0, 1)) or 0
+        held = {0: count}
+        for place in range(1, min(count, len(entries)) + 1):
+            held[place] = (yield from self._read(mapping, place)) or 0
+        if held == dict(enumerate((len(entries), *entries))):
+            return NOTHING
+        for place, content in (0, 0), *enumerate(entries, 1), (0, len(entries)):
+            refusal = yield from self._put_entry(mapping, place, content)
+            if refusal:
+                return refusal
+            if place in held:       # what was beyond the count was nothing
+                undo.append((place, held[place]))
+                held[place] = content
+        return NOTHING
+
+    def _put_entry(self, mapping: int, place: int, content: int,
+                   ) -> Generator[Ask, Reply, Sentence]:
+        return (yield from self._put(mapping, place, content, 4 if place else 1))
+
+    def _pace(self, at: int, *, fixed: bool, transmit: bool) -> Generator[Ask, Reply, Sentence]:
+        """Write when a PDO is sent; return the refusal of what it cannot do without."""
+        types, refusal = self._types(transmit=transmit), NOTHING
         for kind in types[:1] if fixed else types:
             refusal = yield from self._put(at, pdo.TRANSMISSION, kind, 1)
             if not refusal:
                 break
         if refusal and not fixed:
-            raise _differs(refusal)
+            return refusal
         for subindex, value in self._timers() if transmit else ():
             found = yield from self._read(at, subindex, 2)
             if found == value or found is None and not value:
                 continue
             refusal = yield from self._put(at, subindex, value, 2)
             if refusal and subindex == pdo.EVENT_TIMER:
-                raise _differs(refusal)
+                return refusal
             if refusal:
                 self.tell(refusal)
-        if not fixed:
-            yield from self._must(at, pdo.COB_ID, wanted.identifier | kept, 4)
-        return fixed
-
-    def _map(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
-        """Write what a PDO holds; return the refusal where it is fixed."""
-        mapping = wanted.communication + pdo.MAPPING_OFFSET
-        refusal = yield from self._put(mapping, 0, 0, 1)
-        if refusal:
-            return refusal
-        for place, entry in enumerate(wanted.entries, 1):
-            yield from self._must(mapping, place, entry, 4)
-        yield from self._must(mapping, 0, len(wanted.entries), 1)
         return NOTHING
 
     def _close(self, first: int, used: Iterable[Pdo]) -> Procedure:

@@ -443,3 +443,34 @@ class TestFixedEntries:
         axis.start()
         assert axis.session.online, axis.session.offline_advice
         assert not any(text[2:4] in ('16', '1A') for text in written(axis))
+
+    #: mapping of three objects that this drive is found with
+    FOUND = {**FITS, (0x1600, 0): b'\3', (0x1600, 2): bytes.fromhex('20007A60'),
+             (0x1600, 3): bytes.fromhex('08006060')}
+
+    @pytest.mark.parametrize(('refused', 'what'), [
+        ((0x1600, 1), '1600h.01h'), ((0x1600, 2), '1600h.02h'), ((0x1400, 2), '1400h.02h')])
+    def test_the_others_stay_as_they_were_found(
+            self, refused: tuple[int, int], what: str) -> None:
+        axis = Axis(objects=self.FOUND)
+        axis.drive.fixed = {refused: 0x06040041}
+        axis.start()
+        assert differs(axis) == says('object_refused', what=what, why=describe(0x06040041))
+        assert {place: axis.drive.objects[place] for place in self.FOUND} == self.FOUND
+        axis.drive.fixed.clear()
+        axis.live(1.1)
+        assert axis.session.online
+
+    def test_a_count_that_is_refused(self) -> None:
+        axis = Axis(objects=self.FOUND)
+        sdo = axis.drive._sdo
+
+        def two_are_too_many(data: bytes) -> bytes:
+            if data[:5] == bytes.fromhex('2F00160002'):
+                return bytes.fromhex('8000160042000406')
+            return sdo(data)
+        axis.drive._sdo = two_are_too_many      # type: ignore[method-assign]
+        axis.start()
+        assert differs(axis) == says(
+            'object_refused', what='1600h.00h', why=describe(0x06040042))
+        assert {place: axis.drive.objects[place] for place in self.FOUND} == self.FOUND
