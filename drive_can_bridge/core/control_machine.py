@@ -282,10 +282,11 @@ class ControlMachine:
         """
         self.handle_timer(now)
         if self._reports.take(member, raw, counts=self._sent) and raw is not None:
-            self._rules.reported(raw, behind=self._sent)
+            behind = self._sent
+            self._rules.reported(raw, behind=behind)
             self._choose()      # what another word has to bring about is not confirmed yet
             self._watch_fault(raw)
-            self._watch_enabled(member, raw)
+            self._watch_enabled(member, raw, behind=behind)
             self._advance()
             self._choose()
             self._watch_disabled(now)
@@ -458,13 +459,13 @@ class ControlMachine:
         elif self._sending is not ControlAction.RESET_FAULT:
             self._send(ControlAction.DISABLE)
 
-    def _watch_enabled(self, member: str, raw: int) -> None:
+    def _watch_enabled(self, member: str, raw: int, *, behind: bool) -> None:
         """Withdraw the enable word from a drive that dropped out by itself, confirmed or not."""
         table = self._table
         if self._sending is not ControlAction.ENABLE or table.enabled is None:
             return
         if table.enabled.matches(raw):
-            if self._sent:
+            if behind:
                 self._seen_enabled.add(member)
             return
         if self._reached:

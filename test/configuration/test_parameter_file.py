@@ -419,3 +419,8 @@ def test_what_a_bridge_finds_out_by_itself_may_stand_in_a_file(tmp_path: Path) -
     text = FILE.replace('    buses:\n', '    bridges: [/drive_can_bridge]\n    buses:\n')
     text = text.replace('        station: 1\n', f'        station: 1\n{found}')
     assert list(load(tmp_path, text).drives) == ['conveyor', 'lift']
+
+
+def test_nested_too_deep(tmp_path: Path) -> None:
+    assert read(tmp_path, HEAD + BUSES + '    a: ' + '{a: ' * 5000 + '1' + '}' * 5000)[1] == [
+        says('too_deep', levels=32)]

@@ -141,6 +141,9 @@ CASES = [
     ('parameters:', 'parametrs:',
      [at('table.yaml:1: parameters', 'missing', allowed='a mapping'),
       at('table.yaml:3: parametrs', 'unknown_key', hint=says('did_you_mean', word='parameters'))]),
+    ('control:\n', 'restore: {before: {limit: 70000}}\ncontrol:\n',
+     [at('table.yaml:16: restore.before.limit', 'cannot_be_written', value=70000,
+         allowed='0 to 65535')]),
 ]
 
 #: what is wrong where the change was made, below ``parameters``

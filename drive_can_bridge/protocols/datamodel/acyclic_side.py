@@ -241,7 +241,8 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
     if not doubtful:    # nothing was read behind the last write
         silent = True
         numbers = *(write.number for _, write in readable), *witnesses
-        for number in numbers[:STOP_ATTEMPTS]:
+        # the first one twice: its answer may be late
+        for number in (*numbers[:1], *numbers)[:STOP_ATTEMPTS]:
             silent = (yield Read(
                 number, attempts=1, late_will_do=True, timeout=timeout)) is None
             if not silent:

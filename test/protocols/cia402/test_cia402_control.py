@@ -289,3 +289,20 @@ class TestOneThatFallsOutBeforeItsEnableIsConfirmed:
         axis.live(0.6)
         assert axis.words() == ['0700', '0F00', '0200', '0600']
         self.fails(axis, 0x0217)
+
+    def test_one_that_interpolates_and_was_seen_enabled_once(self) -> None:
+        """The sample that shows it enabled changes the word, too."""
+        axis = Axis('ip').online()
+        axis.drive.objects[0x6061, 0] = b'\0'
+        control = axis.drive._control
+
+        def cut_off(word: int) -> None:
+            if word == 0x1F:
+                axis.drive.becomes(axis.drive.OFF)
+            else:
+                control(word)
+        axis.drive._control = cut_off       # type: ignore[method-assign]
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        axis.live(0.3)
+        assert axis.words() == ['0700', '0F00', '1F00', '0700', '0600']
+        self.fails(axis, 0x0250)

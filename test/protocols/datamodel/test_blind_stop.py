@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from builders import CONTROL, Conversation, drive, LIMIT, SPEED, TABLE, WO, WORD
+from builders import CONTROL, Conversation, drive, LIMIT, SPEED, STATUS, TABLE, WO, WORD
 import extended_builders
 import pytest
 from saying import may_run, says
@@ -57,13 +57,25 @@ def test_one_that_answers_anything_has_heard_it() -> None:
     assert warnings(talk) == []
 
 
-@pytest.mark.parametrize('answered', [ASK_CURRENT, ASK_STATUS])
-def test_one_that_answers_a_part_has_heard_it(answered: str) -> None:
+def test_one_that_answers_a_part_has_heard_it() -> None:
     talk = running()
     talk.deactivate(10.055)
-    sent = talk.served(12.0, {answered: ZERO}.get)
-    assert sent[-1][1] == answered
+    sent = talk.served(12.0, {ASK_CURRENT: ZERO}.get)
+    assert [text for _, text in sent][-3:] == [ASK_ACTUAL, ASK_ACTUAL, ASK_CURRENT]
     assert talk.session.stopped
+    assert warnings(talk) == []
+
+
+def test_an_answer_that_is_lost_is_asked_for_again() -> None:
+    talk = running(response=(STATUS,))
+    talk.deactivate(10.055)
+    asked: list[str] = []
+
+    def answer(text: str) -> str | None:
+        asked.append(text)
+        return ZERO if asked.count(ASK_STATUS) == 2 else None
+    assert talk.served(12.0, answer)[-1][1] == ASK_STATUS
+    assert asked[-2:] == [ASK_STATUS, ASK_STATUS]
     assert warnings(talk) == []
 
 
@@ -72,7 +84,7 @@ def test_one_that_answers_nothing_may_still_be_running() -> None:
     assert talk.deactivate(10.055) == [SPEED_ZERO]
     sent = talk.until(10.055 + talk.session.longest_stop)
     assert [text for _, text in sent] == [
-        SPEED_ZERO, SPEED_ZERO, ASK_ACTUAL, ASK_CURRENT, ASK_STATUS]
+        SPEED_ZERO, SPEED_ZERO, ASK_ACTUAL, ASK_ACTUAL, ASK_CURRENT]
     assert talk.session.stopped
     assert warnings(talk) == [may_run('stop_failed', what=[UNHEARD])]
 
