@@ -311,13 +311,18 @@ def test_a_canopen_node_that_boots_ends_asking_by_name(protocol: str) -> None:
     ('20010030', '05020000', False),    # another identifier, which may be somebody else's
     ('20010030', '05050080', False),    # a PDO that does not exist
     ('20010030', '05050020', False),    # 29 bits
+    ('20010030', None, True),           # it does not say: where the standard has it
+    ('10004060', None, False),
 ])
-def test_mailboxes_alone_are_read(mapped: str, identifier: str, read: bool) -> None:
+def test_mailboxes_alone_are_read(mapped: str, identifier: str | None, read: bool) -> None:
     objects = {'001000': '00000000', '031601': mapped, '031401': identifier}
 
     def answers(frame: Frame) -> Frame | None:
         if frame.identifier == 0x605 and frame.data[1:4].hex() in objects:
-            content = bytes.fromhex(objects[frame.data[1:4].hex()])
+            found = objects[frame.data[1:4].hex()]
+            if found is None:
+                return Frame(0x585, b'\x80' + frame.data[1:4] + b'\0\0\2\6', False)
+            content = bytes.fromhex(found)
             return Frame(0x585, b'\x43' + frame.data[1:4] + content, False)
         if frame.data[:3] == bytes.fromhex('C70100'):
             return Frame(0x485, frame.data[:4] + bytes.fromhex('83200000'), False)

@@ -109,6 +109,13 @@ class CanopenScanner(Scanner):
             self._fact(node, 'device type', 'refused' if value is None else f'{value:08X}h')
             for entry in ((sdo.IDENTITY, 1), (sdo.IDENTITY, 2), (sdo.RPDO4_MAPPING, 1)):
                 self._questions.append(sdo.encode_upload(node, *entry))
+        elif (index, subindex) == (sdo.RPDO4, 1) and node in self._mailboxes:
+            # one that does not say where it listens does so as delivered
+            if value is None or value & _PDO_IDENTIFIER == network.REQUEST_BASE + node:
+                # a device that got the function of the first one last, does not answer that one
+                self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
+                    pkw.read_request(STATUS, 1, toggle), pkw.Layout.WORD_LE), False)
+                    for toggle in (False, True)]
         elif value is None:
             return
         elif index == sdo.IDENTITY:
@@ -122,12 +129,6 @@ class CanopenScanner(Scanner):
                 self._mailboxes.add(node)
                 self._fact(node, 'mailbox', 'yes')
                 self._questions.append(sdo.encode_upload(node, sdo.RPDO4, 1))
-        elif (index, subindex) == (sdo.RPDO4, 1) and node in self._mailboxes:
-            if value & _PDO_IDENTIFIER == network.REQUEST_BASE + node:
-                # a device that got the function of the first one last, does not answer that one
-                self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
-                    pkw.read_request(STATUS, 1, toggle), pkw.Layout.WORD_LE), False)
-                    for toggle in (False, True)]
 
     def _fact(self, node: int, name: str, text: str) -> None:
         facts = self._facts.setdefault(node, {})
