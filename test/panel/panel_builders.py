@@ -83,6 +83,8 @@ parameters:
   other_setpoint: {{number: 35, type: int16, access: rw, storage: ram}}
   target_x: {{number: 36, type: int16, access: rw, storage: ram}}
   serial: {{number: 40, type: uint16, access: ro}}
+  user_command: {{number: 41, type: uint16, access: wo}}
+  release: {{number: 42, type: bool, access: wo}}
 """
 #: costs nothing, unlike a page
 FILE_OF_PANEL = '/panel/panel.css'

@@ -2,12 +2,16 @@
 """Rows of parameters: what they show, and what becomes of names that mean no good."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import pytest
 
 from drive_can_bridge.core.parameters import ValueKind
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Reading
 from drive_can_bridge.monitor.values import ParameterInfo
+
+if TYPE_CHECKING:
+    from panel_bench import House
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
@@ -67,3 +71,14 @@ def test_what_cannot_be_read_is_said(page: object) -> None:
         row = _Row('/lift', RAMP, writes=writes)
         row.show(drive(''))
         assert (row._now if writes else row._label).text == 'could not be read'
+
+
+@pytest.mark.parametrize(('name', 'typed', 'value'), [
+    ('user_command', '7', 7), ('release', 'true', True)])
+def test_what_cannot_be_read_is_written_in_its_type(
+        house: 'House', name: str, typed: str, value: object) -> None:
+    said = house.do('write', 'operator', {
+        'drive': '/conveyor', 'name': name, 'value': typed}).said
+    assert said['success'] is True, said['text']
+    house.until(lambda: house.bridge.played['conveyor'].value(name) == value,
+                'the write, which nobody confirms')

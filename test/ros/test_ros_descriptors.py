@@ -12,10 +12,11 @@ import pytest
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import DescribeParameters
 
-from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.parameters import Parameter, ParameterType, ValueKind
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.messages import facts_of
-from drive_can_bridge.ros.values import constraints
+from drive_can_bridge.ros.monitor.client import parameter_info
+from drive_can_bridge.ros.values import constraints, descriptor
 
 
 @pytest.mark.parametrize(('described', 'role', 'text'), [
@@ -34,6 +35,20 @@ from drive_can_bridge.ros.values import constraints
      'type=uint16 access=ro protected=false role=cyclic')])
 def test_as_the_contract_writes_it(described: Parameter, role: Role | None, text: str) -> None:
     assert constraints(described, role) == text
+
+
+@pytest.mark.parametrize(('described', 'kind'), [
+    (parameter('key', 44, access=WO), ValueKind.INTEGER),
+    (parameter('release', 45, access=WO, type=ParameterType.BOOL), ValueKind.BOOL),
+    (parameter('push', 46, access=WO, unit='%'), ValueKind.DOUBLE),
+    (parameter('mode', 47), ValueKind.INTEGER),
+    (parameter('brake', 48, type=ParameterType.BOOL), ValueKind.BOOL),
+    (parameter('ramp_time', 49, unit='s', scale=0.01), ValueKind.DOUBLE)])
+@pytest.mark.parametrize('unreadable', [False, True])
+def test_a_monitor_knows_the_kind_of_what_has_no_value_too(
+        described: Parameter, kind: ValueKind, unreadable: bool) -> None:
+    message = descriptor(described.name, described, unreadable=unreadable)
+    assert parameter_info(message).kind is kind
 
 
 @pytest.mark.parametrize('unit', ['rpm', 'N m', '%', "'", '"', '\\', 'a "b" \\c', '°C', 'a=b',

@@ -37,7 +37,8 @@ from drive_can_bridge.ros.messages import (
 from drive_can_bridge.ros.recognition import bridges_among, drives_among
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,
-          ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER}
+          ParameterType.PARAMETER_INTEGER: ValueKind.INTEGER,
+          ParameterType.PARAMETER_DOUBLE: ValueKind.DOUBLE}
 _LEVELS = {getattr(Log, name): name
            for name in ('DEBUG', 'INFO', 'WARN', 'ERROR', 'FATAL')}
 #: s for a read or write
@@ -78,9 +79,17 @@ def log_level(message: Log) -> str:
 
 def parameter_info(message: ParameterDescriptor) -> ParameterInfo:
     """Return what a descriptor says."""
+    facts = facts_of(message)
     return ParameterInfo(
-        printable(message.name), _KINDS.get(message.type, ValueKind.DOUBLE), message.read_only,
-        printable(message.description), *limits_of(message), facts_of(message))
+        printable(message.name), _KINDS.get(message.type) or _kind_told_by(facts),
+        message.read_only, printable(message.description), *limits_of(message), facts)
+
+
+def _kind_told_by(facts: Mapping[str, str]) -> ValueKind:
+    """Return the kind of a parameter whose descriptor has no type: it has no value to show."""
+    if 'scale' in facts or 'type' not in facts:
+        return ValueKind.DOUBLE
+    return ValueKind.BOOL if facts['type'] == 'bool' else ValueKind.INTEGER
 
 
 #: s between two looks at the graph, which are not cheap
