@@ -11,6 +11,7 @@ through the running bridge: one way of doing it, with the same rules and words.
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import json
 import os
@@ -62,14 +63,28 @@ async def _command(arguments: Sequence[str], directory: str) -> tuple[int, str]:
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT, cwd=directory,
         env={**os.environ, 'NO_COLOR': '1', 'PYTHONIOENCODING': 'utf-8'})
+    talk = asyncio.ensure_future(process.communicate())
+    late = ''
     try:
-        said, _ = await asyncio.wait_for(process.communicate(), TIMEOUT)
-    except (asyncio.TimeoutError, TimeoutError):
-        process.kill()
-        await process.wait()
-        return 2, f'not done after {TIMEOUT:.0f} s: given up'
+        if not (await asyncio.wait([talk], timeout=TIMEOUT))[0]:
+            _ask_to_end(process)
+            late = f'not done after {TIMEOUT:.0f} s: ended\n'
+        said, _ = await talk
+    except asyncio.CancelledError:      # the panel ends, and would kill what it leaves behind
+        _ask_to_end(process)
+        while process.returncode is None:
+            with suppress(asyncio.CancelledError):
+                await process.wait()
+        raise
     lines = said.decode(errors='replace')[:_TEXT_MAX].splitlines()
-    return process.returncode or 0, '\n'.join(printable(line) for line in lines)
+    code = process.returncode or 0
+    return code, (late if code else '') + '\n'.join(printable(line) for line in lines)
+
+
+def _ask_to_end(process: asyncio.subprocess.Process) -> None:
+    """Ask: a restore has the drive leave its mode first, and says what was written."""
+    with suppress(ProcessLookupError):
+        process.terminate()
 
 
 ALL = '*'
