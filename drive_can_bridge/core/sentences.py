@@ -1105,11 +1105,6 @@ def nobody_answered() -> str:
 
 
 @sentence
-def nobody_offers(service: str) -> str:
-    return f'nobody offers {service}: no control word, or its bridge does not run'
-
-
-@sentence
 def answer_not_delivered(service: str) -> str:
     return (f'an answer of {service} could not be delivered: its caller takes none (another QoS, '
             f'or DDS has not found all of it)')

@@ -15,7 +15,7 @@ from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_offers, nobody_takes,
+    may_still_be_running, no_answer_to_stop, nobody_takes,
 )
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
@@ -117,8 +117,6 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
             assert operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT - 0.1)
             assert not operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT)
             assert told[1:] == [Outcome(False, may_still_be_running(nobody_takes('enable')))]
-            operations.stop('/conveyor', Stop.DISABLE, told.append, now)
-            assert told[-1].text == nobody_offers('/conveyor/enable')
         finally:
             client.node.destroy_service(service)
 
@@ -176,3 +174,19 @@ def test_a_stop_may_take_as_long_as_that_of_a_command(
     assert told == [Outcome(True, 'stopped'),
                     Outcome(False, may_still_be_running(no_answer_to_stop(patience)))]
     assert busy.asked == [kind.Request()] * 2 * times, 'for anything but enable'
+
+
+def test_a_drive_that_has_just_appeared_is_stopped_too(client: Client) -> None:
+    """Its button is there before the next poll is told of it."""
+    busy, now, told = Busy(client, Trigger, '/lift/quick_stop'), 100.0, list[Outcome]()
+    try:
+        with asking(client) as operations:
+            operations.poll({}, now)
+            operations.stop('/lift', Stop.QUICK_STOP, told.append, now)
+            wait_until(lambda: operations.poll({}, now) and busy.kept, what='a stop')
+            busy.answers()
+            wait_until(lambda: not operations.poll({'/lift': Stop}, now), what='an answer')
+    finally:
+        busy.close()
+    assert told == [Outcome(True, 'stopped')]
+    assert busy.asked == [Trigger.Request()]

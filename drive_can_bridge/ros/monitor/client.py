@@ -22,7 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_offers, nobody_takes,
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes,
 )
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.model import Model
@@ -341,22 +341,23 @@ class Operations:
             if not self._stops[gone].busy:
                 self._stops.pop(gone).close()
         for drive, stop in wanted - self._stops.keys():
-            name, kind, _, patience, again = _STOPS[stop]
-            self._stops[drive, stop] = Service(self._node, kind, f'{drive}/{name}', patience,
-                                               again)
+            self._keep_at_hand(drive, stop)
         for service in self._stops.values():
             if service.busy:
                 service.look(now)
         self._calls.look(now)
         return self._calls.busy or any(service.busy for service in self._stops.values())
 
+    def _keep_at_hand(self, drive: str, stop: Stop) -> Service:
+        name, kind, _, patience, again = _STOPS[stop]
+        made = Service(self._node, kind, f'{drive}/{name}', patience, again)
+        self._stops[drive, stop] = made
+        return made
+
     def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
-        """Stop a drive."""
+        """Stop a drive, one that no poll has told of yet too."""
         name, _, request, patience, _ = _STOPS[stop]
-        service = self._stops.get((drive, stop))
-        if service is None:
-            done(Outcome(False, nobody_offers(f'{drive}/{name}')))
-            return
+        service = self._stops.get((drive, stop)) or self._keep_at_hand(drive, stop)
 
         def take(response: Any) -> None:
             if response is not None:
