@@ -21,6 +21,8 @@ _ROLES = {'cyclic': 'sent cyclically: a setpoint', 'control': 'control word: use
           'map': 'a map: not written while the bridge runs'}
 #: names that say what a profile cannot: setpoints, those of CiA 402 (targets) too
 _MOVING = re.compile(r'(setpoint|control_word)$|(^|_)target(_|$)')
+#: the second of them and so on; one that is stored is no setpoint, but says what such a one means
+_NUMBERED = re.compile(r'(setpoint|control_word)_?[0-9]+$')
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
 _EXAMPLES = {ValueKind.INTEGER: ', such as 12 or 0x0C', ValueKind.DOUBLE: ', such as 12.5'}
@@ -150,7 +152,8 @@ class ParameterInfo:
         role = self.facts.get('role')
         if role is not None:
             return _ROLES.get(role, role)
-        if _MOVING.search(self.name):   # also while nobody maps it
+        if _MOVING.search(self.name) or (   # also while nobody maps it
+                self.facts.get('storage') != 'eeprom' and _NUMBERED.search(self.name)):
             return 'moves the drive: not written here'
         return 'protected by its profile: not written here' * (
             self.facts.get('protected') == 'true')

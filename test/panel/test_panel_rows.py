@@ -37,11 +37,17 @@ def test_a_name_stays_one_attribute(page: object, name: str) -> None:
 @pytest.mark.parametrize(('name', 'edited'), [
     ('target', False), ('target_position', False), ('vl_target_velocity', False),
     ('interpolation_target', False), ('speed_setpoint', False), ('control_word', False),
+    ('setpoint_2', False), ('speed_setpoint_10', False), ('control_word2', False),
     ('setpoint_source', True), ('targets', True), ('retarget_time', True)])
 def test_what_moves_a_drive_has_no_field(page: object, name: str, edited: bool) -> None:
     from drive_can_bridge.panel.drive_page import _Row
     row = _Row('/lift', replace(RAMP, name=name), writes=True)
     assert (row._field is not None) == edited
+
+
+def test_what_says_the_meaning_of_a_setpoint_has_one() -> None:
+    # P547 of a NORD inverter (BU0270, page 40)
+    assert replace(RAMP, name='bus_setpoint_2', facts={'storage': 'eeprom'}).refusal == ''
 
 
 def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: object) -> None:
