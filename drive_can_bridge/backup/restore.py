@@ -8,7 +8,8 @@ Bring the settings of a backup back into a drive.
     rounds      what differs is written and read back; what was refused, or not taken, is tried
                 again after the others, as long as that gets on
     after       steps of the profile, whatever happened: written without a look, for a drive whose
-                answers get lost may hear them all the same
+                answers get lost may hear them all the same; one that cannot be read a few times
+                at most, for it may be what stores
     read back   everything that is to be as in the file
 
 ``stopped`` is asked between two writes, so that each is verified before anything ends. Before each
@@ -331,6 +332,7 @@ class Restorer:
         self._attempted = False
         self._wrote = False
         self._words = dict(plan.found)
+        self._unseen: dict[str, list[str]] = {}     # what became of steps that cannot be read
         self._reasons: dict[str, str] = {}
         self._result = RestoreResult()
         table = drive.facts.restore
@@ -444,7 +446,8 @@ class Restorer:
             self._lost = self._unanswered = False
             try:
                 for step in self._after:
-                    self._note(step, self._take_back(step, blind=last or attempt <= _ATTEMPTS))
+                    self._note(step, self._take_back(
+                        step, blind=last or attempt <= _ATTEMPTS, last=last))
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
                 failed[already:] = [f'{step.parameter}: not set back' for step in self._after]
@@ -479,11 +482,12 @@ class Restorer:
         word = (found or 0) & ~step.mask | step.bits
         return '' if word == found else self._put(parameter, word, blind=False)
 
-    def _take_back(self, step: RestoreStep, *, blind: bool) -> str:
+    def _take_back(self, step: RestoreStep, *, blind: bool, last: bool) -> str:
         """
         Take a step after the settings; return why it failed.
 
         :param blind: nothing is read first, unless nobody knows yet which bits are to be kept.
+        :param last: there is no other attempt.
         """
         parameter = self._drive.find(step.parameter)
         if parameter is None:
@@ -503,7 +507,10 @@ class Restorer:
         elif kept is None and not is_whole(step, parameter):
             return _NO_BITS
         word = (kept or 0) & ~step.mask | step.bits
-        reason = '' if word == found else self._put(parameter, word, blind=True)
+        if not parameter.readable:
+            reason = self._put_unseen(parameter, word, last=last)
+        else:
+            reason = '' if word == found else self._put(parameter, word, blind=True)
         if not reason and any((parameter.name, word) == (change.name, change.word)
                               for change in self._plan.changes):
             self._note_written(parameter.name)      # as it is to be, if nothing else was done
@@ -527,12 +534,31 @@ class Restorer:
                 return written.reason
             # it may have been taken all the same
             self._unanswered = True
-            self._lost = not parameter.readable or bool(self._look(name, parameter))
+            if not parameter.readable:
+                self._lost = not self._is_there()
+                return written.reason
+            self._lost = bool(self._look(name, parameter))
             if self._lost or self._words[name] != word:
                 return written.reason
             self._unanswered = False
         self._words[name] = word
         return ''
+
+    def _put_unseen(self, parameter: Parameter, word: int, *, last: bool) -> str:
+        """Write a step that cannot be read; again only where the drive is there, or at last."""
+        tried = self._unseen.setdefault(parameter.name, [])
+        if len(tried) == _ATTEMPTS:
+            return tried[-1]
+        if tried and not last and not self._is_there():
+            self._unanswered = self._lost = True
+            return tried[-1]
+        tried.append(self._put(parameter, word, blind=True))
+        return tried[-1]
+
+    def _is_there(self) -> bool:
+        """Tell whether the drive answers, by something that it gave before."""
+        name = next(iter(self._plan.found), None)
+        return name is None or not tells_nothing(self._drive.read(name)[name].reason)
 
     def _write_step(self, name: str, value: Value, *, blind: bool) -> WriteOutcome:
         heard: list[WriteOutcome] = []

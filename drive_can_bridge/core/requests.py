@@ -115,9 +115,10 @@ class RetryPolicy:
     attempts: int
     offline: Callable[[], bool] = _never
 
-    def unanswered(self, attempts: int | None = None) -> Failure:
-        """Say that nobody answered; ``attempts`` None: as many as configured."""
+    def unanswered(self, attempts: int | None = None, timeout: float | None = None) -> Failure:
+        """Say that nobody answered; None: as often, and in so many s, as configured."""
         if self.offline():
             return Failure(sentences.no_answer_offline())
         return Failure(sentences.no_answer(
-            self.timeout, self.attempts if attempts is None else attempts))
+            self.timeout if timeout is None else timeout,
+            self.attempts if attempts is None else attempts))

@@ -10,7 +10,7 @@ from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import Access, Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
 
@@ -18,6 +18,8 @@ from drive_can_bridge.core.roles import Role
 MODE, OTHER = 0x0001, 0x0010
 SETTINGS = {'first': 11, 'second': 12, 'third': 13}
 FILE = {**SETTINGS, 'mode': OTHER}
+#: what stores, if it is told so; it cannot be read
+STORE, SAVE = 'store', 0x6173
 #: s that an exchange takes, and how long nobody's answer is waited for
 EXCHANGE, SILENCE = 0.01, 0.9
 
@@ -49,20 +51,26 @@ class ScriptedDrive(Drive):
     A drive.
 
     :param fates: by the number of the write (1: the first).
+    :param stores: it wants to be told to store, instead of being in a mode.
     :ivar events: what reached it, in order: (what, parameter, word).
     :ivar moving: what was written while it was enabled.
     :ivar now: s.
     """
 
-    def __init__(self, fates: Mapping[int, Fate] = {}) -> None:
+    def __init__(self, fates: Mapping[int, Fate] = {}, *, stores: bool = False) -> None:
         bits = MODE
         table = RestoreTable((RestoreStep('mode', MODE, bits),), (RestoreStep('mode', 0, bits),))
+        if stores:
+            table = RestoreTable((), (RestoreStep(STORE, SAVE, 0xFFFF),))
         super().__init__(
             DriveFacts('lift', 'main', 'virtual', '0', 500000, 'datamodel_extended', 1, 'own', '',
                        table),
             ParameterDirectory({name: Parameter(name, number=number) for number, name in
-                                enumerate(FILE, 30)}, lambda name: None))
+                                enumerate(FILE, 30)} | {STORE: Parameter(
+                                    STORE, number=60, access=Access.WRITE_ONLY)},
+                               lambda name: None))
         self.registers = {**dict.fromkeys(SETTINGS, 1), 'mode': OTHER}
+        self._stores = stores
         self.events: list[tuple[str, str, int]] = []
         self.moving: list[str] = []
         self.now = 0.0
@@ -129,7 +137,8 @@ class ScriptedDrive(Drive):
             self.now += SILENCE
             return WriteOutcome(name, False, parameter, 'no answer')
         self.events.append(('write', name, int(value)))
-        refused = fate is Fate.REFUSED or name != 'mode' and not self.in_mode
+        refused = fate is Fate.REFUSED or not (
+            self._stores or name == 'mode' or self.in_mode)
         if not refused:
             self.registers[name] = int(value)
         if fate is Fate.KILLED_AFTER:

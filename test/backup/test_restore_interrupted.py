@@ -4,7 +4,8 @@
 from itertools import product
 
 import pytest
-from scripted_drive import Fate, FILE, Killed, MODE, OTHER, restored, ScriptedDrive, SETTINGS
+from scripted_drive import (
+    Fate, FILE, Killed, MODE, OTHER, restored, SAVE, ScriptedDrive, SETTINGS, STORE)
 
 from drive_can_bridge.backup.restore import PATIENCE
 
@@ -100,3 +101,37 @@ def test_what_a_killed_restore_leaves_is_brought_to_its_end_by_the_next(
     drive.ended()
     result = restored(drive)
     assert (result.complete, drive.registers) == (True, FILE)
+
+
+class TestStoring:
+    """What stores cannot be read, and wears a memory each time that it is written."""
+
+    def stored(self, drive: ScriptedDrive) -> int:
+        """Return how often it was told to store."""
+        return drive.events.count(('write', STORE, SAVE))
+
+    def test_it_is_told_once(self) -> None:
+        drive = ScriptedDrive(stores=True)
+        assert (restored(drive).complete, self.stored(drive)) == (True, 1)
+
+    @pytest.mark.parametrize(('lost', 'told', 'failed'), [(1, 2, 0), (2, 3, 0), (36, 3, 1)])
+    def test_an_answer_that_is_lost(self, lost: int, told: int, failed: int) -> None:
+        drive = ScriptedDrive(dict.fromkeys(range(4, 4 + lost), Fate.UNANSWERED), stores=True)
+        result = restored(drive)
+        assert (self.stored(drive), len(result.steps)) == (told, failed)
+        assert result.wrong == []
+
+    @pytest.mark.parametrize('fate', FATES)
+    def test_whatever_becomes_of_it_it_is_told_three_times_at_most(self, fate: Fate) -> None:
+        for number in range(1, 8):
+            drive = ScriptedDrive(dict.fromkeys(range(number, 40), fate), stores=True)
+            result = restored(drive)
+            assert self.stored(drive) <= 3
+            assert drive.now < 40.0
+            assert not result.complete or self.stored(drive)
+
+    @pytest.mark.parametrize('number', [3, 4])
+    def test_of_a_drive_that_was_away_it_is_told_when_it_is_back(self, number: int) -> None:
+        drive = ScriptedDrive({number: Fate.AWAY}, stores=True)
+        result = restored(drive)
+        assert (result.steps, self.stored(drive)) == ([], 1)

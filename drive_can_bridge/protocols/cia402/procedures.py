@@ -28,6 +28,10 @@ NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
 MAP = 'communication'
 _MAPS = frozenset((0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
 _PDOS = range(0x1400, 0x1C00)
+#: object that stores, which a drive acknowledges when all is stored; and s that this may take:
+#: CiA 301 sets no limit. Written once more, it would wear the memory once more.
+_STORE = 0x1010
+STORE_TIMEOUT = 5.0
 
 
 def cells(parameter: Parameter) -> Cells:
@@ -91,12 +95,15 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             if not low <= raw <= high:
                 return Failure(sentences.not_in_bits(raw, 8 * length, low, high))
         data = (raw & (1 << 8 * length) - 1).to_bytes(length, 'little')
-        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data)
+        timeout = self.retry.timeout
+        if parameter.index == _STORE:
+            timeout = max(timeout, STORE_TIMEOUT)
+        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data, timeout=timeout)
         if reply.data is not None:
             return Written()
         if reply.abort is not None:
             return refused(reply.abort)
-        return self.retry.unanswered(1) if reply.sent else Failure(sentences.not_sent())
+        return self.retry.unanswered(1, timeout) if reply.sent else Failure(sentences.not_sent())
 
     def _upload(self, parameter: Parameter,
                 ) -> Generator[Ask, Reply, 'tuple[bytes, bool] | Failure']:

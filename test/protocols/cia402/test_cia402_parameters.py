@@ -20,7 +20,9 @@ FLAG = parameter('flag', None, index=0x2002, subindex=0, type=ParameterType.BOOL
 WORD = parameter('word', None, index=0x2003, subindex=0, type=ParameterType.INT16)
 LONG = parameter('long', None, index=0x2004, subindex=0, type=ParameterType.UINT32)
 ORDER = parameter('order', None, index=0x2005, subindex=0, type=ParameterType.UINT16, access=WO)
-LISTED = (*TABLE, NAME, METHOD, BYTE, FLAG, WORD, LONG, ORDER)
+STORE = parameter('store_parameters', None, index=0x1010, subindex=1, type=ParameterType.UINT32,
+                  access=WO)
+LISTED = (*TABLE, NAME, METHOD, BYTE, FLAG, WORD, LONG, ORDER, STORE)
 OBJECTS = {(0x6098, 0): b'\xFF', (0x2001, 1): b'\x80', (0x2002, 0): b'\1',
            (0x2003, 0): b'\xFE\xFF',
            (0x2004, 0): b'\1\2\3\x84', (0x2005, 0): b'\0\0', (0x2006, 0): b'\x81'}
@@ -198,3 +200,32 @@ def test_what_another_master_sends_is_named() -> None:
         axis.says(frame)
         event, = axis.talk.events(ForeignMasterSeen)
         assert event.text == says('other_master_asks_node', node=5, what=what, frame=frame)
+
+
+@pytest.mark.parametrize(('after', 'outcome'), [
+    (0.3, 'written'), (4.9, 'written'), (5.1, says('no_answer', timeout=5.0, attempts=1))])
+def test_what_stores_is_told_once_and_waited_for(axis: Axis, after: float, outcome: str) -> None:
+    """Others have their turn when it has ended: a node does one transfer at a time."""
+    order, takes = '605#2310100173617665', axis.drive.takes
+    axis.drive.takes = lambda sent: [] if (     # type: ignore[method-assign]
+        str(sent) == order) else takes(sent)
+    axis.deliver(axis.talk.submits(write((STORE, 0x65766173)), axis.now))
+    axis.deliver(axis.talk.submits(read(BYTE), axis.now))
+    axis.live(after)
+    axis.says('585#6010100100000000')
+    axis.live(0.5)
+    stored, other = axis.talk.events(RequestCompleted)
+    assert [text_of(each) for each in (*stored.outcomes, *other.outcomes)] == [outcome, 0x80]
+    assert axis.take().count(order) == 1
+
+
+def test_a_stop_does_not_wait_for_what_stores() -> None:
+    axis = Axis(table=LISTED).enabled()
+    takes = axis.drive.takes
+    axis.drive.takes = lambda sent: [] if (     # type: ignore[method-assign]
+        str(sent) == '605#2310100173617665') else takes(sent)
+    axis.deliver(axis.talk.submits(write((STORE, 0x65766173)), axis.now))
+    axis.live(0.1)
+    axis.deliver(axis.talk.deactivate(axis.now))
+    axis.live(1.0)
+    assert axis.session.stopped
