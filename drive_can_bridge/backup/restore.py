@@ -17,6 +17,7 @@ the drive is asked whether somebody has enabled it: then only the steps afterwar
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
@@ -312,7 +313,8 @@ class Restorer:
     :param clock: s.
     :param wait: waits for so many seconds.
     :param told: is told each outcome of a write.
-    :param hint: takes what the user should know while it goes on.
+    :param hint: takes what the user should know while it goes on. Where neither can say it (the
+        terminal has gone), the drive is not left in its mode because of that.
     """
 
     def __init__(self, drive: Drive, plan: RestorePlan, *, stopped: Callable[[], bool],
@@ -419,7 +421,8 @@ class Restorer:
             self._note_written(name)
         else:
             self._reasons[name] = outcome.reason
-        self._told(outcome)
+        with suppress(OSError):
+            self._told(outcome)
         return outcome
 
     def _note_written(self, name: str) -> None:
@@ -458,8 +461,9 @@ class Restorer:
             if self._lost and end is None:
                 end = self._clock() + PATIENCE
                 names = ', '.join(dict.fromkeys(step.parameter for step in self._after))
-                self._hint(f'{self._drive.name}: answers no more; waiting up to {PATIENCE:g} s '
-                           f'for it, so that {names} is set back')
+                with suppress(OSError):
+                    self._hint(f'{self._drive.name}: answers no more; waiting up to '
+                               f'{PATIENCE:g} s for it, so that {names} is set back')
             del failed[already:]
             self._wait(_PATIENCE_STEP)
 

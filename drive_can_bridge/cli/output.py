@@ -7,7 +7,7 @@ a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a te
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import sys
@@ -94,7 +94,8 @@ def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callab
         yield step
     finally:
         if progress.live.is_started:
-            progress.stop()
+            with suppress(OSError):     # the terminal may have gone meanwhile
+                progress.stop()
 
 
 def differs(path: Path, data: bytes | None = None) -> bool:

@@ -16,7 +16,7 @@ Steps that a signal does not break off in the middle.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import math
 import os
 import signal
@@ -225,14 +225,16 @@ def postponed(told: Callable[[], object]) -> Iterator[Interruption]:
     """
     Only remember SIGINT, SIGTERM and SIGHUP; the work in here ends where it can.
 
-    :param told: called once, when the first signal comes.
+    :param told: called once, when the first signal comes. The terminal to which it may speak
+        has perhaps gone: that is what SIGHUP says.
     """
     noted = Interruption()
 
     def note(number: int, _: Any) -> None:
         if not noted:
             noted.number = number
-            told()
+            with suppress(OSError):
+                told()
 
     before = {number: signal.signal(number, note) for number in (*_SIGNALS, signal.SIGHUP)}
     try:

@@ -170,11 +170,15 @@ class ScriptedDrive(Drive):
             raise DriveCanError('bus main: is gone')
 
 
-def restored(drive: ScriptedDrive) -> RestoreResult:
-    """Restore :data:`FILE`."""
+def restored(drive: ScriptedDrive, **tell: Callable[..., object]) -> RestoreResult:
+    """
+    Restore :data:`FILE`.
+
+    :param tell: whom a :class:`.Restorer` tells something.
+    """
     backup = Backup('b.yaml', '/lift', FILE)
     plan = plan_restore(backup, drive, drive.read(*names_to_read(backup, drive)),
                         include_protected=False)
     drive.events.clear()
     return Restorer(drive, plan, stopped=lambda: drive.signalled, clock=lambda: drive.now,
-                    wait=drive.wait).run()
+                    wait=drive.wait, **tell).run()

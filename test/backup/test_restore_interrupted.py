@@ -1,13 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A restore that something comes between: at every write, in virtual time."""
 
+import errno
 from itertools import product
+import signal
 
 import pytest
 from scripted_drive import (
     Fate, FILE, Killed, MODE, OTHER, restored, SAVE, ScriptedDrive, SETTINGS, STORE)
 
 from drive_can_bridge.backup.restore import PATIENCE
+from drive_can_bridge.process.signals import postponed
 
 #: mode, three settings, mode
 WRITES = range(1, 6)
@@ -101,6 +104,25 @@ def test_what_a_killed_restore_leaves_is_brought_to_its_end_by_the_next(
     drive.ended()
     result = restored(drive)
     assert (result.complete, drive.registers) == (True, FILE)
+
+
+def gone(*_: object) -> None:
+    raise OSError(errno.EIO, 'Input/output error')
+
+
+@pytest.mark.parametrize('number', WRITES)
+@pytest.mark.parametrize('fate', [Fate.SIGNAL, Fate.AWAY])
+def test_a_terminal_that_has_gone_leaves_no_drive_in_its_mode(number: int, fate: Fate) -> None:
+    drive = ScriptedDrive({number: fate})
+    restored(drive, told=gone, hint=gone)
+    assert not drive.in_mode
+
+
+def test_a_signal_of_a_terminal_that_has_gone_is_noted() -> None:
+    with postponed(gone) as interrupted:
+        assert not interrupted
+        signal.raise_signal(signal.SIGHUP)
+        assert interrupted.exit_code == 128 + signal.SIGHUP
 
 
 class TestStoring:
