@@ -279,13 +279,54 @@ class NotAsInFile:
     reason: str = ''
 
 
+class StepKind(Enum):
+    """What a step of a profile is for."""
+
+    BEFORE = 'before'
+    AFTER = 'after'
+    STORE = 'store'
+
+
+@dataclass(frozen=True, slots=True)
+class FailedStep:
+    """A step of the profile that failed, and why."""
+
+    parameter: str
+    kind: StepKind
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """In words, with what follows from it."""
+        if self.kind is StepKind.STORE and self.unknown:
+            follows = 'Whether what was written is stored is not known'
+        else:
+            follows = _FOLLOWS[self.kind]
+        return f'{self.parameter}: {self.reason}. {follows}'
+
+    @property
+    def unknown(self) -> bool:
+        """The drive may have done it all the same."""
+        return tells_nothing(self.reason)
+
+
+_NOT_ATTEMPTED = {StepKind.AFTER: 'not set back', StepKind.STORE: 'not written'}
+_FOLLOWS = {
+    StepKind.BEFORE: 'No setting was written',
+    StepKind.AFTER: 'Look at it by hand: the drive may still be in the mode in which settings '
+                    'are written',
+    StepKind.STORE: 'What was written is not stored',
+}
+
+
 @dataclass(slots=True)
 class RestoreResult:
     """
     What became of it.
 
     :param written: names of the settings that were written, in that order.
-    :param steps: steps of the profile that failed, in words.
+    :param steps: steps of the profile that failed.
+    :param stored: the drive was told to store all, and said that it has.
     :param wrong: what is not as in the file. Empty after an interruption: nothing was compared.
     :param enabled: somebody enabled the drive meanwhile.
     :param stopped: it was interrupted, or the drive enabled; these were not written.
@@ -293,7 +334,8 @@ class RestoreResult:
     """
 
     written: list[str] = field(default_factory=list)
-    steps: list[str] = field(default_factory=list)
+    steps: list[FailedStep] = field(default_factory=list)
+    stored: bool = False
     wrong: list[NotAsInFile] = field(default_factory=list)
     enabled: bool = False
     stopped: list[str] | None = None
@@ -351,7 +393,7 @@ class Restorer:
             for step in self._before:
                 if self._may_not_write():
                     break
-                self._note(step, self._take(step))
+                self._note(StepKind.BEFORE, step, self._take(step))
             if not result.steps:
                 self._rounds()
         except DriveCanError as error:
@@ -449,27 +491,43 @@ class Restorer:
             self._lost = self._unanswered = False
             try:
                 for step in self._after:
-                    self._note(step, self._take_back(
+                    self._note(self._kind(step), step, self._take_back(
                         step, blind=last or attempt <= _ATTEMPTS, last=last))
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
-                failed[already:] = [f'{step.parameter}: not set back' for step in self._after]
+                failed[already:] = [
+                    FailedStep(step.parameter, kind, _NOT_ATTEMPTED[kind]) for step, kind in zip(
+                        self._after, map(self._kind, self._after))]
                 return
             there += not self._lost
             if not self._unanswered or there == _ATTEMPTS or last:
                 return
             if self._lost and end is None:
                 end = self._clock() + PATIENCE
-                names = ', '.join(dict.fromkeys(step.parameter for step in self._after))
                 with suppress(OSError):
                     self._hint(f'{self._drive.name}: answers no more; waiting up to '
-                               f'{PATIENCE:g} s for it, so that {names} is set back')
+                               f'{PATIENCE:g} s for it, so that {self._aim}')
             del failed[already:]
             self._wait(_PATIENCE_STEP)
 
-    def _note(self, step: RestoreStep, reason: str) -> None:
+    @property
+    def _aim(self) -> str:
+        """What the steps afterwards are for."""
+        names = dict.fromkeys(step.parameter for step in self._after
+                              if self._kind(step) is not StepKind.STORE)
+        return f'{", ".join(names)} is set back' if names else 'it stores what was written'
+
+    def _kind(self, step: RestoreStep) -> StepKind:
+        """Tell what a step afterwards is for."""
+        parameter = self._drive.find(step.parameter)
+        return (StepKind.STORE if parameter is not None and parameter.stores
+                else StepKind.AFTER)
+
+    def _note(self, kind: StepKind, step: RestoreStep, reason: str) -> None:
         if reason:
-            self._result.steps.append(f'{step.parameter}: {reason}')
+            self._result.steps.append(FailedStep(step.parameter, kind, reason))
+        if kind is StepKind.STORE:
+            self._result.stored = not reason
 
     def _take(self, step: RestoreStep) -> str:
         """Take a step before the settings; return why it failed."""
@@ -534,17 +592,15 @@ class Restorer:
         name = parameter.name
         written = self._write_step(name, value_of_word(parameter, word), blind=blind)
         if not written.ok:
-            if not tells_nothing(written.reason):
-                return written.reason
-            # it may have been taken all the same
-            self._unanswered = True
+            # it may have been taken all the same, or the drive refuses what it has already
+            unanswered = tells_nothing(written.reason)
             if not parameter.readable:
-                self._lost = not self._is_there()
+                self._lost = unanswered and not self._is_there()
+            else:
+                self._lost = bool(self._look(name, parameter))
+            if self._lost or not parameter.readable or self._words[name] != word:
+                self._unanswered = self._unanswered or unanswered
                 return written.reason
-            self._lost = bool(self._look(name, parameter))
-            if self._lost or self._words[name] != word:
-                return written.reason
-            self._unanswered = False
         self._words[name] = word
         return ''
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from drive_can_bridge.backup.document import Backup, is_setting, read_backup
 from drive_can_bridge.backup.restore import (
     LeftAlone, names_to_read, NotAsInFile, other_type, plan_restore, problems_in, RestorePlan,
-    Restorer, RestoreResult, says_nothing, strangers, why_left_alone)
+    Restorer, RestoreResult, says_nothing, StepKind, strangers, why_left_alone)
 from drive_can_bridge.cli.command import (
     agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage)
 from drive_can_bridge.cli.drives import (
@@ -213,12 +213,12 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         for each in result.wrong:
             _print_outcome(drive, each.name, False, each.found, each.wanted,
                            _reason(each, result))
-    for text in result.steps:
-        complain(f'{drive.name}: {text}. Look at it by hand: the drive may still be in '
-                 'the mode in which settings are written')
+    for step in result.steps:
+        complain(f'{drive.name}: {step.text}')
     volatile = [change.name for change in plan.changes
                 if change.name in result.written and _is_volatile(drive, change.parameter)]
-    if volatile:
+    stores = [step for step in result.steps if step.kind is StepKind.STORE]
+    if volatile and not result.stored and not any(step.unknown for step in stores):
         complain(f'{drive.name}: gone when it loses power: {_list(volatile)} '
                  f'({_WHY_VOLATILE[drive.facts.persist_writes]})')
     if result.trouble is not None:

@@ -13,8 +13,6 @@ from drive_can_bridge.configuration.yaml_nodes import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES
 
-#: CANopen object that stores parameters when it is written
-STORE = 0x1010
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
 _NAMES_SHOWN = 12
@@ -166,5 +164,5 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
 def _is_lost(outcome: WriteOutcome) -> bool:
     """Tell whether a value was written that the drive may not keep."""
     parameter = outcome.parameter
-    return outcome.ok and parameter is not None and parameter.index != STORE and (
+    return outcome.ok and parameter is not None and not parameter.stores and (
         parameter.storage is not Storage.EEPROM)

@@ -166,6 +166,11 @@ class Parameter:
         """Can be written by a service or command."""
         return self.access is not Access.READ_ONLY
 
+    @property
+    def stores(self) -> bool:
+        """Stores what the drive has in its RAM when it is written: 1010h of CANopen."""
+        return self.index == 0x1010
+
     def shown(self, raw: int) -> str:
         """Write a value as the drive's manual does: with as many decimals as a raw step has."""
         value = self.value_from_raw(raw)

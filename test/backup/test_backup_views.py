@@ -100,6 +100,16 @@ class Story:
             return outcome
         self.patch.setattr(DirectDrive, 'put', enabled_by_now)
 
+    def _store_fails(self, reason: str) -> None:
+        put = DirectDrive.put
+
+        def failed(drive: Any, name: str, parameter: Any, *args: Any, **options: Any,
+                   ) -> WriteOutcome:
+            if name == 'store_parameters':
+                return WriteOutcome(name, False, parameter, reason)
+            return put(drive, name, parameter, *args, **options)
+        self.patch.setattr(DirectDrive, 'put', failed)
+
     def _interrupted_twice(self) -> None:
         put, report = DirectDrive.put, restore._report
 

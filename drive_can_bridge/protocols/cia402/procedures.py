@@ -28,9 +28,8 @@ NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
 MAP = 'communication'
 _MAPS = frozenset((0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
 _PDOS = range(0x1400, 0x1C00)
-#: object that stores, which a drive acknowledges when all is stored; and s that this may take:
-#: CiA 301 sets no limit. Written once more, it would wear the memory once more.
-_STORE = 0x1010
+#: s that a drive may take until it acknowledges that all is stored: CiA 301 sets no limit. Told
+#: once more, it would wear its memory once more.
 STORE_TIMEOUT = 5.0
 
 
@@ -96,7 +95,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
                 return Failure(sentences.not_in_bits(raw, 8 * length, low, high))
         data = (raw & (1 << 8 * length) - 1).to_bytes(length, 'little')
         timeout = self.retry.timeout
-        if parameter.index == _STORE:
+        if parameter.stores:
             timeout = max(timeout, STORE_TIMEOUT)
         reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data, timeout=timeout)
         if reply.data is not None:
