@@ -119,7 +119,12 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
                               wait=lambda s: args.clock.wait(args.clock.now() + s),
                               told=step, hint=complain).run()
         # a second signal does not keep from anybody what was written
-        return _report(args, drive, plan, result, interrupted)
+        try:
+            return _report(args, drive, plan, result, interrupted)
+        except OSError:     # the terminal whose end it is
+            if not interrupted:
+                raise
+            return interrupted.exit_code
 
 
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:

@@ -1,12 +1,18 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can backup``, ``restore`` and ``compare`` as a user types them, directly on a bus."""
 
+import errno
 from pathlib import Path
+import signal
+from typing import Any
 
 from backup_builders import BY_HAND, Command, Shop
 import pytest
 
 from drive_can_bridge.backup.document import read_backup
+from drive_can_bridge.cli import restore
+from drive_can_bridge.client.direct import DirectDrive
+from drive_can_bridge.client.drive import WriteOutcome
 
 
 class TestOneDriveOfEachFamily:
@@ -65,6 +71,25 @@ def test_a_place_where_no_file_can_be_made(shop: Shop, command: Command) -> None
 
 
 class TestRestore:
+
+    def test_a_closed_terminal_ends_it_with_the_mode_taken_back(
+            self, shop: Shop, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+        shop.drives['pump'].set_value('general_configuration', 0x10)
+        file = shop.write_backup('pump', flc1_ratio=50.0, flc2_ratio=40.0)
+        put = DirectDrive.put
+
+        def gone(text: str) -> None:
+            raise OSError(errno.EIO, 'Input/output error')
+
+        def closed(drive: Any, name: str, *args: Any, **options: Any) -> WriteOutcome:
+            if name == 'flc1_ratio':
+                monkeypatch.setattr(restore, 'complain', gone)
+                signal.raise_signal(signal.SIGHUP)
+            return put(drive, name, *args, **options)
+        monkeypatch.setattr(DirectDrive, 'put', closed)
+        assert command('restore', str(file), '--yes').code == 128 + signal.SIGHUP
+        assert shop.values('pump', 'general_configuration', 'flc1_ratio', 'flc2_ratio') == (
+            0x10, 50.0, 33.0)
 
     @pytest.mark.parametrize(('persist', 'told'), [
         ('true', []), ('false', ['mixer: gone when it loses power: acceleration_time '
