@@ -48,7 +48,8 @@ def test_nothing_with_control_runs_on_when_all_are_stopped(
         somebody.enables(drive)
     # the control word comes first in the cyclic request of stations 2 and 3
     enabled = '0001'
-    assert control_word(site, '005FFFF0') == control_word(site, '007FFFF0') == enabled
+    for identifier in ('005FFFF0', '007FFFF0'):     # who writes the trace may be behind
+        wait_for(lambda at=identifier: control_word(site, at) == enabled, 'that it is enabled')
     said = site.do('quick_stop', 'operator', {'drive': '*'}).said
     assert (said['success'], said['failed']) == (True, [])
     for identifier in ('005FFFF0', '007FFFF0'):
