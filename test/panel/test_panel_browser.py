@@ -75,7 +75,7 @@ def test_an_edit_reaches_the_drive_and_its_refusal_is_shown(site: Site, browser:
     browser.click('.q-tab', 'Parameters')
     browser.shows('ramp_time')
     browser.search('ramp_time')
-    browser.shows('1 of 9 parameters')
+    browser.shows('1 of 11 parameters')
     wait_for(lambda: browser.field('ramp_time') not in ('', None), 'its value, as read')
     browser.write('ramp_time', '2.5')
     browser.shows('written')
