@@ -2,6 +2,7 @@
 """A browser that is looked at and clicked in."""
 
 import base64
+from collections.abc import Callable
 from functools import cache
 import json
 from pathlib import Path
@@ -96,18 +97,33 @@ class Browser:
 
     def click(self, selector: str, text: str) -> None:
         """Click what has a text, as soon as it is there."""
+        def clicked() -> bool:
+            for element in self.find_all(selector):
+                if text in element.text:
+                    element.click()
+                    return True
+            return False
+        self._done(clicked, f'{text} to be clicked')
+
+    def _done(self, action: Callable[[], bool], what: str) -> None:
+        """Wait until something could be done, with elements that may be drawn anew meanwhile."""
         from selenium.common.exceptions import StaleElementReferenceException
 
-        def clicked() -> bool:
+        def done() -> bool:
             try:
-                for element in self.find_all(selector):
-                    if text in element.text:
-                        element.click()
-                        return True
-            except StaleElementReferenceException:  # drawn anew in this moment
-                pass
+                return action()
+            except StaleElementReferenceException:
+                return False
+        wait_for(done, what)
+
+    def _keys(self, selector: str, *texts: str) -> None:
+        def typed() -> bool:
+            for field in self.find_all(selector)[:1]:
+                for text in texts:
+                    field.send_keys(text)
+                return True
             return False
-        wait_for(clicked, f'{text} to be clicked')
+        self._done(typed, f'{selector} to be typed into')
 
     def value(self, drive: str, name: str) -> str:
         """Return a value of a drive's card."""
@@ -120,7 +136,7 @@ class Browser:
 
     def search(self, words: str) -> None:
         """Search in the parameters."""
-        self.find_all('.search input')[0].send_keys(words)
+        self._keys('.search input', words)
 
     def field(self, name: str) -> str | None:
         """Return what stands in the field of a parameter."""
@@ -132,9 +148,7 @@ class Browser:
     def type(self, name: str, text: str) -> None:
         """Type a value."""
         from selenium.webdriver.common.keys import Keys
-        field = self.find_all(f'[data-parameter="{name}"] input')[0]
-        field.send_keys(Keys.CONTROL, 'a')
-        field.send_keys(text)
+        self._keys(f'[data-parameter="{name}"] input', Keys.CONTROL + 'a', text)
 
     def write(self, name: str, text: str) -> None:
         """Type a value and press Enter."""

@@ -205,7 +205,7 @@ def test_a_panel_that_was_started_again_has_its_page_say_so(run: Run, tmp_path: 
     try:
         browser.open(address)
         browser.shows('No bridge yet')
-        assert browser.find_all('.lost') == []
+        wait_for(lambda: not browser.find_all('.lost'), 'that it is live')
         assert panel.end(signal.SIGKILL) == -signal.SIGKILL
         # what is old looks so
         wait_for(lambda: browser.find_all('.lost'), 'that it is noticed')
