@@ -25,10 +25,13 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator['House']:
 
 
 @pytest.fixture
-def page() -> Iterator[Any]:
+def page(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Return a page, with nobody who looks at it."""
+    from nicegui import background_tasks
     from nicegui.client import Client
     from nicegui.page import page as kind
+    # so nothing is sent to it; and after a test that has started NiceGUI nothing could be deferred
+    monkeypatch.setattr(background_tasks, 'create_or_defer', lambda sends, **_: sends.close())
     client = Client(kind(''))
     with client:
         yield client
