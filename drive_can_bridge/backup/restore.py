@@ -496,8 +496,8 @@ class Restorer:
             except DriveCanError as error:
                 self._result.trouble = self._result.trouble or error
                 failed[already:] = [
-                    FailedStep(step.parameter, kind, _NOT_ATTEMPTED[kind]) for step, kind in zip(
-                        self._after, map(self._kind, self._after))]
+                    FailedStep(step.parameter, kind, _NOT_ATTEMPTED[kind])
+                    for step in self._after for kind in (self._kind(step),)]
                 return
             there += not self._lost
             if not self._unanswered or there == _ATTEMPTS or last:

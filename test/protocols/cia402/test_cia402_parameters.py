@@ -88,13 +88,7 @@ def test_another_length_than_the_profile_says(axis: Axis) -> None:
 
 
 def test_what_can_only_be_written_has_to_be_listed(axis: Axis) -> None:
-    sdo = axis.drive._sdo
-
-    def write_only(data: bytes) -> bytes:
-        if data[:4] == bytes.fromhex('40072000'):
-            return bytes.fromhex('8007200001000106')
-        return sdo(data)
-    axis.drive._sdo = write_only    # type: ignore[method-assign]
+    axis.drive.instead = {'40072000': '8007200001000106'}
     (why,) = outcomes(axis, write((raw('x2007.0', axis), 1)))
     assert 'nobody knows' in str(why)
     assert not any(text.startswith('605#2B0720') for text in axis.take())
@@ -102,11 +96,9 @@ def test_what_can_only_be_written_has_to_be_listed(axis: Axis) -> None:
 
 def test_texts_are_no_numbers(axis: Axis) -> None:
     """A device name in segments, as CiA 301 sends them."""
-    answers = {'4008100000000000': '4108100009000000', '6000000000000000': '0053657276696365',
-               '7000000000000000': '1D64730000000000'}
-    sdo = axis.drive._sdo
-    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
-        answers.get(data.hex(), sdo(data).hex()))
+    axis.drive.instead = {
+        '4008100000000000': '4108100009000000', '6000000000000000': '0053657276696365',
+        '7000000000000000': '1D64730000000000'}
     assert outcomes(axis, read(NAME)) == [says('too_long', length=8)]
     sent = axis.take()
     at = sent.index('605#4008100000000000')
@@ -117,20 +109,16 @@ def test_texts_are_no_numbers(axis: Axis) -> None:
 def test_what_is_longer_than_four_bytes_is_not_written(axis: Axis) -> None:
     """Nothing of a profile is longer, so that no download needs segments."""
     assert max(kind.bits for kind in ParameterType) == 32
-    answers = {'4008200000000000': '4108200008000000', '6000000000000000': '0053657276696365',
-               '7000000000000000': '1D73000000000000'}
-    sdo = axis.drive._sdo
-    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
-        answers.get(data.hex(), sdo(data).hex()))
+    axis.drive.instead = {
+        '4008200000000000': '4108200008000000', '6000000000000000': '0053657276696365',
+        '7000000000000000': '1D73000000000000'}
     assert outcomes(axis, write((raw('x2008.0', axis), 1))) == [
         says('too_long', length=8)]
     assert not [text for text in axis.take() if text.startswith('605#2')]
 
 
 def test_a_drive_that_gives_up_in_the_middle_of_its_segments(axis: Axis) -> None:
-    sdo = axis.drive._sdo
-    axis.drive._sdo = lambda data: bytes.fromhex(     # type: ignore[method-assign]
-        {'4008100000000000': '4108100009000000'}.get(data.hex(), sdo(data).hex()))
+    axis.drive.instead = {'4008100000000000': '4108100009000000'}
     takes = axis.drive.takes
     axis.drive.takes = lambda sent: [] if sent.data[:1] == b'\x60' and (   # type: ignore
         sent.identifier == 0x605) else takes(sent)
@@ -169,13 +157,7 @@ def test_parameters_of_a_drive_that_differs(axis: Axis) -> None:
 
 def test_a_raw_name_of_what_is_listed_has_the_width_that_is_listed(axis: Axis) -> None:
     """What ``drive_can write`` says of how to store: a write-only object by its raw name."""
-    sdo = axis.drive._sdo
-
-    def write_only(data: bytes) -> bytes:
-        if data[:4] == bytes.fromhex('40052000'):
-            return bytes.fromhex('8005200001000106')
-        return sdo(data)
-    axis.drive._sdo = write_only    # type: ignore[method-assign]
+    axis.drive.instead = {'40052000': '8005200001000106'}
     assert outcomes(axis, write((raw('x2005.0', axis), 7))) == ['written']
     assert '605#2B05200007000000' in axis.take()
     assert outcomes(axis, write((raw('x2005.0', axis), 1 << 16))) == [

@@ -463,13 +463,7 @@ class TestFixedEntries:
 
     def test_a_count_that_is_refused(self) -> None:
         axis = Axis(objects=self.FOUND)
-        sdo = axis.drive._sdo
-
-        def two_are_too_many(data: bytes) -> bytes:
-            if data[:5] == bytes.fromhex('2F00160002'):
-                return bytes.fromhex('8000160042000406')
-            return sdo(data)
-        axis.drive._sdo = two_are_too_many      # type: ignore[method-assign]
+        axis.drive.instead = {'2f00160002': '8000160042000406'}     # two are too many
         axis.start()
         assert differs(axis) == says(
             'object_refused', what='1600h.00h', why=describe(0x06040042))
