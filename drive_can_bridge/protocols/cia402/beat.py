@@ -37,17 +37,18 @@ class Turn(CycleTimer):
 
     :ivar session: of the drive.
     :ivar begun_round: its RPDOs of the round under way were handed out.
+    :ivar moved: it is due with others, at another time than it wanted.
     :ivar tell: takes what becomes of the SYNC behind them.
     """
 
-    __slots__ = ('_beat', '_spacing', 'begun_round', 'session', 'tell')
+    __slots__ = ('_beat', '_spacing', 'begun_round', 'moved', 'session', 'tell')
 
     def __init__(self, period: float, beat: 'Beat', session: InStep) -> None:
         super().__init__(period)
         self._beat = beat
         self._spacing = period
         self.session = session
-        self.begun_round = False
+        self.begun_round = self.moved = False
         self.tell: Left | None = None
         beat.turns.append(self)
 
@@ -61,6 +62,7 @@ class Turn(CycleTimer):
         return self.begun_round or self.due < now + 0.5 * self._spacing
 
     def start(self, at: float) -> None:
+        self.moved = False
         super().start(self._beat.next_due(at, self, self._spacing))
 
     def stop(self) -> None:
@@ -72,16 +74,19 @@ class Turn(CycleTimer):
             self._beat.bring_forward(at)
 
     def follow(self, at: float) -> None:
-        """Be due then, because others are."""
+        """Be due then, because others are; who serves this drive does not know that."""
         super().start(at)
+        self.moved = True
 
     def hurry(self, now: float) -> None:
         if self.due > now + SYNC_WAIT_MAX:
             self.no_later(max(now, self.began_at + CYCLE_SPACING_MIN))
 
     def begun(self, now: float, pause: float | None = None) -> float:
-        error = super().begun(now, pause)
-        self.begun_round = True
+        error = super().begun(now)
+        if pause is not None and pause < self._spacing:     # those of a stop are closer
+            self._beat.bring_forward(now + pause)
+        self.begun_round, self.moved = True, False
         self._beat.agree()
         return error
 
@@ -95,7 +100,7 @@ class Beat:
 
     def __init__(self) -> None:
         self.turns: list[Turn] = []
-        self._hurried = self._pulling = False
+        self._pulling = False
 
     @property
     def running(self) -> bool:
@@ -120,7 +125,6 @@ class Beat:
 
     def bring_forward(self, at: float) -> None:
         """Have a whole round begin then, unless it is due before."""
-        self._hurried = True
         for turn in self.turns:
             if turn.running and turn.due > at:
                 turn.follow(at)
@@ -136,7 +140,7 @@ class Beat:
             return
         round_of = [each for each in self.turns if each.takes_part(now)]
         waiting = [each for each in round_of if not each.begun_round]
-        if waiting and not self._hurried and round_of[-1] is not turn:
+        if waiting and round_of[-1] is not turn and not any(each.moved for each in waiting):
             return      # they are served right behind this one
         outbox, self._pulling = turn.session.outbox, True
         try:
@@ -156,7 +160,6 @@ class Beat:
             self._send_sync(turn.session.outbox)
 
     def _send_sync(self, outbox: Outbox) -> None:
-        self._hurried = False
         told = [each.tell for each in self.turns if each.begun_round and each.tell is not None]
         for each in self.turns:
             each.begun_round, each.tell = False, None

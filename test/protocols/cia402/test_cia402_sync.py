@@ -7,6 +7,7 @@ from literal_drives import ServoDrive
 import pytest
 from servo_builders import Axis, OBJECTS, servo
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import ProcessDataReceived
@@ -173,6 +174,47 @@ class TestRounds:
         assert one.drives[1].state == one.drives[3].state == ServoDrive.ENABLED
         assert one.now - at < 0.05
         one.live(2.0)
+        assert all(session.statistics.missed == 0 for session in one.sessions)
+
+    @pytest.mark.parametrize('period', [0.5, 2.0])
+    def test_cycles_of_a_stop_are_close_together_however_long_the_period_is(
+            self, period: float) -> None:
+        one = bus(2, period=period, control_timeout=0.5)
+        one.start()
+        one.live(3 * period)
+        assert online(one) == [True] * 2
+        one.log.clear()
+        for place, session in enumerate(one.sessions):
+            session.deactivate(one.now)
+            one.pump(place)
+        one.live(1.0)
+        assert all(session.stopped for session in one.sessions)
+        syncs = [at for at, text in one.log if text == '080#']
+        assert len(syncs) == 3
+        assert max(later - at for at, later in zip(syncs, syncs[1:])) <= 0.1 + 1e-6
+        assert one.rounds() == [['201', '202', '080']] * 3
+
+    @pytest.mark.parametrize('place', [0, 1, 2])
+    def test_so_are_those_of_one_drive_and_all_others_come_along(self, place: int) -> None:
+        one = bus(period=0.5)
+        one.start()
+        one.live(2.2)
+        one.asks(place, ControlAction.ENABLE)
+        one.live(3.0)
+        assert one.drives[place + 1].state == ServoDrive.ENABLED
+        one.log.clear()
+        one.sessions[place].fail(sentences.bridge_inactive(), one.now)
+        one.pump(place)
+        one.live(0.4)
+        assert one.sessions[place].stopped
+        assert one.drives[place + 1].state == ServoDrive.READY
+        syncs = [at for at, text in one.log if text == '080#']
+        assert max(later - at for at, later in zip(syncs[:3], syncs[1:3])) <= 0.1 + 1e-6
+        rounds = one.rounds()
+        assert [sorted(each) for each in rounds[:3]] == [['080', '201', '202', '203']] * 3
+        rest = [each for number, each in enumerate(('201', '202', '203')) if number != place]
+        one.live(3.0)
+        assert [*rounds[3:], *one.rounds()] == [[*rest, '080']] * 7
         assert all(session.statistics.missed == 0 for session in one.sessions)
 
     def test_a_process_that_is_late_between_two_drives(self) -> None:
