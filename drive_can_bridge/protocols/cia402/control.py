@@ -118,9 +118,12 @@ class DriveRules(TableRules):
         return states.SHUTDOWN
 
     def _enabling(self) -> int:
-        if self.homing_bits is not None and self._last & _ENABLE_OPERATION:
-            # what was halted stays so until homing starts: its old target is still there
-            return states.ENABLE | (self.homing_bits or self.mode_bits & states.HALT)
+        if self.homing_bits is not None:
+            if self._last & _ENABLE_OPERATION:
+                # what was halted stays so until homing starts: its old target is still there
+                return states.ENABLE | (self.homing_bits or self.mode_bits & states.HALT)
+            if self.state is State.SWITCHED_ON:     # until it is back in its mode
+                return states.SWITCH_ON
         if self.state is State.OPERATION_ENABLED:
             return self._enable_word | self.mode_bits
         if self.state is State.SWITCHED_ON:

@@ -4,7 +4,8 @@
 
 Each step is seen before the next one: a control word in an answered cycle, a mode in 6061h, the
 end in the status word. Nothing arms meanwhile. Whatever stops the drive stops this too; the mode
-is written back then as soon as the drive is disabled.
+is written back then as soon as the drive is disabled, and until that is acknowledged the drive is
+not enabled: bit 4 of its own mode would start homing.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -14,6 +15,7 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cia402 import states
@@ -29,6 +31,8 @@ _DONE = states.BIT_12 | states.TARGET_REACHED
 _STILL = 0.1
 #: likewise where it says otherwise, which may be noise: so much of control_timeout
 _STILL_ANYWAY = 0.5
+#: s until a mode that the drive did not take is written again
+_WRITE_AGAIN = 1.0
 
 
 class Step(Enum):
@@ -48,6 +52,7 @@ class Homing:
     The homing of one drive.
 
     :param mode: number of the mode to go back to.
+    :ivar not_back: that the drive does not take it; '' as far as is known.
     """
 
     def __init__(self, session: Session, machine: ControlMachine, rules: DriveRules,
@@ -63,7 +68,8 @@ class Homing:
         self._looking = self._no_velocity = False       # 606Ch says so, or nothing
         self._now = -math.inf           # of the last sample
         self._fresh = self._lowered = False
-        self._failure = NOTHING
+        self._failure = self.not_back = NOTHING
+        self._write_at = -math.inf      # the mode of a drive that was stopped
 
     @property
     def under_way(self) -> bool:
@@ -203,11 +209,14 @@ class Homing:
     def _left(self, failure: Sentence) -> None:
         if self._step is not Step.LEAVING:
             return
-        if failure:
+        if failure and self._machine.operating:
             self._machine.drop(failure)     # in whatever mode it is, it is not driven
-        failure = failure or self._failure
-        self._answer(not failure, failure or sentences.homed())
-        self._finish()
+        told = failure or self._failure
+        self._answer(not told, told or sentences.homed())
+        if failure:
+            self._go(Step.HOLDING)
+        else:
+            self._finish()
 
     def _interrupted(self, status: int) -> None:
         """Go back to the mode of a drive that was stopped, as soon as it is disabled."""
@@ -215,16 +224,37 @@ class Homing:
             self._answer(False, sentences.homing_stopped(self._step.value))
         self._rules.homing_bits = 0
         self._deadline = math.inf
-        if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING:
+        if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING and (
+                self._now >= self._write_at):
             self._go(Step.LEAVING)
-            self._change(self._mode, lambda failure: self._finish())
+            self._channel.run(self._write(self._mode), self._written, self._now)
+
+    def _write(self, mode: int) -> Generator[Ask, Reply, Sentence]:
+        """Write the mode of a drive that is disabled: it may show it when it is enabled."""
+        reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'),
+                          attempts=self._session.retry.attempts)
+        return NOTHING if reply.data is not None else sentences.mode_refused(mode)
+
+    def _written(self, failure: Sentence) -> None:
+        if self._step is not Step.LEAVING:
+            return
+        if not failure:
+            self._finish()
+            return
+        if not self.not_back:
+            self._session.report.note(Noted(failure, warning=True))
+        self.not_back, self._write_at = failure, self._now + _WRITE_AGAIN
+        self._go(Step.HOLDING)
 
     def _change(self, mode: int, then: Callable[[Sentence], None]) -> None:
+        step = self._step
+
         def look() -> Generator[Ask, Reply, Sentence]:
             reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'))
             if reply.data is None:
                 return sentences.mode_refused(mode)
-            for _ in range(int(self._session.configuration.control_timeout / LOOK_PERIOD)):
+            until = self._channel.now + self._session.configuration.control_timeout
+            while self._step is step and self._machine.operating and self._channel.now < until:
                 shown = yield Ask(states.MODE_SHOWN)
                 if shown.abort is not None or shown.data and shown.data[0] == mode:
                     return NOTHING
@@ -240,6 +270,6 @@ class Homing:
 
     def _finish(self) -> None:
         self._rules.homing_bits = None
-        self._deadline = math.inf
+        self._deadline, self._write_at, self.not_back = math.inf, -math.inf, NOTHING
         self._go(Step.NONE)
         self._session.interlock.hold(False)

@@ -481,7 +481,7 @@ class Cia402Session(Session):
         code, emergency = self._error_code, self._node.emergency
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
-        return sentences.together((known, newest))
+        return sentences.together((self._homing.not_back, known, newest))
 
     # -- control ----------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import pytest
 from saying import says
 from servo_builders import Axis, OBJECTS, POSITION, TARGET
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.frame import Frame
@@ -300,6 +301,80 @@ class TestHoming:
         axis.live(0.5)
         assert axis.talk.control_outcomes() == [('home', True, 'homed')]
         assert drive.found == 1
+
+
+@pytest.mark.parametrize(('mode', 'number'), [('ip', 7), ('vl', 2), ('csp', 8)])
+class TestAModeThatIsNotTakenBack:
+    """In mode 6 bit 4 of an enable word would start homing, and nobody has asked for that."""
+
+    @staticmethod
+    def interrupted(mode: str) -> tuple[Axis, PositionDrive, list[int]]:
+        axis, drive = meet(mode, homing=True, control_timeout=0.5, homing_timeout=1.0)
+        drive.homing = -1
+        home(axis, 0.2)
+        drive.fixed[0x6060, 0] = 0x08000022
+        axis.talk.events()
+        axis.asks(ControlAction.DISABLE, 0.3)
+        control, heard = drive._control, list[int]()
+
+        def listens(word: int) -> None:
+            if drive.number(0x6060) == 6:
+                heard.append(word)
+            control(word)
+        drive._control = listens    # type: ignore[method-assign]
+        return axis, drive, heard
+
+    def test_a_drive_is_not_enabled_before(self, mode: str, number: int) -> None:
+        axis, drive, heard = self.interrupted(mode)
+        refused = says('mode_refused', mode=number)
+        axis.live(2.0)
+        assert [note.text for note in axis.talk.events(Noted) if note.warning] == [refused]
+        axis.take()
+        (_, success, text), = axis.asks(ControlAction.ENABLE, 1.0)
+        assert not success
+        assert sentences.mode_refused(number) in text
+        assert axis.take().count(f'605#2F606000{number:02X}000000') == 1
+        drive.fixed.clear()
+        axis.live(1.1)
+        assert drive.number(0x6060) == number
+        assert set(heard) == {0x06, 0x07}
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+        assert axis.session.busy == ''
+
+    def test_one_that_takes_it_in_time_is_enabled_then(self, mode: str, number: int) -> None:
+        axis, drive, heard = self.interrupted(mode)
+        axis.live(0.5)
+        axis.deliver(axis.talk.asks(ControlAction.ENABLE, axis.now))
+        axis.live(0.1)
+        drive.fixed.clear()
+        axis.live(0.4)
+        assert axis.talk.control_outcomes() == [('enable', True, 'operation enabled')]
+        assert set(heard) == {0x06, 0x07}
+
+    def test_nor_is_it_when_it_could_not_go_back_by_itself(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True, control_timeout=0.5)
+        drive.fixed[0x6060, 0] = 0
+
+        class Once(dict[tuple[int, int], int]):
+            def get(self, place: Any, default: Any = None) -> Any:
+                return 0x08000022 if place == (0x6060, 0) and drive.number(
+                    0x6060) == 6 and drive.state == drive.ENABLED else 0
+        drive.fixed = Once()
+        assert home(axis, 1.0) == [('home', False, says('mode_refused', mode=number))]
+        assert drive.state == drive.READY
+        assert drive.number(0x6060) == number
+        assert axis.session.busy == ''
+        assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+
+    def test_one_that_does_not_say_its_mode_keeps_nobody_waiting(
+            self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True, control_timeout=0.5, homing_timeout=1.0)
+        takes = drive.takes
+        drive.takes = lambda sent: [] if str(sent).startswith(  # type: ignore[method-assign]
+            '605#406160') else takes(sent)
+        (_, success, _), = home(axis, 2.5)
+        assert not success
+        assert drive.number(0x6060) == number
 
 
 class Moves(PositionDrive):
