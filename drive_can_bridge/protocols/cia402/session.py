@@ -447,8 +447,9 @@ class Cia402Session(Session):
             elif reply.data:
                 self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
             if self._mode_shown == self._mode:
-                self._machine.status_received(self._rules.status, self._channel.now)
-                self.control_changed(self._channel.now)
+                if not self._machine.stopping:      # the status is older than what was sent
+                    self._machine.status_received(self._rules.status, self._channel.now)
+                    self.control_changed(self._channel.now)
                 return
             yield Ask(pause=LOOK_PERIOD)
 

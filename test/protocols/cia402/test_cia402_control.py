@@ -193,6 +193,20 @@ class TestQuickStop:
         assert [success for _, success, _ in axis.asks(DISABLE)] == [True]
         assert axis.words() == ['0200', '0000', '0600']
 
+    def test_an_old_status_is_none_behind_a_quick_stop(self) -> None:
+        """The mode shows in 6061h when 0002h has left, and no status behind that has come."""
+        axis = Axis(disable_word='disable_voltage', missed_limit=100).online()
+        axis.drive.objects[0x6061, 0] = b'\0'
+        assert axis.asks(ENABLE) == []
+        axis.drive.responses = lambda *kinds: []    # type: ignore[method-assign]
+        axis.asks(QUICK_STOP, 0.015)
+        assert axis.words()[-1] == '0200'
+        axis.drive.objects[0x6061, 0] = b'\x09'
+        while '605#4061600000000000' not in axis.take():
+            axis.live(0.001)
+        axis.asks(DISABLE, 0.05)
+        assert axis.words() == ['0200']
+
     def test_a_disable_meanwhile_goes_on_with_the_quick_stop(self) -> None:
         axis = Axis().enabled()
         axis.drive.braking = 30
