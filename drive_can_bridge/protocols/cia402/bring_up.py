@@ -220,13 +220,20 @@ class BringUp:
 
     def _learn(self) -> Procedure:
         """Read what the drive does at a stop."""
-        for index in (states.QUICK_STOP_OPTION, states.SHUTDOWN_OPTION, states.DISABLE_OPTION):
+        for index in states.STOP_OPTIONS:
             value = yield from self._read(index, 0, 2, signed=True)
             if value is None:
                 self.options.pop(index, None)
             else:
                 self.options[index] = value
         self._rules.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
+
+    def learn_again(self) -> Procedure:
+        """Read it once more: users have written it."""
+        try:
+            yield from self._learn()
+        except _End:    # nobody answers: what was read stands
+            return
 
     def _heartbeat(self) -> Procedure:
         """Have the drive produce heartbeats."""

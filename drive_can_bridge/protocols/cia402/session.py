@@ -27,6 +27,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.process_image import ProcessImage
+from drive_can_bridge.core.requests import Outcomes, Request, WriteRequest
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
@@ -483,6 +484,12 @@ class Cia402Session(Session):
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
         return sentences.together((self._homing.not_back, known, newest))
+
+    def request_answered(self, request: Request, outcomes: Outcomes) -> None:
+        # also where the answer was lost: it may have been written
+        if not self.serving and isinstance(request, WriteRequest) and any(
+                parameter.index in states.STOP_OPTIONS for parameter, _ in request.items):
+            self._channel.run(self._bring_up.learn_again(), lambda _: None, self._channel.now)
 
     # -- control ----------------------------------------------------------------------------------
 

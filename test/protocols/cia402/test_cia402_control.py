@@ -1,9 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
+from builders import INT16, parameter, write
 import pytest
 from saying import says
-from servo_builders import Axis
+from servo_builders import Axis, TABLE
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
@@ -192,6 +193,21 @@ class TestQuickStop:
         assert [success for _, success, _ in axis.asks(QUICK_STOP)] == [True]
         assert [success for _, success, _ in axis.asks(DISABLE)] == [True]
         assert axis.words() == ['0200', '0000', '0600']
+
+    @pytest.mark.parametrize('heard', [True, False])
+    def test_one_that_users_have_made_hold(self, heard: bool) -> None:
+        option = parameter('quick_stop_option', None, index=0x605A, type=INT16)
+        axis = Axis(table=(*TABLE, option), control_timeout=0.5, parameter_timeout=0.05).enabled()
+        axis.mute = not heard
+        axis.deliver(axis.talk.submits(write((option, 6)), axis.now))
+        axis.mute = False
+        axis.live(0.2)
+        assert 'then holds' in axis.session.facts()['stops_by']
+        assert axis.asks(QUICK_STOP) == [
+            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
+        axis.take()
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+        assert axis.words() == ['0000', '0600', '0700', '0F00']
 
     def test_an_old_status_is_none_behind_a_quick_stop(self) -> None:
         """The mode shows in 6061h when 0002h has left, and no status behind that has come."""
