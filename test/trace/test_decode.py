@@ -153,6 +153,21 @@ def test_what_is_remembered_of_tasks_has_an_end_but_for_those_under_way() -> Non
     assert (witness.telegrams[-1].title, witness.telegrams[-1].parameters) == ('read', (RAMP_2,))
 
 
+def test_an_object_of_megabytes_by_segments_is_neither_kept_nor_shown() -> None:
+    witness = Witness(axis())
+    witness.hears('604#4021100000000000', 0.0)
+    witness.hears('584#4121100000002000', 0.001)
+    for index in range(400):
+        witness.hears(f'604#{0x60 + index % 2 * 0x10:02X}00000000000000', 0.01)
+        witness.hears(f'584#{index % 2 * 0x10:02X}41424344454647', 0.011)
+    kept = [value for each in witness.tracer.buses['main'].observers
+            for value in vars(each).values() if isinstance(value, bytes)]
+    assert 0 < max(map(len, kept)) <= 256
+    line, = witness.hears('584#1D41000000000000', 0.02)
+    assert 'ABCDEFGABC' in line
+    assert len(witness.telegrams[-1].remark) == 256
+
+
 @pytest.mark.parametrize(('drives', 'identifiers'), [
     ((drive(), drive('datamodel_standard', name='lift')),
      (0x003FFFF0, 0x103FFFF0, 0x3F1, 0x7F1, 0x002001E1)),

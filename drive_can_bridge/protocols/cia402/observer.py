@@ -12,6 +12,7 @@ import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
@@ -157,12 +158,14 @@ class Cia402Observer(DriveObserver):
             refusal=sdo.describe(answer.number) if answer.kind is Said.ABORT else '')
 
     def _take_segment(self, answer: Message, now: float) -> None:
-        self._text += answer.data
+        # a domain may have megabytes, and no more of it is shown
+        self._text = (self._text + answer.data)[:TEXT_MAX]
         if answer.kind is Said.SEGMENT and answer.last and self._transfer is not None:
             parameters, _ = self._content(self._transfer, None)
             self._transfer = None
             self.tell(now, _RESPONSE, _PARAMETER, 'read', parameters,
-                      remark=repr(self._text.rstrip(b'\0').decode('ascii', 'replace')))
+                      remark=printable(repr(
+                          self._text.rstrip(b'\0').decode('ascii', 'replace'))))
 
     def _content(self, place: Place, words: Sequence[int] | None,
                  ) -> tuple[list[Parameter], list[int]]:
