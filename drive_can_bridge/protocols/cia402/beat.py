@@ -63,7 +63,11 @@ class Turn(CycleTimer):
 
     def start(self, at: float) -> None:
         self.moved = False
-        super().start(self._beat.next_due(at, self, self._spacing))
+        due = self._beat.next_due(at, self, self._spacing)
+        if self.running and due > at + self.stop_spacing:   # a stop: the others come along
+            self._beat.bring_forward(at)
+            due = at
+        super().start(due)
 
     def stop(self) -> None:
         super().start(math.inf)

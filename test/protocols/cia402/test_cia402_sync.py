@@ -194,6 +194,32 @@ class TestRounds:
         assert max(later - at for at, later in zip(syncs, syncs[1:])) <= 0.1 + 1e-6
         assert one.rounds() == [['201', '202', '080']] * 3
 
+    @pytest.mark.parametrize('period', [0.01, 0.5, 2.0])
+    def test_drives_that_fall_silent_together_get_theirs_as_soon(self, period: float) -> None:
+        one = bus(2, period=period, control_timeout=0.5)
+        one.start()
+        one.live(3 * period + 0.5)
+        for place in (0, 1):
+            one.asks(place, ControlAction.ENABLE)
+        one.live(2.0)
+        for station in (1, 2):
+            assert one.drives[station].state == ServoDrive.ENABLED
+            one.drives[station].takes = lambda sent: []     # type: ignore[method-assign]
+        one.live(period / 2)
+        one.log.clear()
+        for place, session in enumerate(one.sessions):
+            left = session.frames_left      # which takes its time
+            session.frames_left = (         # type: ignore[method-assign]
+                lambda now, left=left: left(now + 0.0003))
+            session.deactivate(one.now)
+            one.pump(place)
+        one.live(0.9)
+        assert one.rounds() == [['201', '202', '080']] * 6
+        one.live(0.2)
+        assert all(session.stopped for session in one.sessions)
+        assert [sum(getattr(event, 'danger', False) for event in events)
+                for events in one.events.values()] == [1, 1]
+
     @pytest.mark.parametrize('place', [0, 1, 2])
     def test_so_are_those_of_one_drive_and_all_others_come_along(self, place: int) -> None:
         one = bus(period=0.5)
