@@ -211,9 +211,14 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
 def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreResult,
             interrupted: Interruption) -> int:
     wrong = {each.name: each for each in result.wrong}
+    why = 'was enabled meanwhile' if result.enabled else 'interrupted'
     if args.json:
+        # what nothing was compared after is told by what was written
+        early = str(result.trouble or ('' if result.stopped is None else why))
         for change in plan.changes:
-            if change.name not in wrong and result.stopped is None:
+            if early and change.name not in result.written:
+                _print_outcome(drive, change.name, False, None, change.value, early)
+            elif change.name not in wrong:
                 _print_outcome(drive, change.name, True, change.value, change.value, '')
         for each in result.wrong:
             _print_outcome(drive, each.name, False, each.found, each.wanted,
@@ -229,7 +234,6 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     if result.trouble is not None:
         complain(f'{drive.name}: {result.trouble}')
     if result.stopped is not None:
-        why = 'was enabled meanwhile' if result.enabled else 'interrupted'
         complain(
             f'{drive.name}: {why}. Written: {_list(result.written)}. Not written: '
             f'{_list(result.stopped)}. {"Disable it, then repeat" if result.enabled else "Repeat"}'

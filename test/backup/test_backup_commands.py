@@ -13,6 +13,7 @@ from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.cli import restore
 from drive_can_bridge.client.direct import DirectDrive
 from drive_can_bridge.client.drive import WriteOutcome
+from drive_can_bridge.core.errors import BusUnavailable
 
 
 class TestOneDriveOfEachFamily:
@@ -90,6 +91,32 @@ class TestRestore:
         assert command('restore', str(file), '--yes').code == 128 + signal.SIGHUP
         assert shop.values('pump', 'general_configuration', 'flc1_ratio', 'flc2_ratio') == (
             0x10, 50.0, 33.0)
+
+    @pytest.mark.parametrize('why', ['bus main: is gone', ''], ids=['lost', 'interrupted'])
+    def test_documents_say_what_was_not_written(
+            self, shop: Shop, command: Command, monkeypatch: pytest.MonkeyPatch, why: str,
+    ) -> None:
+        file = shop.write_backup('conveyor', ramp_time=2.5, maximum_speed=900.0,
+                                 brake_enabled=True)
+        put = DirectDrive.put
+
+        def ending(drive: Any, name: str, *args: Any, **options: Any) -> WriteOutcome:
+            if name == 'maximum_speed' and why:
+                raise BusUnavailable(why)
+            if name == 'ramp_time' and not why:
+                signal.raise_signal(signal.SIGINT)
+            return put(drive, name, *args, **options)
+        monkeypatch.setattr(DirectDrive, 'put', ending)
+        said = command('restore', str(file), '--yes', '--json')
+        assert said.code == (1 if why else 128 + signal.SIGINT)
+        reason = why or 'interrupted'
+        assert [each for each in said.documents if 'ok' in each] == [
+            {'drive': 'conveyor', 'parameter': name, 'ok': not unwritten,
+             'found': None if unwritten else wanted, 'wanted': wanted,
+             'reason': reason if unwritten else ''}
+            for name, wanted, unwritten in (
+                ('ramp_time', 2.5, False), ('maximum_speed', 900.0, True),
+                ('brake_enabled', True, True))]
 
     @pytest.mark.parametrize(('persist', 'told'), [
         ('true', []), ('false', ['mixer: gone when it loses power: acceleration_time '
