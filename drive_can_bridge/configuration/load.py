@@ -27,6 +27,7 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import (
     ALL_OPTIONS, check_schema, check_value, checked_bridge, complete, definition,
 )
+from drive_can_bridge.configuration.yaml_nodes import read_scalar, STRING_TAG
 from drive_can_bridge.core.complaints import hint, says, suggestion
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -320,6 +321,18 @@ def bridge_names(buses: Iterable[str]) -> dict[str, str]:
     return names
 
 
+class _Dumper(yaml.SafeDumper):     # type: ignore[misc]  # has no types
+    """Quotes text that rcl would take for something else: ``y``, ``1e5``, ``08``."""
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
+    style = None if read_scalar(text) == text else "'"
+    return dumper.represent_scalar(STRING_TAG, text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
 def write_parameter_file(configuration: BridgeConfiguration, path: FilePath,
                          node: str = 'drive_can_bridge') -> None:
     """
@@ -335,5 +348,6 @@ def write_parameter_file(configuration: BridgeConfiguration, path: FilePath,
         for part in above:
             place = place.setdefault(part, {})
         place[key] = value
-    path.write_text(yaml.safe_dump(
-        {f'/**/{node}': {'ros__parameters': tree}}, sort_keys=False), encoding='utf-8')
+    path.write_text(yaml.dump(
+        {f'/**/{node}': {'ros__parameters': tree}}, Dumper=_Dumper, sort_keys=False),
+        encoding='utf-8')

@@ -48,6 +48,23 @@ def test_each_bus_by_itself(tmp_path: Path) -> None:
     assert found == both.drives
 
 
+@pytest.mark.parametrize('text', [
+    'y', 'N', 'inf', 'nan', '1e5', '08', '0x1p3', 'Infinity', 'yes', '010', '1.5', 'null', '~',
+    "it's", 'a: b', '- a', ' ', '\N{DEGREE SIGN}'])
+def test_text_that_reads_as_something_else_stays_text(text: str, tmp_path: Path) -> None:
+    file, written = tmp_path / 'both.yaml', tmp_path / 'written.yaml'
+    quoted = "'" + text.replace("'", "''") + "'"
+    file.write_text(TWO_BUSES.replace(
+        'channel: right', f'channel: {quoted}, unique_hardware_id: {quoted}').replace(
+        'cyclic_response: [actual_speed]}', 'cyclic_response: [actual_speed], '
+        f'joint: {{name: {quoted}, velocity: actual_speed}}}}', 1), encoding='utf-8')
+    both = configuration_from_file(file)
+    assert [drive.joint and drive.joint.name for drive in both.drives.values()] == [text, None]
+    write_parameter_file(both, written)
+    again = configuration_from_file(written)
+    assert (again.buses, again.drives) == (both.buses, both.drives)
+
+
 STANDARD = """
     use_sim_time: false
     start_type_description_service: true
