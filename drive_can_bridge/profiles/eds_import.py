@@ -52,7 +52,8 @@ _SI_UNITS = {0xB400: ('rev', 1.0), 0xB500: ('inc', 1.0), 0x4100: ('deg', 1.0),
              0x1000: ('rad', 1.0), 0xB447: ('rpm', 1.0), 0xB403: ('rpm', 60.0),
              0xB503: ('inc/s', 1.0), 0x4103: ('deg/s', 1.0), 0x1003: ('rad/s', 1.0)}
 #: everything that the library raises about a section that makes no sense
-_ERRORS = (ValueError, KeyError, AttributeError, TypeError, configparser.Error)
+_ERRORS = (ValueError, OverflowError, KeyError, AttributeError, TypeError,
+           configparser.Error)
 
 
 def canopen_library() -> ModuleType:
@@ -325,7 +326,14 @@ def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> No
     for draft in found.drafts:
         draft.name = known.get((draft.entry['index'], draft.entry['subindex']), '')
     names = {draft.name for draft in found.drafts}
-    raw = [draft for draft in found.drafts if not _complete(draft, shipped, units, names)]
+    raw = []
+    for draft in list(found.drafts):
+        try:
+            if not _complete(draft, shipped, units, names):
+                raw.append(draft)
+        except Unusable as error:
+            found.drafts.remove(draft)
+            found.left_out.append(LeftOut(draft.line, draft.section, draft.title, str(error)))
     standard = [draft.name for draft in raw if draft.name]
     others = sum(not draft.name and draft.entry['index'] not in _COMMUNICATION for draft in raw)
     found.notes.append(f'CiA 402: {len(names - {""})} standard objects have the names of the '

@@ -113,6 +113,15 @@ def test_units_that_the_file_names(tmp_path: Path, value: str, scale: float, uni
     assert made.parameters['profile_acceleration'].unit == ''
 
 
+def test_a_unit_that_makes_no_sense_costs_its_entries_only(tmp_path: Path) -> None:
+    good = bring(tmp_path, eds()).parameters
+    made = bring(tmp_path, eds(('60A9', 'SI unit velocity', 7, 'rw', 'DefaultValue=0x20B44700')))
+    assert set(good) - set(made.parameters) == {'actual_velocity', 'target_velocity'}
+    assert [line.partition(': ')[2] for line in made.left_out] == [
+        '[606C]: Velocity Actual Value: 1e+32 is too large',
+        '[60FF]: Target Velocity: -5e+35 is too large']
+
+
 def test_without_an_actual_position_no_axis_is_told_to_stay(tmp_path: Path) -> None:
     made = bring(tmp_path, eds(without='6064'))
     assert made.parameters['target_position'].neutral_from == ''

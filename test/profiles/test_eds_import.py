@@ -160,6 +160,9 @@ def test_dcf_and_other_names(tmp_path: Path) -> None:
     ('LowLimit=1\n', 'LowLimit=abc\n', 'ramp_time', '[2000]', "LowLimit 'abc' is no number"),
     ('LowLimit=1\n', 'LowLimit=9000\n', 'ramp_time', '[2000]',
      'LowLimit 9000 is above HighLimit 6000'),
+    ('HighLimit=0x1770', f'HighLimit={10**400}', 'ramp_time', '[2000]',
+     'is no object that can be understood'),
+    ('HighLimit=0x1770', f'HighLimit={10**40}', 'ramp_time', '[2000]', '1e+38 is too large'),
     # missing keys and sections
     ('DataType=0x0006            ; UNSIGNED16\n', '', 'ramp_time', '[2000]',
      'DataType is missing'),
