@@ -80,7 +80,7 @@ def raw_in_file(parameter: Parameter, value: object) -> int:
 
 
 def _nearest_raw(parameter: Parameter, value: float) -> int:
-    return math.floor((value - parameter.offset) / parameter.scale + 0.5)
+    return math.floor(parameter.steps(value) + 0.5)
 
 
 @dataclass(frozen=True, slots=True)

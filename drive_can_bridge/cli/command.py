@@ -59,9 +59,11 @@ def say(text: str) -> None:
 
 
 def print_json(*documents: Mapping[str, Any]) -> None:
-    """Print JSON documents, each as a line of standard output."""
+    """Print JSON documents, each as a line of standard output; JSON has no inf, and no nan."""
     for document in documents:
-        print(json.dumps(document, ensure_ascii=False))
+        print(json.dumps({
+            key: str(value) if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in document.items()}, ensure_ascii=False))
 
 
 def complain(text: str) -> None:

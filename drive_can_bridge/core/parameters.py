@@ -255,7 +255,7 @@ class Parameter:
                 raise ValueRefused(sentences.not_an_integer(value_text(value)))
             raw = int(value)
         else:
-            raw = math.floor(self._steps(value) + 0.5)
+            raw = math.floor(self.steps(value) + 0.5)
         low, high = self.type.raw_range
         if not low <= raw <= high:
             raise ValueRefused(sentences.not_carried(
@@ -273,7 +273,7 @@ class Parameter:
 
         :return: None where the type cannot represent it.
         """
-        steps = self._steps(value) if self.scaled else float(value)
+        steps = self.steps(value) if self.scaled else float(value)
         raw = math.floor(steps + 0.5)
         low, high = self.type.raw_range
         return raw if low <= raw <= high else None
@@ -286,8 +286,8 @@ class Parameter:
         They bound what is sent, however a value was rounded. The first is the larger one where
         the type has no value between the limits.
         """
-        ends = sorted((self._steps(-math.inf if self.minimum is None else self.minimum),
-                       self._steps(math.inf if self.maximum is None else self.maximum)))
+        ends = sorted((self.steps(-math.inf if self.minimum is None else self.minimum),
+                       self.steps(math.inf if self.maximum is None else self.maximum)))
         low, high = self.type.raw_range
         return (max(low, math.ceil(ends[0] - STEP_TOLERANCE)),
                 min(high, math.floor(ends[1] + STEP_TOLERANCE)))
@@ -313,7 +313,7 @@ class Parameter:
         first, last = (raw * self.scale + self.offset for raw in self.type.raw_range)
         return (first, last) if first <= last else (last, first)
 
-    def _steps(self, value: float) -> float:
+    def steps(self, value: float) -> float:
         """Return a physical value in raw steps, not rounded, in bounds that floor() can take."""
         steps = (value - self.offset) / self.scale
         return min(max(steps, -_STEPS_MAX), _STEPS_MAX)

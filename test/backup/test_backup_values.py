@@ -56,5 +56,6 @@ def test_values_beyond_the_limits_are_no_other_values() -> None:
     parameter = Parameter('a', number=1, scale=0.1, scaled=True, maximum=10.0)
     assert raw_in_file(parameter, 10.0) == 100
     assert raw_in_file(parameter, 7000.0) == 70000      # whatever 16 bits would make of it
+    assert raw_in_file(parameter, -1e308) < -1e17       # so far away that no step counts
     raw_name = Parameter('p1', number=1, listed=False)
     assert (raw_in_file(raw_name, -1), raw_in_file(raw_name, 70000)) == (0xFFFF, 70000)

@@ -2,6 +2,7 @@
 """What the words of a command line may be, and how columns stand."""
 
 from argparse import ArgumentTypeError
+import math
 from pathlib import Path
 import shlex
 import sys
@@ -9,8 +10,8 @@ import sys
 import pytest
 
 from drive_can_bridge.cli import completion as completion_script
-from drive_can_bridge.cli.command import above_zero, bitrate, of_drive, PARAMS_FILE, whole
-from drive_can_bridge.cli.command import WrongUsage
+from drive_can_bridge.cli.command import (
+    above_zero, bitrate, of_drive, PARAMS_FILE, print_json, whole, WrongUsage)
 from drive_can_bridge.cli.main import EXAMPLES, main, SUBCOMMANDS, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
@@ -54,6 +55,11 @@ def test_no_line_has_all_that_a_file_has(tmp_path: Path,
     assert main(['profile', 'import', str(table), '-o', str(tmp_path / 'p.yaml')]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 1 and max(map(len, lines)) <= 4000
+
+
+def test_documents_are_json_whatever_the_values(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({'a': math.nan, 'b': -math.inf, 'c': 1.5, 'd': 'nan'})
+    assert capsys.readouterr().out == '{"a": "nan", "b": "-inf", "c": 1.5, "d": "nan"}\n'
 
 
 TABLE = """\
