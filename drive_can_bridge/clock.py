@@ -18,6 +18,9 @@ from typing import Generic, Protocol, TypeVar
 #: CLOCK_MONOTONIC stands still while the machine is suspended; the drives do not
 _CLOCK = getattr(time, 'CLOCK_BOOTTIME', time.CLOCK_MONOTONIC)
 
+#: s that may be slept at once; more is an error where the end has no place in a time of the system
+_LONGEST = 1e9
+
 Item = TypeVar('Item')
 
 
@@ -175,7 +178,7 @@ class SteadyClock:
 
     def wait(self, until: float) -> None:
         """Sleep until then."""
-        time.sleep(max(0.0, until - self.now()))
+        time.sleep(min(max(0.0, until - self.now()), _LONGEST))
 
 
 class Mailbox(Generic[Item]):

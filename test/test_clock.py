@@ -2,6 +2,7 @@
 """The clock of this machine: its wake_events, threads, locks and mailboxes."""
 
 import threading
+import time
 
 import pytest
 
@@ -32,6 +33,14 @@ def test_sleep_ends_by_itself_even_when_its_time_is_over() -> None:
     assert not wake_event.wait(-1.0)
     assert not wake_event.wait(CLOCK.now() + 0.001)
     assert not wake_event.wait(0.0)
+
+
+def test_no_time_is_too_far_away_to_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+    monkeypatch.setattr(time, 'sleep', slept.append)
+    CLOCK.wait(1e300)
+    CLOCK.wait(-1.0)
+    assert slept == [1e9, 0.0]      # 32 years, which any system takes
 
 
 def test_ring_wakes_the_sleeper() -> None:
