@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import is_dataclass, replace
 from functools import partial
 import json
+import os
 from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -274,7 +275,7 @@ def _names(tree: Tree, key: str) -> list[str]:
 def _look_for_directories(tree: Tree, directories: list[str]) -> None:
     path = ('profile_directories',)
     for position, entry in enumerate(directories):
-        if entry and ('\0' in entry or not FilePath(entry).is_dir()):
+        if entry and not os.path.isdir(entry):
             tree.suspicious(path, says('no_directory', name=entry), at=(*path, position))
 
 

@@ -72,7 +72,7 @@ class ProfileStore:
                 return says('cannot_be_read', path=path, why='not a regular file')
         if name.endswith(SUFFIX):
             return says('name_with_suffix', name=name, suffix=SUFFIX)
-        known = sorted({path.stem for directory in self._directories
+        known = sorted({path.stem for directory in self._directories if os.path.isdir(directory)
                         for path in directory.glob(f'*{SUFFIX}')})
         places = ', '.join(map(str, self._directories)) or 'no directory'
         hint = suggestion(name, known) if known else says('no_profile_at_all')

@@ -189,12 +189,18 @@ def test_settings_of_the_bridge(tmp_path: Path) -> None:
     assert configuration.profile_directories == (str(tmp_path),)
 
 
-def test_profile_directory_that_is_none(tmp_path: Path) -> None:
+@pytest.mark.parametrize('name', ['/nowhere/at/all', f'/{"too_long" * 32}'])
+def test_profile_directory_that_is_none(name: str, tmp_path: Path) -> None:
     path = write(tmp_path)
-    text = path.read_text().replace(f'[{tmp_path}]', f"['', {tmp_path}, /nowhere/at/all]")
+    text = path.read_text().replace(f'[{tmp_path}]', f"['', {tmp_path}, {name}]")
     path.write_text(text)
     assert local(tmp_path, configuration_from_file(path).warnings) == [
-        at('f.yaml:3: profile_directories', 'no_directory', name='/nowhere/at/all')]
+        at('f.yaml:3: profile_directories', 'no_directory', name=name)]
+    path.write_text(changed(text, 'profile: table', 'profile: tabel'))
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_file(path)
+    problem, = local(tmp_path, caught.value.problems)
+    assert problem.code == 'unknown_profile' and name in problem.fields['places']
 
 
 def test_earlier_directory_wins(tmp_path: Path) -> None:
