@@ -246,6 +246,8 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
     :raises OSError: the file cannot be read.
     """
     if str(path) == '-':
+        if isinstance(sys.stdin, io.TextIOWrapper):
+            sys.stdin.reconfigure(errors='replace')     # as that of a file
         yield from _candump_records(sys.stdin, complain)
         return
     suffix, packed = check_readable(path)

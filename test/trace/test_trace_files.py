@@ -4,6 +4,7 @@
 from datetime import datetime
 from errno import ENOSPC
 import gzip
+import io
 from pathlib import Path
 import subprocess
 import sys
@@ -54,6 +55,14 @@ DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
 def test_lines_of_candump(line: str, record: Record) -> None:
     assert parse_line(line) == record
     assert parse_line(f'{line}\n') == record
+
+
+def test_bytes_that_are_no_text_on_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = io.BytesIO(b'\xff\n(1.5) can0 7FF#\n')
+    monkeypatch.setattr(sys, 'stdin', io.TextIOWrapper(given, encoding='utf-8'))
+    told: list[str] = []
+    assert [record.identifier for record in read_records(Path('-'), told.append)] == [0x7FF]
+    assert told == ['line 1: neither a line of a candump log nor of its screen']
 
 
 @pytest.mark.parametrize('line', ['', '   \n'])
