@@ -188,11 +188,11 @@ def listen(host: str, port: int) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(128)
-    except OSError as error:
-        advice = '; --port chooses another' if error.errno in _OF_THE_PORT else (
+    except (OSError, UnicodeError) as error:    # what is no name at all
+        advice = '; --port chooses another' if getattr(error, 'errno', 0) in _OF_THE_PORT else (
             ': no address of this machine, --host chooses another')
-        raise DriveCanError(f'drive_can panel: {host}, port {port}: {error.strerror or error}'
-                            f'{advice}') from error
+        why = getattr(error, 'strerror', '') or error
+        raise DriveCanError(f'drive_can panel: {host}, port {port}: {why}{advice}') from error
     return listener
 
 

@@ -5,6 +5,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.panel.access import Access, Entry, is_loopback, Refusal, Role
 
 PORT = 8080
@@ -115,6 +116,14 @@ def test_the_address_that_is_printed_opens_it(host: str) -> None:
         access = Access(port=listener.getsockname()[1], host=host)
         printed = urlsplit(address(listener, access.tokens[Role.VIEWER]))
     assert isinstance(judge(access, host=printed.netloc, query=printed.query, cookie=''), Entry)
+
+
+@pytest.mark.parametrize('host', ['a..b', 'x' * 70, '192.0.2.300'])
+def test_what_is_no_host(host: str) -> None:
+    pytest.importorskip('uvicorn')
+    from drive_can_bridge.panel.server import listen
+    with pytest.raises(DriveCanError, match=f'{host}, port 0: .*, --host chooses another$'):
+        listen(host, 0)
 
 
 def test_two_hosts_or_none_are_refused() -> None:
