@@ -275,6 +275,7 @@ class Session(ABC):
 
     def give_up(self, now: float) -> None:
         """Handle a stop that did not come to its end in time: the bus takes nothing."""
+        self.duty.happened(Happened.SILENT)     # what has left of it was not answered
         self._leave_owing(sentences.stop_not_possible())
         self.go_idle(sentences.deactivated())
         self.outbox.clear()

@@ -71,7 +71,12 @@ def test_after_a_stall_nobody_waits_for_the_beat() -> None:
 # -- frames that the bus refuses ------------------------------------------------------------------
 
 
-def test_one_stop_frame_that_left_is_a_word() -> None:
+@pytest.mark.parametrize(('answers', 'said'), [
+    ([READY], []),
+    ([], [says('may_still_be_running', why=says('stop_not_possible'))]),
+])
+def test_one_stop_frame_that_left_is_a_word_if_it_is_answered(
+        answers: list[str], said: list[str]) -> None:
     talk = running()
     talk.refusing = lambda text: True
     talk.deactivate(10.05)
@@ -79,10 +84,12 @@ def test_one_stop_frame_that_left_is_a_word() -> None:
     talk.refusing = lambda text: False
     assert talk.until(10.081) == [(10.08, READY_FRAME)]
     talk.refusing = lambda text: True
+    for answer in answers:
+        talk.hears(answer, 10.082)
     talk.until(10.5)
     assert not talk.session.stopped, 'three were due'
     talk.session.give_up(10.6)
-    assert warnings(talk) == []
+    assert warnings(talk) == said
 
 
 def test_additional_frame_that_is_refused_is_half_a_stop() -> None:
