@@ -354,9 +354,8 @@ class BridgeRuntime:
         if self._misconfigured is not None and self.exchanges[bus].link.taken:
             self._misconfigured.append(f'bus {bus}: {reason}')
             return
-        if bus in self.exchanges:   # else it was given up while it was still being opened
-            again = self.configuration.buses[bus].reconnect_period
-            self._log.speaker(f'bus {bus}').error(with_outlook(reason, again))
+        again = self.configuration.buses[bus].reconnect_period
+        self._log.speaker(f'bus {bus}').error(with_outlook(reason, again))
         self._flight.bus_lost(bus)
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:

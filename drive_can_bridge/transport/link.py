@@ -42,7 +42,7 @@ NOT_READ_YET = 'not read yet'
 
 class LinkListener(Protocol):
     """
-    What a link tells its exchange. Every call comes from the link's reader thread.
+    What a link tells its exchange, until it is stopped. From the link's reader thread.
 
     :ivar frames_rejected: counts what arrived and was nobody's; the link adds what was no frame.
     """
@@ -196,7 +196,8 @@ class Link:
             self._prepare_thread()
             self._keep_open()
         except BusMisconfigured as error:
-            self._listener.bus_misconfigured(in_words(error))
+            if not self._closing:
+                self._listener.bus_misconfigured(in_words(error))
         except Exception as error:  # noqa: BLE001  outermost loop of a thread: nothing is silent
             self._tell_tried()
             self._listener.link_failed(f'{type(error).__name__}: {in_words(error)}')
@@ -229,6 +230,8 @@ class Link:
             try:
                 self._loss = NOT_READ_YET
                 self._port = port = self._open()
+                if self._closing:   # it took longer than anybody waits
+                    return
                 self.taken = False
                 port.error_witness = self.error_witness
                 frame = port.receive(RECEIVE_TIMEOUT)
@@ -243,6 +246,8 @@ class Link:
                 self._tell_tried()
                 self._read(port, frame)
             except BusUnavailable as error:
+                if self._closing:
+                    return
                 self.taken = error.taken
                 reason = gone(adapter_of(self.bus)) if opened and self._gone() else in_words(error)
                 self.last_error = reason

@@ -289,6 +289,33 @@ def test_configuration_that_can_never_work(make: Callable[..., Bench]) -> None:
     assert bench.listener.told[2] == 'misconfigured: unknown'
 
 
+@pytest.mark.parametrize('end', [BusUnavailable('no route to host'), BusMisconfigured('no driver'),
+                                 None], ids=['in vain', 'never', 'open'])
+def test_who_has_stopped_is_not_told_what_becomes_of_an_attempt(
+        make: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch,
+        end: Exception | None) -> None:
+    """An adapter may take longer to open than anybody waits: socketcand tries for ten seconds."""
+    bench = make()
+    tried = []
+
+    def slowly(*_: object, **__: object) -> FakePort:
+        tried.append(bench.clock.now())
+        pause(10.0)
+        if end is not None:
+            raise end
+        bench.ports.append(FakePort())
+        return bench.port
+    monkeypatch.setattr(bench.link, '_open', slowly)
+    bench.port.coming.append(BusUnavailable('gone'))
+    wait_for(lambda: tried)
+    told = list(bench.listener.told)
+    bench.link.stop()
+    assert bench.clock.now() < tried[0] + 10.0
+    wait_for(lambda: not bench.clock.tasks)
+    assert bench.listener.told == told
+    assert bench.port.closed
+
+
 def test_defect_is_told(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.port.coming.append(ZeroDivisionError('a defect'))
