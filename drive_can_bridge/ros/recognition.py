@@ -8,6 +8,7 @@ namespace of a bridge.
 """
 
 from collections.abc import Callable, Collection, Iterable
+import re
 
 #: name and types of each service, or topic, as the graph tells them
 Entries = Iterable[tuple[str, list[str]]]
@@ -15,6 +16,9 @@ Entries = Iterable[tuple[str, list[str]]]
 #: parameter of a bridge: the full names of all bridges that it sees, its own among them
 BRIDGES = 'bridges'
 _TRIGGER = 'std_srvs/srv/Trigger'
+#: a service of a node by a name that rmw takes, of 247 characters at most: who is no ROS may call
+#: its own anything, and rclpy raises where it is asked about that
+_FULL_NAME = re.compile(r'(?=.{,247}\Z)(/[A-Za-z_][A-Za-z0-9_]*){2,}')
 
 
 def bridges_among(services: Entries) -> list[str]:
@@ -47,4 +51,4 @@ def namespace_of(node: str) -> str:
 def _nodes(entries: Entries, name: str, kind: str) -> list[str]:
     ending = f'/{name}'
     return [full.removesuffix(ending) for full, kinds in entries
-            if full.endswith(ending) and kind in kinds]
+            if full.endswith(ending) and kind in kinds and _FULL_NAME.fullmatch(full)]

@@ -185,6 +185,20 @@ def test_a_bridge_says_which_others_there_are(bridge: StartBridge, client: Clien
     assert client.get(own, 'bridges') == [['/a/bridge', own]]
 
 
+def test_what_can_be_no_name_in_the_graph_keeps_no_answer_back(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A participant of DDS that is no ROS may call its services anything."""
+    one = bridge(parameters())
+    own = '/drive_can_bridge'
+    told = one.node.get_service_names_and_types()
+    odd = [(f'{name}/{service}', [kind])
+           for name in ('/9/bridge', '/a b', '//x', '', f'/{240 * "x"}') for service, kind in (
+               ('change_state', 'lifecycle_msgs/srv/ChangeState'),
+               ('save_trace', 'std_srvs/srv/Trigger'))]
+    monkeypatch.setattr(one.node, 'get_service_names_and_types', lambda: [*told, *odd])
+    assert client.get(own, 'bridges') == [[own]]
+
+
 def test_one_that_hangs_counts(bridge: StartBridge, client: Client) -> None:
     """Which of two drives of one name is meant, nobody knows."""
     bridge(parameters()).online()
