@@ -317,8 +317,9 @@ class BridgeRuntime:
 
     def stop(self) -> None:
         """Stop the drives safely, if they run."""
-        self._attendance.end()
-        for bus, reason in stop_all(self.exchanges.values(), self._clock).items():
+        failures = stop_all(self.exchanges.values(), self._clock)
+        self._attendance.end()      # which may be waiting for a bus that hangs
+        for bus, reason in failures.items():
             self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
 
     def close(self) -> None:

@@ -3,16 +3,18 @@
 
 from typing import Any
 
-from bridges import Bridge, LIFT, parameters, Recorder, StartBridge
+from bridges import Bridge, CONVEYOR, late, LIFT, parameters, Recorder, StartBridge
 from clients import Client, ERROR, wait_until, WARN
 from lifecycle_msgs.msg import Transition
 import pytest
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock, pause
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.ros.diagnostics import GRACE
 
 LIFTS = parameters(lift=LIFT)
 
@@ -144,3 +146,24 @@ def test_who_asks_for_what_meets_a_defect_is_answered_once(
     assert client.transition(Transition.TRANSITION_DEACTIVATE)
     assert client.transition(Transition.TRANSITION_CLEANUP)
     wait_until(lambda: '/lift' not in client.nodes())
+
+
+def test_a_bus_that_hangs_holds_up_no_stop_of_another(bridge: StartBridge, client: Client) -> None:
+    """Its adapter does not come back from a send when somebody looks which drives are missing."""
+    bus = parameters()['buses']['main']
+    one = bridge(parameters(buses={'hung': bus, 'main': dict(bus)}, lift=LIFT,
+                            conveyor={**CONVEYOR, 'bus': 'hung'}), autostart=False)
+    one.played['conveyor'].fault('silent')
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        assert client.transition(transition)
+    one.online('lift')
+    assert client.call('/lift/enable', SetBool, SetBool.Request(data=True)).success
+    ending = clock().worker(one.node.stop, 'ending')
+    with one.record() as recorder, late(one.node.exchanges['hung']):
+        pause(2.0 * GRACE)
+        assert one.node.drives['lift'].session.active
+        ending.start()
+        pause(1.0)
+        assert last_cycles(recorder) == [(0, 0, 0, 0)] * 3
+        assert one.node.drives['lift'].session.stopped
+    ending.join()
