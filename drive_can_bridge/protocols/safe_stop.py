@@ -150,6 +150,8 @@ class SafeStop(Generic[StepT, ReplyT]):
         session, self.running = self._session, False
         if kind.again:
             self.again_at = self._channel.now
+        # it may have fallen silent since: with what it was told just before
+        owed = kind.owed or session.owed and not kind.again
         if not failed:
             if kind.whole:
                 session.duty.happened(Happened.STOPPED)
@@ -159,8 +161,8 @@ class SafeStop(Generic[StepT, ReplyT]):
                     session.duty.happened(Happened.ANSWERED)
             if kind.again and not session.owed:
                 session.report.note(Noted(sentences.stopped_again()))
-        elif kind.owed or kind.insists:
-            session.report.warn(sentences.stop_failed(failed), may_run=kind.owed)
+        elif owed or kind.insists:
+            session.report.warn(sentences.stop_failed(failed), may_run=owed)
             if not session.active:      # which ends with it: there is no more to be said
                 session.duty.happened(Happened.SAID)
         self._ended()

@@ -410,6 +410,17 @@ def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -
     assert talk.session.duty.unshown
 
 
+def test_drive_that_falls_silent_with_its_disable_by_number_is_named() -> None:
+    """It was not owed a stop when the one by number began; that fails after the last cycles."""
+    talk = enabled_at_a_look(online(control=CONTROL))
+    checked(talk, 11.003)
+    assert talk.until(11.02 + TICK) == [(11.02, NEUTRAL)]
+    assert talk.asks(ControlAction.DISABLE, 11.021) == [DISABLE]
+    talk.until(13.0)
+    assert warnings(talk) == [
+        may_run('stop_failed', what=[says('write_unanswered', what='control_word (P52)')])]
+
+
 def left_alone() -> Conversation:
     """Return a drive that was told to run, and has answered nothing since; 10.162 s."""
     talk = running()
