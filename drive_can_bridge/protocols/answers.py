@@ -11,7 +11,7 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.core.stop_duty import Do, Happened
+from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook
 
 
@@ -98,8 +98,12 @@ class Answers:
 
     def _heed(self) -> None:
         """Record that the drive has shown to have heard what it was told last, if it has."""
+        duty = self.session.duty
         if self.heeded and self.book.stop_shown:
-            self.session.duty.happened(Happened.ANSWERED)
+            if self.session.online:
+                duty.happened(Happened.ANSWERED)
+            else:       # what else it was told while it was silent, it may have missed
+                duty.channel(CYCLE, Happened.ANSWERED)
         if self.book.stop_shown:
             self.session.neutral_stop.answered()
 

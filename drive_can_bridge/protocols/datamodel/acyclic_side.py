@@ -5,7 +5,7 @@ The acyclic side of a DataModel drive, whatever its identifiers look like.
 Requests of users, a control or status word without a slot in cyclic telegrams, stops by number.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 import math
 
@@ -41,6 +41,7 @@ class AcyclicSide:
 
     :param codec: of the frames.
     :param quarantine: given where the exchange itself goes through the channel.
+    :param doubt: see :class:`.ControlByNumber`.
     :ivar channel: everything acyclic goes through it, by the ``transactor``.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
@@ -53,7 +54,8 @@ class AcyclicSide:
     """
 
     def __init__(self, session: Session, codec: AcyclicCodec, *,
-                 quarantine: float | None = None) -> None:
+                 quarantine: float | None = None,
+                 doubt: Callable[[], None] = lambda: None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.numbers = Numbers(drive)
         self._session = session
@@ -85,7 +87,7 @@ class AcyclicSide:
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
             ControlByNumber(session, session.control, self.channel, self.transactor, self.numbers,
-                            self.output, word=word, status=status))
+                            self.output, word=word, status=status, doubt=doubt))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, session.stop_ended, at_end, self._read_status)

@@ -77,7 +77,8 @@ class ExtendedSession(Session):
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
-        self._side = AcyclicSide(self, extended.AcyclicCodec(station, strict))
+        self._side = AcyclicSide(self, extended.AcyclicCodec(station, strict),
+                                 doubt=lambda: self._answers.book.doubt())
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
         self._codec = CyclicCodec(
@@ -372,8 +373,8 @@ class ExtendedSession(Session):
                     self.start_over(now)
                 return
             self.be_online()
-            # a neutral cycle, right after a look at its maps
-            self.duty.happened(Happened.ANSWERED)
+            # a neutral cycle, right after a look at its maps; what was written it may have missed
+            self.duty.channel(CYCLE, Happened.ANSWERED)
             self._side.found(now)
         slot = self._side.status_slot
         if self.control is not None and slot is not None:

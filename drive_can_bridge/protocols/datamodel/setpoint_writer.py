@@ -14,6 +14,7 @@ with the value that it has then.
 What is due, and when a word is written again, says :mod:`..acyclic_output`.
 """
 
+from collections.abc import Callable
 import math
 
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -41,12 +42,15 @@ class ControlByNumber:
 
     :param word: parameter of the control word; None: it has one.
     :param status: parameter of the status word; None: it has one, or there is none.
+    :param doubt: records that answers to what was asked before show nothing of a word that left.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: Channel[Step, Reply],
                  transactor: ParameterTransactor, numbers: Numbers, output: AcyclicOutput, *,
-                 word: Parameter | None, status: Parameter | None) -> None:
+                 word: Parameter | None, status: Parameter | None,
+                 doubt: Callable[[], None]) -> None:
         self._session = session
+        self._doubt = doubt
         self._control = control
         self._channel = channel
         self._transactor = transactor
@@ -101,6 +105,7 @@ class ControlByNumber:
             self._output.word_refused(word, now + REFUSED_PAUSE)
             return
         session.duty.channel(CONTROL_WORD, Happened.RUN_LEFT if runs else Happened.STOP_LEFT)
+        self._doubt()
         # of a drive that is lost, others see to the stop
         self._output.word_left(now, word, again=online)
         if online and session.stage is Stage.RUNNING:

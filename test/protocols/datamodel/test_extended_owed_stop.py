@@ -421,6 +421,48 @@ def test_drive_that_falls_silent_with_its_disable_by_number_is_named() -> None:
         may_run('stop_failed', what=[says('write_unanswered', what='control_word (P52)')])]
 
 
+def enabled_by_number(**options: object) -> Conversation:
+    """Return a drive with neutral setpoints that was enabled by number; cycled until 10.18 s."""
+    talk = online(control=CONTROL, **options)
+    talk.asks(ControlAction.ENABLE, 10.003)
+    for cycle in range(1, 10):
+        talk.until(10.0 + 0.02 * cycle + TICK)
+        talk.hears(ENABLED if cycle > 2 else ANSWER, 10.002 + 0.02 * cycle)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk.events()
+    return talk
+
+
+def test_answer_to_a_cycle_shows_nothing_of_a_word_that_was_written_behind_it() -> None:
+    talk = enabled_by_number(mapping='assume')
+    assert talk.until(10.2 + TICK) == [(10.2, NEUTRAL)]
+    assert talk.asks(ControlAction.DISABLE, 10.201) == [DISABLE]
+    talk.hears(ENABLED, 10.202)
+    assert talk.session.duty.unshown
+    assert exchange(talk, 10.22) == NEUTRAL
+    assert not talk.session.duty.unshown
+
+
+@pytest.mark.parametrize('mapping', ['verify', 'assume'])
+def test_answer_that_finds_a_drive_shows_nothing_of_a_word_that_was_written_before(
+        mapping: str) -> None:
+    """It was deaf when it was told to disable, and is again when it is told that once more."""
+    talk = enabled_by_number(mapping=mapping)
+    talk.until(12.0)
+    assert not talk.session.online
+    if mapping == 'verify':
+        checked(talk, talk.now)
+    while NEUTRAL not in talk.at(talk.session.next_timer()):
+        pass
+    talk.events()
+    assert talk.hears(ENABLED, talk.now + 0.002) == [DISABLE]
+    assert talk.session.online
+    talk.until(talk.now + 1.0)
+    assert not talk.session.online
+    unheard = may_run('stop_failed', what=[says('write_unanswered', what='control_word (P52)')])
+    assert unheard in warnings(talk)
+
+
 def left_alone() -> Conversation:
     """Return a drive that was told to run, and has answered nothing since; 10.162 s."""
     talk = running()
