@@ -107,12 +107,16 @@ class Answers:
         if self.book.stop_shown:
             self.session.neutral_stop.answered()
 
-    def settle(self, now: float) -> None:
-        """End an exchange: what has not arrived by now does not count for it any more."""
+    def settle(self, now: float, *, early: bool = False) -> None:
+        """
+        End an exchange: what has not arrived by now does not count for it any more.
+
+        :param early: the next one was brought forward. The answer may still come, to that one.
+        """
         self.due = math.inf
         book, session = self.book, self.session
         session.exchange_ended()
-        if book.awaiting:
+        if book.awaiting and not early:
             too_many = book.missed()
             if session.stage is not Stage.STOPPING:
                 limit = session.configuration.missed_limit

@@ -158,7 +158,7 @@ class CyclicExchange(Generic[TelegramT]):
             if now < timer.due:     # that was all
                 return
         if not answers.in_turn or now >= answers.due:
-            answers.settle(now)
+            answers.settle(now, early=self.cycles_left < 0 and answers.book.early(now))
         if timer.due == math.inf:   # what was missed has ended the cycles
             return
         session.interlock.expire(now)

@@ -122,8 +122,8 @@ class ExchangeBook:
     """
 
     __slots__ = (
-        '_asked', '_horizon', '_limit', '_period', '_runs', '_statistics', 'awaiting', 'began_at',
-        'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
+        '_asked', '_horizon', '_limit', '_period', '_runs', '_since', '_statistics', 'awaiting',
+        'began_at', 'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
                  timer: CycleTimer | None = None) -> None:
@@ -137,6 +137,7 @@ class ExchangeBook:
         self._period = drive.period
         self._horizon = max(HORIZON, HORIZON_PERIODS * drive.period)
         self._runs = 0
+        self._since = -math.inf     # what waits for its answer was sent then
         self.overdue = 0.0
         self._limit = drive.missed_limit
         self._statistics = statistics
@@ -160,12 +161,18 @@ class ExchangeBook:
 
         :param runs: it holds anything but neutral and ``disable``.
         """
+        if not self.awaiting:
+            self._since = now
         self.awaiting = True
         self.began_at = now
         if runs:
             self.doubt()
         self._forget_older(now)
         self._asked.append(Asked(now, -1 if runs else self._runs))
+
+    def early(self, now: float) -> bool:
+        """Tell whether what waits has had no time yet: only a cycle brought forward is so near."""
+        return now < self._since + 0.5 * self._period
 
     def doubt(self) -> None:
         """Record that no cycle up to now shows that the drive was told to stop."""

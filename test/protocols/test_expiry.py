@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Cycles that are brought forward, because commands have become too old, do no harm."""
+"""Cycles that are brought forward, for a stop or as commands are too old, do no harm."""
 
 from functools import partial
 from typing import Any
@@ -54,6 +54,27 @@ def test_an_inverter_that_answers_everything_is_not_lost(limit: int) -> None:
     line.live(12.0)
     assert line.talk.events(StationLost) == [], line.log
     assert [at for at, _ in line.log if 11.0 < at < 11.1], 'brought forward, all the same'
+
+
+@pytest.mark.parametrize('since', [0.006, 0.015, 0.03])
+def test_nor_is_one_by_its_stop(since: float) -> None:
+    """What is under way has its time, even if a stop does not wait for that."""
+    line = inverter(1, 0.04, missed_limit=1)
+    line.plan(10.5 + since, partial(line.talk.asks, ControlAction.QUICK_STOP))
+    line.live(12.0)
+    assert line.talk.events(StationLost) == [], line.log
+    assert line.when('002#7A040000')[0] == pytest.approx(10.5 + since)
+    assert [done[:2] for done in line.talk.control_outcomes()][-1] == ('quick_stop', True)
+
+
+def test_one_that_answers_no_more_is_lost_however_often_cycles_are_brought_forward() -> None:
+    line = inverter(1, 0.02, missed_limit=3, command_timeout=0.06, rearm_immediate=True)
+    for place in range(60):
+        line.plan(10.5 + 0.065 * place, partial(command, line, 0, 5.0 + place % 2))
+    line.live(11.0)
+    line.answer = lambda text: None
+    line.live(11.5)
+    assert len(line.talk.events(StationLost)) == 1
 
 
 def test_neutral_that_expires_hurries_nothing() -> None:
