@@ -127,9 +127,14 @@ class StandardSession(Session):
 
     @property
     def _patience(self) -> float:
-        """Return what a round may take when a read of a user and one of its own go unanswered."""
-        return 2 * (self.configuration.period + self.configuration.parameter_timeout
-                    + float(self.configuration.options.quarantine))
+        """
+        Return what a round may take: a read of a user and one of its own may go unanswered.
+
+        Behind a write to the EEPROM it waits: what we do not ask for is not missed.
+        """
+        drive = self.configuration
+        return float(drive.options.eeprom_write_gap) + 2 * (
+            drive.period + drive.parameter_timeout + float(drive.options.quarantine))
 
     def hand_out_neutral(self, now: float) -> None:
         self._writer.write_all(now)

@@ -353,6 +353,19 @@ def test_an_eeprom_write_is_preceded_by_a_read_and_followed_by_a_pause_for_reads
     assert talk.session.statistics.missed == 0
 
 
+@pytest.mark.parametrize('gap', [0.02, 0.5, 2.0])
+def test_a_long_pause_after_an_eeprom_write_is_no_missed_round(gap: float) -> None:
+    talk = online(eeprom_write_gap=gap)
+    assert talk.submits(write((RAMP, 300)), 10.005) == ['3F1#031E000100000000']
+    talk.hears('7F1#C800000000000000', 10.007)
+    sent = talk.served(10.1 + gap, {
+        ASK: ANSWER, '3F1#031E000100000000': '7F1#2C01000000000000'}.get)
+    assert [now for now, text in sent if text == ASK][0] >= 10.008 + gap
+    assert talk.session.online
+    assert talk.session.statistics.missed == 0
+    assert talk.outcomes() == [['written']]
+
+
 def test_a_read_is_repeated_after_the_quarantine_only() -> None:
     talk = online(parameter_retries=1, missed_limit=99)
     talk.submits(read(GAIN), 10.005)
