@@ -177,9 +177,11 @@ class AcyclicOutput:
         """Record that nobody knows what the drive has: it is due at the next look."""
         self._written[index] = None
 
-    def write_all(self) -> None:
-        """Let everything be due at the next look, whether it has changed or not."""
-        self._written[:] = [None] * len(self._written)
+    def write_all(self, *, but: Container[int] = ()) -> None:
+        """Let everything be due at the next look, ``but`` these, whether it has changed or not."""
+        for index in range(len(self._written)):
+            if index not in but:
+                self.failed(index)
 
     # -- setpoints before a word that starts ------------------------------------------------------
 

@@ -154,6 +154,44 @@ class TestNeutral:
             assert told(partner) == [(False, says('no_control_section'))]
 
 
+def limited(name: str) -> Partner:
+    """Have a drive run whose limit comes before its setpoint."""
+    partner = meet(name, request=(TORQUE, SPEED), refresh_interval=0.33, command_timeout=0.0)
+    for value in (0.0, 100.0):
+        partner.talk.commands(1, value, partner.now)
+    partner.live(0.1)
+    assert partner.registers[50] == 1000
+    return partner
+
+
+@pytest.mark.parametrize('name', ['canopen_pkw', 'datamodel_standard'])
+def test_a_limit_is_not_written_by_it(name: str) -> None:
+    partner = limited(name)
+    partner.registers[51] = 7       # by somebody else
+    stop(partner)
+    partner.live(0.03)
+    assert told(partner) == [(True, says('neutral_without_control'))]
+    assert (partner.registers[50], partner.registers[51]) == (0, 7)
+
+
+@pytest.mark.parametrize('due', [False, True])
+def test_no_limit_goes_before_it(due: bool) -> None:
+    """Of a device that has lost its voice, each answer is waited for."""
+    partner = limited('canopen_pkw')
+    if due:     # it is to be written again with the next round
+        partner.take()
+        partner.live(0.35)
+        written_at, = (at for at, text in partner.take() if text.startswith('501#3300'))
+        partner.live(written_at + 0.331 - partner.now)
+    partner.take()
+    partner.mute = True
+    begun_at = partner.now
+    stop(partner)
+    partner.live(0.06)
+    (at, text), *_ = partner.take()
+    assert (at, partner.setpoints(text)) == (begun_at, [0])
+
+
 def test_a_write_that_the_drive_refuses_is_no_success() -> None:
     partner = meet('canopen_pkw')
     run(partner)

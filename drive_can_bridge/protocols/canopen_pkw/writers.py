@@ -18,7 +18,7 @@ a device under local control, say, takes it as soon as it is back under remote c
 """
 
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
@@ -103,23 +103,33 @@ class Writers:
         if waits or self._setpoints.changed and not self._setpoints.enabled:
             self.write_setpoints(now)
 
-    def write_setpoints(self, now: float) -> None:
-        """Write the setpoints that are due, each once."""
+    def write_setpoints(self, now: float, *, hold: Sequence[int] = ()) -> None:
+        """
+        Write the setpoints that are due, each once.
+
+        :param hold: indices of those that are not to be written now.
+        """
         self.expire(now)
         self._setpoints.changed = False
         items = self._setpoints.items
         if not items:
             return
         self._output.look([setpoint.raw for setpoint in items], now, hold=[
-            index for index, setpoint in enumerate(items) if not setpoint.known])
+            *hold, *(index for index, setpoint in enumerate(items) if not setpoint.known)])
         if self._output.waiting and self._channel.is_idle(Priority.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Priority.SETPOINTS)
 
     def write_all_setpoints(self, now: float) -> None:
-        """Write all setpoints at once, whether they have changed or not; others make room."""
-        self._output.write_all()
+        """
+        Write all setpoints at once, whether they have changed or not; others make room.
+
+        No limit goes before them: each would wait for its answer.
+        """
+        limits = [index for index, setpoint in enumerate(self._setpoints.items)
+                  if setpoint.parameter.limit]
+        self._output.write_all(but=limits)
         self._channel.make_room(now)
-        self.write_setpoints(now)
+        self.write_setpoints(now, hold=limits)
 
     def expire(self, now: float) -> bool:
         """

@@ -214,7 +214,8 @@ class SetpointWriter:
 
     def write_all(self, now: float) -> None:
         """Write all setpoints, whether they have changed or not, without waiting for a period."""
-        self._output.write_all()
+        self._output.write_all(but=[
+            index for index, parameter in enumerate(self._parameters) if parameter.limit])
         self.write_word(now)
 
     def handle_timer(self, now: float) -> None:
