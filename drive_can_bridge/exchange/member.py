@@ -135,20 +135,24 @@ class Member:
             partner._pump()
 
     def _pump(self) -> None:
-        session = self.session
         try:
-            frames = session.take_frames()
-            while frames:
-                refused = []
-                leaving = self._clock()     # nothing answers before that
-                for place, frame in enumerate(frames):
-                    if not self._transmit(frame, leaving):
-                        refused.append(place)
-                session.frames_left(self._clock(), refused)
-                frames = session.take_frames()
+            self._send()
         finally:
             self._report()
-        self.due = session.next_timer()
+        self._send()    # a fault that was told is asked for its number
+        self.due = self.session.next_timer()
+
+    def _send(self) -> None:
+        session = self.session
+        frames = session.take_frames()
+        while frames:
+            refused = []
+            leaving = self._clock()     # nothing answers before that
+            for place, frame in enumerate(frames):
+                if not self._transmit(frame, leaving):
+                    refused.append(place)
+            session.frames_left(self._clock(), refused)
+            frames = session.take_frames()
 
     def _report(self) -> None:
         """Tell the listener what was sent, and what happened."""

@@ -5,7 +5,8 @@ from dataclasses import replace
 import threading
 import time
 
-from builders import CONTROL, drive, GAIN, INT16, parameter, RAMP, read, SPEED, WORD, write
+from builders import (
+    CONTROL, drive, GAIN, INT16, parameter, RAMP, read, RO, SPEED, WORD, write)
 from clocks import HandClock, REAL
 from exchange_builders import all_routes, Bench, BusNotes
 from jumping import JumpingClock
@@ -21,6 +22,7 @@ from drive_can_bridge.core.events import (
     ForeignMasterSeen, Noted, RequestCompleted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.frame import Route
+from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.core.requests import ReadValue
 from drive_can_bridge.exchange.exchange import (
     BusExchange, LOOK_PERIOD, PASS_PERIOD, PeriodicTask, stop_all,
@@ -571,6 +573,21 @@ def test_requests_are_sent_at_once_and_answered_as_events() -> None:
     assert bench.link.take() == [f'00200281#{ZEROS}']
     bench.hears('10200281#0007000000000000', 10.004)
     assert bench.notes[0].events[-1] == RequestCompleted(request, (ReadValue(7),))
+
+
+def test_the_number_of_a_fault_is_asked_for_at_once() -> None:
+    """Not with the next cycle: its time would be over by then."""
+    code = parameter('fault_code', 217, access=RO)
+    conveyor = drive(period=0.5, parameter_timeout=0.1, parameter_retries=0)
+    bench = Bench(replace(conveyor, profile=replace(
+        conveyor.profile, parameters={**conveyor.profile.parameters, 'fault_code': code},
+        fault=FaultTable('fault_code', ((7, 'overcurrent'),), ('status_word', 8)))))
+    bench.online()
+    assert bench.at(10.5) == [NEUTRAL]
+    assert bench.hears('103FFFF0#03E800FA00080000', 10.502) == [f'00200D91#{ZEROS}']
+    bench.hears('10200D91#0007000000000000', 10.504)
+    assert bench.notes[0].events[-1] == Noted(
+        says('fault_named', number='7', name='overcurrent'), warning=True)
 
 
 def test_control_request_is_answered_by_an_event() -> None:
