@@ -263,9 +263,11 @@ class Channel(Generic[StepT, ReplyT]):
         """
         Forget everything under way. Nobody is told: that is the caller's business.
 
-        An answer may still be on its way. It must not meet the next question.
+        An answer may still be on its way. It must not meet the next question, and is no surprise.
         """
-        self._expect_late()
+        step = self._expect_late()
+        if step is not None and self._deadline < math.inf:  # else nothing answers it
+            self._given_up.append((self._deadline, step))
         for queue in self._queues.values():
             queue.clear()
         self._transactor.forget()
@@ -446,14 +448,15 @@ class Channel(Generic[StepT, ReplyT]):
         key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
 
-    def _expect_late(self) -> None:
-        """Record that the answer under way is not waited for any more."""
+    def _expect_late(self) -> StepT | None:
+        """Record that the answer under way is not waited for any more; return to what it is."""
         if self._serving is None or not self._transactor.busy:
-            return
+            return None
         step = self._serving.step
         key = None if step is None else self._transactor.key(step)
         if key is not None:
             self._quarantine.begin(key, self._deadline + self._transactor.silence)
+        return step
 
     def _end(self, reply: ReplyT) -> None:
         """End the exchange under way; what that sets in motion waits."""

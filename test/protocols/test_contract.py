@@ -401,6 +401,25 @@ def test_loss_and_recovery(partner: Partner) -> None:
     assert len(partner.talk.events(StationFound)) == 1
 
 
+def test_an_answer_that_is_not_wanted_any_more_is_not_rejected(partner: Partner) -> None:
+    """It was asked for, and comes in time: the bridge has ended meanwhile."""
+    partner.mute = True
+    partner.reads(RAMP)
+    while not (asked := [text for _, text in partner.take() if not partner.setpoints(text)]):
+        partner.live(0.005)
+    answers = partner.answers(asked[-1])
+    assert answers
+    partner.deliver(partner.talk.deactivate(partner.now))
+    partner.mute = False
+    partner.now += DELAY
+    for answer in answers:
+        partner.deliver(partner.talk.hears(answer, partner.now))
+    partner.live(1.0)
+    assert partner.talk.events(FrameRejected) == []
+    assert partner.talk.session.statistics.rejected == 0
+    assert partner.talk.session.statistics.late == 0
+
+
 def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
     partner.talk.commands(0, 0.0, partner.now)
     partner.talk.commands(0, 100.0, partner.now)
