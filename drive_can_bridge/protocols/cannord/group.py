@@ -205,8 +205,9 @@ class Group:
         """
         if session is not self._leader and action not in _STOPS:
             return sentences.group_is_led(self.leads, _SERVICES[action])
-        # a stop is good for those that are there
-        there = any(each.online for each in self._sessions)
+        # a stop is good for those that are there; who is missing for an enable, it says itself
+        there = action is not ControlAction.RESET_FAULT and any(
+            each.online for each in self._sessions)
         return NOTHING if refusal.code == 'drive_offline' and there else refusal
 
     def stop_for(self, session: Session, request: ControlRequest, now: float) -> None:

@@ -681,6 +681,17 @@ def test_members_name_their_leader() -> None:
     assert bus.session('hoist').state is DriveState.DISABLED
 
 
+def test_no_fault_is_reset_by_a_leader_that_is_not_there() -> None:
+    """It may be listening, with a fault that nobody has seen."""
+    bus = three()
+    bus.answers = {2: FAULT, 3: READY}
+    bus.live(0.3)
+    assert not bus.session('lift').online
+    refused = bus.session('lift').services.control_refusal
+    assert {action: refused(action) for action in (RESET_FAULT, DISABLE, QUICK_STOP)} == {
+        RESET_FAULT: 'drive offline', DISABLE: '', QUICK_STOP: ''}
+
+
 def test_refused_when_nobody_is_there() -> None:
     bus = Bus(*members())
     bus.answers = {}
