@@ -21,8 +21,7 @@ from typing import Any, NoReturn, TypeVar
 
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
-from drive_can_bridge.core.text import printable
-from drive_can_bridge.monitor.snapshot import is_ros_name
+from drive_can_bridge.core.text import is_ros_name, printable
 
 FAILED = 1
 WRONG_USAGE = 2

@@ -112,6 +112,14 @@ def is_pattern(text: str) -> bool:
     return not _WILD.isdisjoint(text)
 
 
+_ROS_NAME = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
+
+
+def is_ros_name(name: str) -> bool:
+    """Tell whether a full name may stand in front of a topic."""
+    return len(name) <= TEXT_MAX and _ROS_NAME.fullmatch(name) is not None
+
+
 def counted(number: int, one: str, many: str = '') -> str:
     """Return a number of things; without ``many`` an s makes it the plural."""
     return f'{number} {one if number == 1 else many or one + "s"}'

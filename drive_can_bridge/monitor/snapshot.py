@@ -16,18 +16,11 @@ import re
 from typing import Protocol
 
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.text import printable, TEXT_MAX
+from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.values import ParameterInfo
 
 #: characters kept of a line of the log, which may tell of several drives
 LOG_LIMIT = 2000
-_ROS_NAME = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
-
-
-def is_ros_name(name: str) -> bool:
-    """Tell whether a full name may stand in front of a topic."""
-    return len(name) <= TEXT_MAX and _ROS_NAME.fullmatch(name) is not None
-
 
 _SUBJECT = re.compile(r'(?P<bridge>\S+): (?P<kind>bus|drive) (?P<name>\S+)')
 #: keys that one status may have

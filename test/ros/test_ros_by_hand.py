@@ -113,6 +113,22 @@ def test_one_that_hangs_is_named_first_and_the_others_are_stopped(
     assert states(one, 'lift') == ['disabled']
 
 
+def test_a_name_that_is_none_keeps_nobody_from_being_stopped(
+        bridge: StartBridge, client: Client, run: Run) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    answer(client, '/a/bridge', others=['/b b/bridge', ''], drives='-')()
+    liar = Presence(one.context.get_domain_id(), '/-/bridge')   # any user may say so
+    try:
+        code, lines, _ = run('stop')
+        assert (code, lines) == (1, [
+            '-/bridge: NOT STOPPED: this bridge of this host '
+            f'(process {os.getpid()}) does not answer here: its drives may still be running',
+            'lift: ready'])
+    finally:
+        liar.withdraw()
+
+
 def test_one_that_another_one_sees_is_named(
         client: Client, run: Run) -> None:
     answer(client, '/a/bridge', others=['/b/bridge'], drives='')()

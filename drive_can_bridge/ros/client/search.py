@@ -24,6 +24,7 @@ from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
+from drive_can_bridge.core.text import is_ros_name
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
@@ -222,7 +223,7 @@ class Search:
         return True
 
     def _see(self, names: Iterable[str], now: float) -> None:
-        for name in names:
+        for name in filter(is_ros_name, names):     # anybody may tell anything
             if name not in self.found and self._namespace in (None, namespace_of(name)):
                 self.found[name] = Found(name)
                 self._ask(self.found[name], now)
@@ -239,9 +240,9 @@ class Search:
             if response is None:
                 bridge.silent = True
                 return
-            bridge.drives = tuple(
-                name.split('.')[1] for name in response.result.names
-                if name.endswith(_MARK) and name.count('.') == 2)
+            drives = (name.split('.')[1] for name in response.result.names
+                      if name.endswith(_MARK) and name.count('.') == 2)
+            bridge.drives = tuple(drive for drive in drives if is_ros_name(f'/{drive}'))
         self._calls.ask(bridge.name, 'get_parameters',
                         GetParameters.Request(names=[BRIDGES]), take_others, now)
         self._calls.ask(bridge.name, 'list_parameters',

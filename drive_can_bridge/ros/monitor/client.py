@@ -24,9 +24,9 @@ from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.sentences import (
     may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes,
 )
-from drive_can_bridge.core.text import printable
+from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import is_ros_name, Outcome, Place, Status, Stop
+from drive_can_bridge.monitor.snapshot import Outcome, Place, Status, Stop
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
