@@ -77,16 +77,17 @@ class Report:
         return self.facts.get('state', '')
 
     def number(self, key: str) -> float:
-        """Return a number of the facts, NaN where there is none."""
+        """Return a number of the facts, NaN where there is none, or no finite one."""
         try:
-            return float(self.facts.get(key, 'nan'))
+            number = float(self.facts.get(key, 'nan'))
         except ValueError:
             return math.nan
+        return number if math.isfinite(number) else math.nan
 
     def count(self, key: str) -> int:
         """Return a count of the facts, 0 where there is none."""
         number = self.number(key)
-        return int(number) if math.isfinite(number) else 0
+        return 0 if math.isnan(number) else int(number)
 
 
 def read_status(status: Status) -> Report | None:

@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Pages of fixed times and values: golden ones, and that they fit everywhere."""
 
-from monitor_builders import drive_status, many_drives, model_of, seen, three_drives
+from monitor_builders import (
+    bus_status, drive_status, many_drives, model_of, seen, three_drives)
 import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
@@ -30,6 +31,11 @@ def test_it_fits_everywhere(width: int, page: Page) -> None:
             assert len(lines) == height
             assert all(len(line) <= width for line in lines)
             assert 'Layout' not in ''.join(lines)
+
+
+def test_a_load_that_is_no_number_ends_no_view() -> None:
+    snapshot = seen(model_of([bus_status(load_percent='inf'), drive_status()]))
+    assert 'load   0.0 % ' in plain(snapshot, Choice(), 100, 30)
 
 
 def test_the_last_line_names_the_keys() -> None:
