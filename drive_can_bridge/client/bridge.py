@@ -106,6 +106,8 @@ class BridgedDrive(Drive):
         self._raw: dict[str, Parameter | None] = {}
 
     def _raw_parameter(self, name: str) -> Parameter | None:
+        if not name.isascii():      # no parameter is called so, and not all of it can be sent
+            return None
         if name not in self._raw:
             message, = self._describe([name])
             self._raw[name] = parameter_of(message, listed=False)

@@ -117,9 +117,11 @@ def test_what_fails_says_why(bridge: StartBridge) -> None:
     one.online()
     with open_drives() as drives:
         conveyor = drives['conveyor']
-        assert reasons(conveyor.read('p9999', 'ramp_time', 'bogus')) == {
+        assert reasons(conveyor.read('p9999', 'ramp_time', 'bogus', '\udcff')) == {
             'p9999': sentences.no_answer(0.2, 3), 'ramp_time': '',
-            'bogus': sentences.unknown_parameter('bogus')}
+            'bogus': sentences.unknown_parameter('bogus'),
+            # as Python takes a word that is no text in the encoding of the terminal
+            '\udcff': sentences.unknown_parameter('\\udcff')}
         one.played['conveyor'].fault('silent')
         wait_until(lambda: not one.node.drives['conveyor'].session.online)
         assert reasons(conveyor.read('ramp_time', 'maximum_speed')) == {
