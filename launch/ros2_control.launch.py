@@ -4,7 +4,7 @@ Start a bridge, ros2_control and what publishes the robot's transforms.
 
 .. code-block:: console
 
-    ros2 launch drive_can_bridge ros2_control.launch.py robot:=arm controller:=arm_controller
+    ros2 launch drive_can_bridge ros2_control.launch.py robot:=arm
     ros2 service call /shoulder/enable std_srvs/srv/SetBool '{data: true}'      # and the others
     ros2 control switch_controllers --activate arm_controller
 
@@ -40,8 +40,8 @@ def generate_launch_description() -> LaunchDescription:
             'params_file', default_value='',
             description="parameter file of the bridge instead of the directory's"),
         DeclareLaunchArgument(
-            'controller', default_value='arm_controller',
-            description='the controller that is loaded, inactive'),
+            'controller', default_value='',
+            description='the controller that is loaded, inactive; without one, ROBOT_controller'),
         DeclareLaunchArgument(
             'log_level', default_value='info',
             description='of the bridge: debug, info, warn, error or fatal'),
@@ -54,6 +54,7 @@ def robot(context: LaunchContext) -> list[Node]:
     directory = LaunchConfiguration('directory').perform(context) or str(
         Path(FindPackageShare('drive_can_bridge').perform(context), 'config', 'ros2_control'))
     name = LaunchConfiguration('robot').perform(context)
+    controller = LaunchConfiguration('controller').perform(context) or f'{name}_controller'
     params_file = (LaunchConfiguration('params_file').perform(context)
                    or str(Path(directory, f'{name}.yaml')))
     description = Path(directory, f'{name}.urdf').read_text(encoding='utf-8')
@@ -72,5 +73,5 @@ def robot(context: LaunchContext) -> list[Node]:
         Node(package='controller_manager', executable='spawner',
              arguments=['joint_state_broadcaster'], output='screen'),
         Node(package='controller_manager', executable='spawner',
-             arguments=[LaunchConfiguration('controller'), '--inactive'], output='screen'),
+             arguments=[controller, '--inactive'], output='screen'),
     ]

@@ -191,16 +191,18 @@ def test_each_bus_has_a_bridge_of_its_own(tmp_path: Path) -> None:
         'drive_can_bridge_left', 'drive_can_bridge_right_1']
 
 
-def test_ros2_control_gets_the_bridge_and_its_description(tmp_path: Path) -> None:
-    launched = Launched(LAUNCH / 'ros2_control.launch.py', tmp_path)
-    bridge, publisher, manager, broadcaster, controller = launched.processes
+@pytest.mark.parametrize(('controller', 'loaded'), [('other', 'other'), ('', 'base_controller')])
+def test_ros2_control_gets_the_bridge_and_its_description(tmp_path: Path, controller: str,
+                                                          loaded: str) -> None:
+    launched = Launched(LAUNCH / 'ros2_control.launch.py', tmp_path, controller=controller)
+    bridge, publisher, manager, broadcaster, spawner = launched.processes
     assert bridge.words[:3] == ['--ros-args', '--log-level', 'debug']
     assert {'~/joint_states:=/robot_joint_states',
             '~/joint_commands:=/robot_joint_commands'} <= set(bridge.words)
     assert [process.node_package for process in (publisher, manager)] == [
         'robot_state_publisher', 'controller_manager']
     assert broadcaster.words[0] == 'joint_state_broadcaster'
-    assert controller.words[:2] == ['base_controller', '--inactive']
+    assert spawner.words[:2] == [loaded, '--inactive']
 
 
 @pytest.mark.parametrize('activate', ['true', 'false'])
