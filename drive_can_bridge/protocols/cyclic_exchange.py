@@ -158,7 +158,7 @@ class CyclicExchange(Generic[TelegramT]):
             if now < timer.due:     # that was all
                 return
         if not answers.in_turn or now >= answers.due:
-            answers.settle(now, early=self.cycles_left < 0 and answers.book.early(now))
+            self.settle(answers, now)
         if timer.due == math.inf:   # what was missed has ended the cycles
             return
         session.interlock.expire(now)
@@ -170,6 +170,10 @@ class CyclicExchange(Generic[TelegramT]):
         self._frames_out = 0
         self.again, self._whole = not self._whole, True
         self._teller.send_cycle(cycle.telegram, now)
+
+    def settle(self, answers: Answers, now: float) -> None:
+        """End the exchange with one drive, for the next begins; those of a stop are close."""
+        answers.settle(now, early=self.cycles_left < 0 and answers.book.early(now))
 
     def start(self, now: float, *, in_turn: bool = False) -> None:
         """

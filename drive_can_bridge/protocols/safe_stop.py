@@ -156,7 +156,8 @@ class SafeStop(Generic[StepT, ReplyT]):
             if kind.whole:
                 session.duty.happened(Happened.STOPPED)
             else:
-                session.duty.channel(CONTROL_WORD, Happened.STOP_LEFT)
+                for happened in (Happened.STOP_LEFT, Happened.ANSWERED):    # it was read back
+                    session.duty.channel(CONTROL_WORD, happened)
                 if not session.active:  # in its end, to be disabled is enough
                     session.duty.happened(Happened.ANSWERED)
             if kind.again and not session.owed:

@@ -20,7 +20,9 @@ def inverter(count: int, delay: float, **options: Any) -> Timeline:
         'cannord', table=SETPOINTS, request=SETPOINTS[:count], response=(), period=0.1,
         **options))
 
-    def answer(text: str) -> tuple[float, str]:
+    def answer(text: str) -> tuple[float, str] | None:
+        if not text.startswith('002#'):     # a broadcast
+            return None
         status = '370B' if text.startswith('002#7F04') else '310B'
         return delay, f'003#{status}{"0000" * count}'
 
@@ -56,10 +58,11 @@ def test_an_inverter_that_answers_everything_is_not_lost(limit: int) -> None:
     assert [at for at, _ in line.log if 11.0 < at < 11.1], 'brought forward, all the same'
 
 
+@pytest.mark.parametrize('broadcast', ['none', 'group'])
 @pytest.mark.parametrize('since', [0.006, 0.015, 0.03])
-def test_nor_is_one_by_its_stop(since: float) -> None:
+def test_nor_is_one_by_its_stop(since: float, broadcast: str) -> None:
     """What is under way has its time, even if a stop does not wait for that."""
-    line = inverter(1, 0.04, missed_limit=1)
+    line = inverter(1, 0.04, missed_limit=1, broadcast=broadcast)
     line.plan(10.5 + since, partial(line.talk.asks, ControlAction.QUICK_STOP))
     line.live(12.0)
     assert line.talk.events(StationLost) == [], line.log

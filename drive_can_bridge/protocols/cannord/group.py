@@ -141,7 +141,7 @@ class Group:
             self._turn = (self._turn + turns) % count
         for member in alone:
             self._put(member.identifier, payloads, member.answers)
-            member.answers.settle(now)
+            exchange.settle(member.answers, now)
             self._expect(member, now, now + self._lead.period)
 
     def last_cycle_left(self, now: float) -> None:

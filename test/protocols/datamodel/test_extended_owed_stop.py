@@ -463,6 +463,17 @@ def test_answer_that_finds_a_drive_shows_nothing_of_a_word_that_was_written_befo
     assert unheard in warnings(talk)
 
 
+def test_disable_that_was_read_back_is_owed_no_more() -> None:
+    """By the second reading of the stop by number; the cycles before were not answered."""
+    talk = enabled_by_number()
+    assert talk.until(10.363 + TICK)[-1] == (10.363, '00200341#0000000000000000')
+    assert talk.session.duty.may_run
+    talk.hears('10200341#0000000000000000', 10.365)
+    assert not talk.session.duty.may_run
+    assert talk.until(10.6)
+    assert [note for note in talk.events(Noted) if note.danger] == []
+
+
 def left_alone() -> Conversation:
     """Return a drive that was told to run, and has answered nothing since; 10.162 s."""
     talk = running()
