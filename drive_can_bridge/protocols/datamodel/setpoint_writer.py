@@ -122,6 +122,8 @@ class ControlByNumber:
             yield now
             raw = yield self._read(status)
             now = self._channel.now
+            if self._transactor.asked_at <= self._output.word_left_at:
+                continue
             self._session.interlock.status(raw, now)
             self._session.control_changed(now)
             now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
@@ -136,12 +138,10 @@ class SetpointWriter:
     Writes what is in ``cyclic_request`` of one polled drive.
 
     :param slot: of the control word in there; None: it has none.
-    :ivar word_written_at: when the control word left last.
     """
 
     def __init__(self, session: Session, exchange: PolledExchange, transactor: ParameterTransactor,
                  numbers: Numbers, output: AcyclicOutput, *, slot: int | None) -> None:
-        self.word_written_at = -math.inf
         self._session = session
         self._exchange = exchange
         self._transactor = transactor
@@ -249,6 +249,5 @@ class SetpointWriter:
             if self._output.has(index):
                 self._session.see_to_control_word(now)
             return
-        self.word_written_at = now
         if self._output.word_left(now, raw):
             self._session.control_changed(now)

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The conversation with an 11-bit drive: literal times, literal bytes."""
 
+from functools import partial
 import math
 
 from builders import (
@@ -12,6 +13,7 @@ from saying import may_run, says
 from standard_builders import (
     ANSWER, ASK, LIMIT_ZERO, online, polling, round_of, SPEED_ZERO,
 )
+from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
@@ -550,6 +552,47 @@ def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
     talk.hears(READY, 10.062)
     assert talk.control_outcomes() == []
     round_of(talk, 10.08, READY)
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_nor_does_it_where_the_word_is_written_by_hand() -> None:
+    talk = polling(request=(SPEED,), control=CONTROL)
+    talk.hears(READY, 10.002)
+    talk.until(10.01)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    talk.until(10.03)
+    round_of(talk, 10.04, ENABLED)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.until(10.0605) == [(10.06, ASK)]
+    assert talk.asks(ControlAction.DISABLE, 10.061) == [DISABLE_WORD]
+    talk.hears(READY, 10.062)
+    assert talk.control_outcomes() == []
+    round_of(talk, 10.08, READY)
+    assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_nor_does_it_where_the_status_is_read_by_hand() -> None:
+    talk = Conversation(drive('datamodel_standard', request=(SPEED, WORD),
+                              response=(ACTUAL, CURRENT), control=CONTROL))
+    ask_status, off, on = '3F1#03D3000100000000', '7F1#0100000000000000', '7F1#0300000000000000'
+    answers = {'3F1#03D1000200000000': (0.001, ANSWER), ask_status: (0.01, off)}
+    line = Timeline(talk, answers.get)
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    line.live(10.3)
+    line.plan(10.3, partial(talk.asks, ControlAction.ENABLE))
+    line.live(10.35)
+    answers[ask_status] = 0.01, on
+    line.live(10.6)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    answers[ask_status] = 0.01, off     # it drops out just before it is told to
+    asked = next(end for end in (10.6 + 0.001 * step for step in range(1, 1000))
+                 if line.live(end) or line.when(ask_status)[-1] > 10.6)
+    line.plan(asked + 0.005, partial(talk.asks, ControlAction.DISABLE))
+    line.live(asked + 0.0105)
+    assert talk.control_outcomes() == []
+    line.live(asked + 0.1)
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
