@@ -120,6 +120,12 @@ class StatusReports:
         raw = self.telling
         return raw is not None and _matches(pattern, raw)
 
+    @property
+    def braking(self) -> bool:
+        """One of them says that it is in a quick stop, which ``disable`` would end."""
+        return any(member.raw is not None and _matches(self._table.braking, member.raw)
+                   for member in self._present.values())
+
     def confirmed(self, pattern: StatusPattern, wanted: bool) -> bool:
         """Tell whether all, knowing the current word, report a condition, or that it is not so."""
         return self._all(lambda answer: pattern.matches(answer) is wanted)
@@ -236,7 +242,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     elif reports.says(table.enabled):
         remarks.append(sentences.word_not_followed(word))
     if sending is ControlAction.QUICK_STOP:     # which is what keeps it there
-        remarks.append(sentences.word_stays() if reports.says(table.braking) else
+        remarks.append(sentences.word_stays() if reports.braking else
                        sentences.now_disable())
     elif wording is not None and reports.telling is not None:
         hint = wording.hint(reports.telling)

@@ -477,6 +477,19 @@ def test_quick_stop_of_all() -> None:
     assert words(bus.live(0.02)) == ['7E04']
 
 
+def test_a_quick_stop_goes_on_as_long_as_one_of_them_brakes() -> None:
+    """Whatever the others say that stand already: disable would end the braking."""
+    bus = enabled(control_timeout=0.2)
+    bus.asks(QUICK_STOP)
+    bus.answers = {1: DISABLED, 2: '170B0010', 3: DISABLED}
+    assert set(words(bus.live(0.5))) == {'7A04'}
+    (_, success, message), = bus.outcomes()
+    assert not success
+    assert message.fields['remarks'] == [says('word_stays')]
+    bus.answers[2] = DISABLED
+    assert words(bus.live(0.1))[-1] == '7E04'
+
+
 def test_a_member_that_drops_out_by_itself_stops_all() -> None:
     bus = enabled()
     bus.answers[2] = '170B0010'
