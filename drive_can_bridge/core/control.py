@@ -36,7 +36,7 @@ A request that is refused changes nothing.
 
 *Quick stop of a drive that does not run* is a DISABLE: answered at once where that is known, and
 otherwise as soon as the drive confirms it. The same goes for a faulted drive, whose control word
-is ``disable`` in any case.
+is ``disable`` in any case; but not for others that share its control word, as long as they run.
 
 *What a profile does not tell.* Where a condition is missing in the profile, having sent the word
 is all the confirmation there is, and the answer says so. A quick stop then keeps its word for the

@@ -247,7 +247,8 @@ class ControlMachine:
             if under_way is not None:
                 self._end(False, sentences.replaced(request.action.value))
             under_way = self._operation = Operation(action, now + self._timeout)
-            if action is ControlAction.QUICK_STOP and may_run and not self._fault:
+            if action is ControlAction.QUICK_STOP and may_run and (
+                    not self._fault or self._reports.sound_ones_run):
                 self._send(ControlAction.QUICK_STOP)
             elif action is not ControlAction.ENABLE:    # of an enabled drive: nothing to do
                 self._send(ControlAction.DISABLE)
@@ -456,7 +457,8 @@ class ControlMachine:
         under_way = self._operation
         if under_way is not None and under_way.action is ControlAction.ENABLE:
             self._end(False, sentences.fault_while_enabling(self._reports.text))
-        elif self._sending is not ControlAction.RESET_FAULT:
+        elif self._sending is not ControlAction.RESET_FAULT and not (
+                self._sending is ControlAction.QUICK_STOP and self._reports.sound_ones_run):
             self._send(ControlAction.DISABLE)
 
     def _watch_enabled(self, member: str, raw: int, *, behind: bool) -> None:

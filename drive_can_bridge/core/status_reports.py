@@ -126,6 +126,15 @@ class StatusReports:
         return any(member.raw is not None and _matches(self._table.braking, member.raw)
                    for member in self._present.values())
 
+    @property
+    def sound_ones_run(self) -> bool:
+        """One of them reports that it runs, and no fault."""
+        running = self._running
+        return running is not None and any(
+            member.raw is not None and running.matches(member.raw)
+            and not _matches(self._table.fault, member.raw)
+            for member in self._present.values())
+
     def confirmed(self, pattern: StatusPattern, wanted: bool) -> bool:
         """Tell whether all, knowing the current word, report a condition, or that it is not so."""
         return self._all(lambda answer: pattern.matches(answer) is wanted)

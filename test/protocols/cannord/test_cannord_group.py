@@ -490,6 +490,31 @@ def test_a_quick_stop_goes_on_as_long_as_one_of_them_brakes() -> None:
     assert words(bus.live(0.1))[-1] == '7E04'
 
 
+def test_a_fault_of_one_ends_no_quick_stop_of_those_that_brake() -> None:
+    bus = enabled()
+    bus.asks(QUICK_STOP)
+    bus.answers = {1: FAULT, 2: '170B0010', 3: DISABLED}
+    assert set(words(bus.live(0.2))) == {'7A04'}
+    assert bus.session('lift').state is DriveState.FAULT
+    bus.answers[2] = DISABLED
+    assert words(bus.live(0.1))[-1] == '7E04'
+    assert [success for _, success, _ in bus.outcomes()] == [True]
+
+
+def test_quick_stop_of_those_that_run_down_because_of_a_fault_of_one() -> None:
+    """Disable lets them take the time of their ramp."""
+    bus = enabled()
+    bus.answers = {1: FAULT, 2: RUNNING, 3: RUNNING}
+    assert words(bus.live(0.1))[-1] == '7E04'
+    bus.asks(QUICK_STOP, 'hoist')
+    assert set(words(bus.live(0.2))) == {'7A04'}
+    bus.answers = {1: FAULT, 2: DISABLED, 3: DISABLED}
+    assert words(bus.live(0.1))[-1] == '7E04'
+    assert [success for _, success, _ in bus.outcomes('hoist')] == [True]
+    bus.asks(ENABLE)
+    assert bus.outcomes() == [('enable', False, says('reset_first'))]
+
+
 def test_a_member_that_drops_out_by_itself_stops_all() -> None:
     bus = enabled()
     bus.answers[2] = '170B0010'
