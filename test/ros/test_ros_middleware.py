@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Memory of the middleware."""
+"""Memory of the middleware, and what it needs."""
 
 import os
 from pathlib import Path
@@ -35,6 +35,10 @@ for number in range(41):
 print(allocated() - before, flush=True)
 os._exit(0)
 """
+CLIENT = """
+from drive_can_bridge.ros.client.calls import ClientNode
+ClientNode('client').leave()
+"""
 
 
 def growth(**environment: str) -> float:
@@ -54,6 +58,16 @@ def test_small_histories_save_half_of_the_memory() -> None:
     set_up_fast_dds(environment)
     assert environment == {VARIABLES[0]: str(config_file('fastdds/profiles.xml'))}
     assert growth(**environment) < 0.7 * growth()
+
+
+@pytest.mark.usefixtures('programs')
+@pytest.mark.parametrize('home', [{}, {'HOME': '/proc'}], ids=['none', 'that takes no files'])
+def test_clients_need_no_home(home: dict[str, str]) -> None:
+    environment = {name: value for name, value in os.environ.items()
+                   if name not in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')}
+    run = subprocess.run([sys.executable, '-c', CLIENT], capture_output=True, text=True,
+                         check=False, env={**environment, **home})
+    assert (run.returncode, run.stderr) == (0, '')
 
 
 @pytest.mark.parametrize('name', VARIABLES)

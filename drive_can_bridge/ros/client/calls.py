@@ -81,7 +81,8 @@ class ClientNode:
     def __init__(self, purpose: str) -> None:
         self.context = Context()
         try:
-            self.context.init([])   # takes no signals
+            # takes no signals, and no log file: a stop has to work where nothing can be written
+            self.context.init([], initialize_logging=False)
             context: Any = self.context.handle
             with context:
                 # a leading underscore hides a node from "ros2 node list"; no arguments of the
