@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The page on profiles shows what really happens."""
 
+import json
 from pathlib import Path
 import re
 
@@ -32,6 +33,20 @@ def test_the_example_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     out, err = capsys.readouterr()
     assert (err + out).splitlines() == answer
     assert block('yaml', 'ramp_time:') in Path('winder.yaml').read_text()
+
+
+def test_keys_of_documents_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('winder.csv').write_text(block('csv', 'WX 200'), encoding='utf-8')
+    for words in ('list', 'show datamodel_example', 'import winder.csv -o winder.yaml',
+                  'check winder.yaml'):
+        assert main(['profile', *words.split(), '--json']) == 0
+        line = next(line for line in PAGE.splitlines()
+                    if line.startswith(f'* `{words.partition(" ")[0]}`'))
+        keys = [key for key in json.loads(capsys.readouterr().out.splitlines()[0])
+                if 'keys of a profile' not in line or key in ('name', 'address')]
+        assert [key for key in re.findall('`([a-z_]+)`', line) if key in keys] == keys
 
 
 def test_all_columns_are_named() -> None:
