@@ -9,7 +9,7 @@ drives, and only then do they lose their bus.
 
 import argparse
 from collections.abc import Iterator
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -307,4 +307,5 @@ def _terminal_restored() -> Iterator[None]:
     try:
         yield
     finally:
-        termios.tcsetattr(0, termios.TCSANOW, settings)
+        with suppress(termios.error):   # the terminal has gone
+            termios.tcsetattr(0, termios.TCSANOW, settings)

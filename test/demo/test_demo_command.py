@@ -7,12 +7,13 @@ from pathlib import Path
 import re
 import signal
 import subprocess
+import termios
 
 import pytest
 from running import Running, Terminal
 from waiting import wait_for
 
-from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.cli import demo, main as front_end
 from drive_can_bridge.demo.child import Child
 
 pytest.importorskip('rclpy')
@@ -55,6 +56,18 @@ def test_a_directory_with_the_name_of_the_package_does_not_matter(
         child = Child('the child', 'drive_can', '--version', output=output)
     assert child.wait(20.0) and child.code == 0
     assert (tmp_path / 'out').read_text().startswith('drive_can ')
+
+
+def test_a_terminal_that_has_gone_is_not_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    other_end, keyboard = os.openpty()
+    get, put = termios.tcgetattr, termios.tcsetattr
+    monkeypatch.setattr(termios, 'tcgetattr', lambda _: get(keyboard))
+    monkeypatch.setattr(termios, 'tcsetattr', lambda _, *how: put(keyboard, *how))
+    try:
+        with demo._terminal_restored():
+            os.close(other_end)
+    finally:
+        os.close(keyboard)
 
 
 def requests(log: Path) -> dict[str, list[str]]:
