@@ -37,7 +37,7 @@ class Turn(CycleTimer):
 
     :ivar session: of the drive.
     :ivar begun_round: its RPDOs of the round under way were handed out.
-    :ivar moved: it is due with others, at another time than it wanted.
+    :ivar moved: who serves this drive may not know when it is due.
     :ivar tell: takes what becomes of the SYNC behind them.
     """
 
@@ -62,10 +62,11 @@ class Turn(CycleTimer):
         return self.begun_round or self.due < now + 0.5 * self._spacing
 
     def start(self, at: float) -> None:
-        self.moved = False
+        self.moved = self._beat.pulling
         due = self._beat.next_due(at, self, self._spacing)
-        if self.running and due > at + self.stop_spacing:   # a stop: the others come along
-            self._beat.bring_forward(at)
+        if self.running and due > at + self.stop_spacing:   # a stop
+            if at > self.due:
+                self._beat.bring_forward(at)    # the others come along
             due = at
         super().start(due)
 
@@ -78,7 +79,7 @@ class Turn(CycleTimer):
             self._beat.bring_forward(at)
 
     def follow(self, at: float) -> None:
-        """Be due then, because others are; who serves this drive does not know that."""
+        """Be due then, because others are."""
         super().start(at)
         self.moved = True
 
@@ -90,7 +91,7 @@ class Turn(CycleTimer):
         error = super().begun(now)
         if pause is not None and pause < self._spacing:     # those of a stop are closer
             self._beat.bring_forward(now + pause)
-        self.begun_round, self.moved = True, False
+        self.begun_round, self.moved = True, self._beat.pulling
         self._beat.agree()
         return error
 
@@ -100,11 +101,12 @@ class Beat:
     The rounds of one bus.
 
     :ivar turns: of all its drives, in their order.
+    :ivar pulling: drives are served of whom another one was.
     """
 
     def __init__(self) -> None:
         self.turns: list[Turn] = []
-        self._pulling = False
+        self.pulling = False
 
     @property
     def running(self) -> bool:
@@ -140,27 +142,29 @@ class Beat:
         :param tell: takes what becomes of SYNC.
         """
         turn.tell = tell
-        if self._pulling:
+        if self.pulling:
             return
         round_of = [each for each in self.turns if each.takes_part(now)]
         waiting = [each for each in round_of if not each.begun_round]
-        if waiting and round_of[-1] is not turn and not any(each.moved for each in waiting):
+        if waiting and round_of[-1] is not turn and not any(
+                each.moved or each.due > now for each in waiting):
             return      # they are served right behind this one
-        outbox, self._pulling = turn.session.outbox, True
+        outbox, self.pulling = turn.session.outbox, True
         try:
             for each in waiting:
-                each.follow(now)
+                if each.due > now:
+                    each.follow(now)
                 each.session.exchange.handle_timer(now)
                 outbox.take_over(each.session.outbox)
         finally:
-            self._pulling = False
+            self.pulling = False
         self._send_sync(outbox)
 
     def leave(self, turn: Turn) -> None:
         """Record that a drive is not in exchange any more: others may have waited for it."""
         turn.begun_round, turn.tell = False, None
         running = [each for each in self.turns if each.running]
-        if running and not self._pulling and all(each.begun_round for each in running):
+        if running and not self.pulling and all(each.begun_round for each in running):
             self._send_sync(turn.session.outbox)
 
     def _send_sync(self, outbox: Outbox) -> None:

@@ -222,6 +222,46 @@ class TestRounds:
         assert [sum(getattr(event, 'danger', False) for event in events)
                 for events in one.events.values()] == [1, 1]
 
+    @pytest.mark.parametrize('place', [0, 1])
+    def test_one_that_is_lost_when_another_one_stops(self, place: int) -> None:
+        one = bus(period=0.5)
+        one.start()
+        one.live(2.2)
+        one.drives[3].takes = lambda sent: []   # type: ignore[method-assign]
+        one.live(0.6)
+        one.log.clear()
+        one.sessions[place].deactivate(one.now)
+        one.pump(place)
+        one.live(3.0)
+        assert online(one) == [place == 1, place == 0, False]
+        self.rpdos_and_sync_are_together(one)
+
+    def test_one_that_restarts_in_the_middle_of_a_round_that_it_has_brought_forward(self) -> None:
+        one = bus(2, period=0.2)
+        one.start()
+        one.live(1.3)
+        one.asks(1, ControlAction.ENABLE)
+        one.live(1.02)
+        one.log.clear()
+        for each in one.drives[2].restarts():
+            one.sessions[1].receive_frame(each, one.now)
+        one.pump(1)
+        one.live(1.0)
+        assert online(one) == [True] * 2
+        self.rpdos_and_sync_are_together(one)
+
+    @staticmethod
+    def rpdos_and_sync_are_together(one: Bus) -> None:
+        sent: dict[str, float] = {}
+        for at, text in one.log:
+            if text == '080#':
+                assert set(sent.values()) == {at}
+                sent.clear()
+            elif text.startswith('20'):
+                assert text[:3] not in sent
+                sent[text[:3]] = at
+        assert not sent
+
     @pytest.mark.parametrize('place', [0, 1, 2])
     def test_so_are_those_of_one_drive_and_all_others_come_along(self, place: int) -> None:
         one = bus(period=0.5)
