@@ -1193,6 +1193,12 @@ def bus_of_drive_down(bus: str) -> str:
 
 
 @sentence
+def bus_hangs(bus: str) -> str:
+    return (f'bus {bus} hangs, its drives are not told anything: its adapter does not return from '
+            f'a send')
+
+
+@sentence
 def bus_of_drive_opening(bus: str) -> str:
     return f'bus {bus} is not open yet'
 

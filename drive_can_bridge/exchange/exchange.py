@@ -30,8 +30,10 @@ from typing import Any, Generic, TypeVar
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
+from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
+from drive_can_bridge.core.sentences import bus_hangs
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.member import BusListener, DriveListener, Member, STOP_MARGIN
 from drive_can_bridge.transport.end_point import EndPoint
@@ -48,6 +50,8 @@ PASS_PERIOD = 0.25
 LOST_TIME = 1.0
 #: s by which a pass may be late until commands that wait are not believed any more
 LATENESS_MAX = 0.25
+#: s that users wait for the lock of a bus: at first, and of one that is known to hang
+PATIENCE, LITTLE_PATIENCE = LOST_TIME, 0.05
 #: s that a command waits at most until it is looked at, however seldom its drive is served
 LOOK_PERIOD = 0.05
 #: s by which the reader may be back too late before the timer thread does its work
@@ -186,6 +190,7 @@ class BusExchange:
     :param prepare_thread: called first in each of the two threads.
     :param note: sees every frame that was sent or received: (frame, time, sent).
     :ivar periodic_task: what its threads see to beside its drives; to be set before ``open``.
+    :ivar hung: a thread has kept the lock for too long: the adapter does not return from a send.
     """
 
     def __init__(self, bus: BusConfiguration, sessions: Sequence[Session],
@@ -223,7 +228,7 @@ class BusExchange:
         self._tell_at = 0.0
         self._closing = False
         self._thread = clock.worker(self._run, f'exchange {bus.name}')
-        self.active = False
+        self.active = self.hung = False
         self.bus_state = 'opening'
         self.bus_reason = ''
         self.frames_rejected = 0
@@ -341,10 +346,21 @@ class BusExchange:
 
     # -- users, any thread ------------------------------------------------------------------------
 
+    def enter(self) -> bool:
+        """Take the lock, for who serves other buses, too; False: this one hangs."""
+        self.hung = not self.lock.acquire(timeout=LITTLE_PATIENCE if self.hung else PATIENCE)
+        return not self.hung
+
     def submit(self, session: Session, request: Request | ControlRequest) -> None:
-        """Hand a request to a drive's session; the answer comes as an event."""
+        """
+        Hand a request to a drive's session; the answer comes as an event.
+
+        :raises TransportError: the bus hangs.
+        """
         member = self._member(session)
-        with self.lock:
+        if not self.enter():
+            raise TransportError(bus_hangs(self.bus.name))
+        try:
             now = self._clock()
             self._notice_lost_time(now)     # else an enable would go by what was before
             try:
@@ -353,6 +369,8 @@ class BusExchange:
             except Exception as error:
                 member.contain(error)
                 raise
+        finally:
+            self.lock.release()
         self._ring_if_sooner(member)
 
     def reconfigure(self, session: Session, **changes: Any) -> None:

@@ -8,7 +8,6 @@ Also drives that are not there: what is said of one, and who is missing a while 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
-import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -151,9 +150,14 @@ class BusReporter:
         level, message = DiagnosticStatus.OK, sentences.bus_up(
             exchange.bus.interface, str(exchange.bus.channel))
         state = exchange.bus_state
+        if exchange.enter():
+            exchange.lock.release()
         if state == 'up' and link.controller or state == 'down' and link.controller == BUS_OFF:
             state = link.controller
-        if exchange.bus_state != 'up':
+        if exchange.hung:
+            state, level = 'hangs', DiagnosticStatus.ERROR
+            message = sentences.bus_hangs(exchange.bus.name)
+        elif exchange.bus_state != 'up':
             level = DiagnosticStatus.ERROR
             reason = exchange.bus_reason or 'not open yet'
             message = sentences.bus_not_up(
@@ -206,16 +210,21 @@ class DriveReporter:
         rejected = statistics.rejected - self._rejected
         self._rejected = statistics.rejected
         # the session belongs to the threads of the bus; what is computed of many samples does not
-        with drive.exchange.lock:
-            state = session.state
-            level, message = self._judge(state, rejected, now)
-            command_age = session.setpoints.age(now)
-            more = session.facts()
-            if session.control is not None:
-                known = session.control.state if session.active else 'unknown'
-                more = {'control_state': known, **more}
-            if session.fault_watch is not None:
-                more = {**more, 'fault_code': session.fault_watch.text}
+        state, level, command_age = DriveState.OFFLINE, DiagnosticStatus.ERROR, math.nan
+        message, more = sentences.bus_hangs(drive.exchange.bus.name), dict[str, str]()
+        if drive.exchange.enter():
+            try:
+                state = session.state
+                level, message = self._judge(state, rejected, now)
+                command_age = session.setpoints.age(now)
+                more = session.facts()
+                if session.control is not None:
+                    known = session.control.state if session.active else 'unknown'
+                    more = {'control_state': known, **more}
+                if session.fault_watch is not None:
+                    more = {**more, 'fault_code': session.fault_watch.text}
+            finally:
+                drive.exchange.lock.release()
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {
@@ -366,7 +375,7 @@ class Diagnostics:
         self._publisher = publisher(node, DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         self.buses = [BusReporter(exchange) for exchange in exchanges]
         self.drives = [DriveReporter(drive) for drive in drives]
-        self._lock = threading.Lock()  # the last message comes from another thread
+        self._lock = clock.lock()   # the last message comes from another thread
         self._message = DiagnosticArray()
         self._statuses: dict[str, StatusMessage] = {}
 

@@ -18,6 +18,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.events import (
     AnswerLate, DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered,
     MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
@@ -25,7 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
 from drive_can_bridge.core.sentences import (
-    answer_late, bridge_inactive, internal_error, NOTHING, Sentence)
+    answer_late, bridge_inactive, bus_hangs, internal_error, NOTHING, Sentence)
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -286,6 +287,8 @@ class DriveNode(DriveListener):
         self._asked[request] = completed    # its outcome may come before the next line
         try:
             self.exchange.submit(self.session, request)
+        except TransportError:  # no other drive's stop waits for it
+            self._refuse(request, bus_hangs(self.exchange.bus.name))
         except Exception as error:  # noqa: BLE001  told as the drive's; whoever asks is not left out
             self._refuse(request, internal_error(type(error).__name__, str(error)))
 

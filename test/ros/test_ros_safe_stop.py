@@ -167,3 +167,24 @@ def test_a_bus_that_hangs_holds_up_no_stop_of_another(bridge: StartBridge, clien
         assert last_cycles(recorder) == [(0, 0, 0, 0)] * 3
         assert one.node.drives['lift'].session.stopped
     ending.join()
+
+
+def test_a_bus_that_hangs_keeps_nobody_else_from_being_served(bridge: StartBridge,
+                                                              client: Client) -> None:
+    bus = parameters()['buses']['main']
+    one = run(bridge, client, parameters(buses={'hung': bus, 'main': dict(bus)}, lift=LIFT,
+                                         conveyor={**CONVEYOR, 'bus': 'hung'}))
+    refused = sentences.bus_hangs('hung')
+    with late(one.node.exchanges['hung']):
+        for drive in ('conveyor', 'conveyor', 'lift'):
+            answer = client.call(f'/{drive}/quick_stop', Trigger)
+            assert answer.success is (drive == 'lift')
+            assert drive == 'lift' or answer.message == refused
+        assert client.set('/conveyor', ramp_time=1.0) == [(False, refused)]
+        assert client.get('/lift', 'ramp_time') != [None]
+        for status in ('bus hung', 'drive conveyor'):
+            client.diagnostics(f'drive_can_bridge: {status}', lambda status: (
+                status['level'], status['code']) == ('ERROR', 'bus_hangs'))
+        client.diagnostics('drive_can_bridge: drive lift',
+                           lambda drive: drive['state'] == 'disabled')
+    client.diagnostics('drive_can_bridge: bus hung', lambda bus: bus['state'] == 'up')
