@@ -348,7 +348,9 @@ class BusExchange:
 
     def enter(self) -> bool:
         """Take the lock, for who serves other buses, too; False: this one hangs."""
-        self.hung = not self.lock.acquire(timeout=LITTLE_PATIENCE if self.hung else PATIENCE)
+        patience = 0.5 * (LITTLE_PATIENCE if self.hung else PATIENCE)
+        # twice: the process may have stood still meanwhile
+        self.hung = not any(self.lock.acquire(timeout=patience) for _ in range(2))
         return not self.hung
 
     def submit(self, session: Session, request: Request | ControlRequest) -> None:

@@ -127,7 +127,8 @@ class Beat:
         begun = [turn for turn in self.turns if turn.begun_round and turn.running]
         soonest = min(turn.due for turn in begun)
         for turn in begun:
-            turn.due = soonest
+            if turn.due > soonest:
+                CycleTimer.start(turn, soonest)
 
     def bring_forward(self, at: float) -> None:
         """Have a whole round begin then, unless it is due before."""

@@ -226,7 +226,7 @@ class BringUp:
                 self.options.pop(index, None)
             else:
                 self.options[index] = value
-        self._rules.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
+            self._rules.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
     def learn_again(self) -> Procedure:
         """Read it once more: users have written it."""

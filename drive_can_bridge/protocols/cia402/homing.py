@@ -156,8 +156,8 @@ class Homing:
             self._end(NOTHING)
 
     def _entered(self, failure: Sentence) -> None:
-        if self._step is not Step.ENTERING:
-            return
+        if self._step is not Step.ENTERING or failure and not self._machine.operating:
+            return      # what was stopped meanwhile goes back with the next sample
         if failure:
             self._end(failure)
             return
@@ -209,9 +209,11 @@ class Homing:
     def _left(self, failure: Sentence) -> None:
         if self._step is not Step.LEAVING:
             return
+        told = failure or self._failure
         if failure and self._machine.operating:
             self._machine.drop(failure)     # in whatever mode it is, it is not driven
-        told = failure or self._failure
+        elif failure:                       # it was stopped meanwhile
+            told = sentences.homing_stopped(self._step.value)
         self._answer(not told, told or sentences.homed())
         if failure:
             self._go(Step.HOLDING)

@@ -209,6 +209,15 @@ class TestQuickStop:
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
 
+    def test_one_that_is_silent_before_it_has_told_everything_again(self) -> None:
+        option = parameter('quick_stop_option', None, index=0x605A, type=INT16)
+        axis = Axis(table=(*TABLE, option), control_timeout=0.5, parameter_timeout=0.05).enabled()
+        axis.drive.instead = {'405b6000': ''}
+        axis.deliver(axis.talk.submits(write((option, 6)), axis.now))
+        axis.live(0.5)
+        assert axis.asks(QUICK_STOP) == [
+            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
+
     def test_an_old_status_is_none_behind_a_quick_stop(self) -> None:
         """The mode shows in 6061h when 0002h has left, and no status behind that has come."""
         axis = Axis(disable_word='disable_voltage', missed_limit=100).online()

@@ -260,6 +260,27 @@ class TestHoming:
         assert axis.session.busy == ''
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
 
+    @pytest.mark.parametrize('phase', range(0, 40, 5))
+    @pytest.mark.parametrize('step', ['changing to mode 6', 'going back to the mode'])
+    def test_so_it_does_while_the_mode_changes(
+            self, step: str, phase: int, mode: str, number: int) -> None:
+        """6061h goes on to show the mode before."""
+        axis, drive = meet(mode, homing=True, control_timeout=1.0)
+        back = step == 'going back to the mode'
+        shown = {'40616000': f'4F616000{6 if back else number:02X}000000'}
+        if not back:
+            drive.instead = shown
+        home(axis, 0.03)
+        if back:
+            while drive.number(0x6060) != 6 or not drive.found:
+                axis.live(0.001)
+            drive.instead = shown
+            axis.live(0.05)
+        axis.live(0.1 + phase / 1000)
+        outcomes = axis.asks(ControlAction.DISABLE, 0.6)
+        assert [done for done in outcomes if done[0] == 'home'] == [
+            ('home', False, says('homing_stopped', step=step))]
+
     def test_when_it_cannot_begin(self, mode: str, number: int) -> None:
         axis, _ = meet(mode, homing=True)
         setpoint = axis.session.setpoints.items[0]

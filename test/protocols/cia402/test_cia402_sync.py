@@ -284,6 +284,19 @@ class TestRounds:
         one.live(3.0)
         assert [*rounds[3:], *one.rounds()] == [[*rest, '080']] * 7
         assert all(session.statistics.missed == 0 for session in one.sessions)
+        assert all(session.statistics.period_error.maximum < 0.001 for session in one.sessions)
+
+    def test_nor_does_one_that_is_lost_bring_a_round_of_its_own(self) -> None:
+        """The last of a round."""
+        one = bus(2, period=0.5)
+        one.start()
+        one.live(2.0)
+        one.drives[2].takes = lambda sent: []   # type: ignore[method-assign]
+        one.log.clear()
+        one.live(4.0)
+        assert online(one) == [True, False]
+        syncs = [at for at, text in one.log if text == '080#']
+        assert min(later - at for at, later in zip(syncs, syncs[1:])) > 0.09
 
     def test_a_round_brought_forward_costs_no_axis_its_answer(self) -> None:
         """TPDOs come 8 ms behind SYNC, as on a slow bus, and a quick stop 2 ms behind it."""
