@@ -113,7 +113,7 @@ class TaskTransactor(Transactor[Ask, Reply]):
         return reply is self.silent
 
     def key(self, step: Ask) -> Hashable:
-        return step.number, step.index
+        return step.number      # a late refusal may not say of which element
 
 
 TaskChannel = Channel[Ask, Reply]

@@ -272,6 +272,18 @@ def test_a_refusal_may_leave_the_sub_index_away() -> None:
         says('refused_by_drive', number=2)]
 
 
+def test_a_late_refusal_without_sub_index_is_that_of_no_other_element() -> None:
+    talk = online(period=5.0)
+    assert talk.submits(write((ACCELERATION_2, 100)), 10.003) == ['202#66C0010000006400']
+    assert talk.until(10.104) == []
+    assert talk.submits(write((ACCELERATION, 50)), 10.105) == []
+    assert talk.hears('203#6670000000000300', 10.15) == []
+    (_, task), = talk.until(10.25)
+    assert task == '202#6620000000003200'
+    assert talk.hears('203#6610000000003200', 10.251) == []
+    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.1)], ['written']]
+
+
 @pytest.mark.parametrize('size', [0, 4, 7])
 def test_malformed_responses(size: int) -> None:
     what = f'{size} data bytes: parameter frames have 8'
