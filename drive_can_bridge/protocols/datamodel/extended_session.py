@@ -124,6 +124,12 @@ class ExtendedSession(Session):
         by_number = self._side.longest_stop(setpoints=not self._exchange.cycling)
         return by_number + (self._exchange.longest_stop if self._exchange.cycling else 0.0)
 
+    def time_lost(self, now: float) -> None:
+        # no answer to a stop that just left will come; with assumed maps, its cycles go on
+        if self._verify and self.stage is Stage.RUNNING and self.unshown and not self.owed:
+            self.duty.happened(Happened.SILENT)
+        super().time_lost(now)
+
     def begin(self, now: float) -> None:
         self._exchange.stop()
         self._differs = self._side.shows_up = False

@@ -70,6 +70,23 @@ def test_stall_with_assumed_maps_needs_no_writes() -> None:
     assert not talk.session.duty.owed
 
 
+def test_stop_that_nobody_had_answered_before_a_stall_is_told_again() -> None:
+    """A drive that was deaf then runs on: silent as it is, its maps are all that is asked for."""
+    talk = running()
+    talk.commands(0, 0.0, 10.03)
+    assert talk.until(10.04 + TICK) == [(10.04, NEUTRAL)]
+    assert talk.time_lost(11.5) == [SPEED_ZERO]
+    talk.until(13.0)
+    assert warnings(talk) == [UNHEARD]
+
+
+def test_stop_that_was_answered_before_a_stall_is_not() -> None:
+    talk = running()
+    talk.commands(0, 0.0, 10.03)
+    assert exchange(talk, 10.04) == NEUTRAL
+    assert talk.time_lost(11.5) == [ASK_REQUEST_MAP]
+
+
 # -- the bus went, and came back ------------------------------------------------------------------
 
 
