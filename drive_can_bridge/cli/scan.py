@@ -24,7 +24,8 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.output import may_overwrite, waiting, write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import BusUnavailable, ConfigurationError, TransportError
+from drive_can_bridge.core.errors import (
+    BusUnavailable, ConfigurationError, DriveCanError, TransportError)
 from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.text import column_lines
@@ -314,6 +315,10 @@ def run(args: Namespace) -> int:
             raise WrongUsage('--bitrates only counts frames, there is nothing to write: leave -o '
                              'away')
         return _compare_bitrates(args, bus)
+    if args.output is not None and args.output.is_dir():
+        raise DriveCanError(f'{args.output}: is a directory')
+    if args.output is not None and not args.output.parent.is_dir():
+        raise DriveCanError(f'{args.output.parent}: no such directory')
     if args.output is not None and not may_overwrite(
             (args.output, *tables_beside(args.output)), yes=args.yes,
             otherwise='Nothing was sent or written'):

@@ -384,6 +384,20 @@ def test_what_is_there_is_asked_for(bench: World, tmp_path: Path,
     assert frames
 
 
+@pytest.mark.parametrize(('name', 'why'), [
+    ('.', 'is a directory'), ('sub/', 'is a directory'), ('none/x.yaml', 'no such directory')])
+def test_where_no_file_can_be_nothing_is_asked(
+        name: str, why: str, bench: World, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / 'sub').mkdir()
+    monkeypatch.chdir(tmp_path)
+    begun = bench.clock.now()
+    assert drive_can('scan', '--interface', 'virtual', '--channel', 'empty', '-o', name) == 1
+    assert bench.clock.now() == begun
+    told = capsys.readouterr()
+    assert not told.out and told.err.endswith(f'{name.partition("/")[0]}: {why}\n')
+
+
 @pytest.mark.usefixtures('bench')
 def test_nothing_found_nothing_written(tmp_path: Path,
                                        capsys: pytest.CaptureFixture[str]) -> None:
