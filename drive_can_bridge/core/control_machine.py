@@ -111,6 +111,7 @@ class ControlMachine:
     :param wording: what the family knows of status words.
     :param rules: which word serves what is wanted; None: the table says it.
     :ivar word: control word to send now.
+    :ivar word_left_at: when it left first. A status that was asked for before says nothing of it.
     :ivar table: the words and conditions.
     :ivar fault_text: which fault it is, if somebody knows.
     :ivar take_completed: returns the outcomes since the last call; asked after every frame.
@@ -131,6 +132,7 @@ class ControlMachine:
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
         self.word = self._rules.word(self._sending, enabling=False)
         self._sent = self._again = False        # the current word left; is to leave once more
+        self.word_left_at = -math.inf
         self._fault: bool | None = None         # None: not known
         self.fault_text = ''
         self._reached = False                   # enabled was confirmed for this enable word
@@ -267,6 +269,8 @@ class ControlMachine:
         is acknowledged, at the acknowledgement. A word that meanwhile is not the current one any
         more does not count.
         """
+        if self.word_due:
+            self.word_left_at = now
         self._sent, self._again = True, False   # before the timer, which may change the word
         self._rules.left(self.word)
         if self.pulsing:

@@ -19,8 +19,8 @@ passes that are due before that, those for which somebody rings, and all of them
 back in time: no bus, one that opens, a reader that has died, an adapter that sleeps too long.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import chain, zip_longest
 import math
@@ -346,12 +346,18 @@ class BusExchange:
 
     # -- users, any thread ------------------------------------------------------------------------
 
-    def enter(self) -> bool:
-        """Take the lock, for who serves other buses, too; False: this one hangs."""
+    @contextmanager
+    def entered(self) -> Iterator[bool]:
+        """Have the lock, for who serves other buses, too; False: this one hangs."""
         patience = 0.5 * (LITTLE_PATIENCE if self.hung else PATIENCE)
         # twice: the process may have stood still meanwhile
-        self.hung = not any(self.lock.acquire(timeout=patience) for _ in range(2))
-        return not self.hung
+        entered = any(self.lock.acquire(timeout=patience) for _ in range(2))
+        self.hung = not entered
+        try:
+            yield entered
+        finally:
+            if entered:
+                self.lock.release()
 
     def submit(self, session: Session, request: Request | ControlRequest) -> None:
         """
@@ -360,9 +366,9 @@ class BusExchange:
         :raises TransportError: the bus hangs.
         """
         member = self._member(session)
-        if not self.enter():
-            raise TransportError(bus_hangs(self.bus.name))
-        try:
+        with self.entered() as entered:
+            if not entered:
+                raise TransportError(bus_hangs(self.bus.name))
             now = self._clock()
             self._notice_lost_time(now)     # else an enable would go by what was before
             try:
@@ -371,8 +377,6 @@ class BusExchange:
             except Exception as error:
                 member.contain(error)
                 raise
-        finally:
-            self.lock.release()
         self._ring_if_sooner(member)
 
     def reconfigure(self, session: Session, **changes: Any) -> None:
@@ -434,6 +438,7 @@ class BusExchange:
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
         now = self._last_pass = self._look_at_clock()
+        self.hung = False
         self._meant_at = min(self._meant_at, now)
         if now >= self._tell_at:
             self._tell_again(now)

@@ -93,8 +93,6 @@ class AcyclicOutput:
     :param lasting: indices of those that are not, for all that.
     :ivar word: the control word that was written last; None: nobody knows, or it was refused.
     :ivar again_at: when it is to be written again in any case.
-    :ivar word_left_at: when a control word left last. A status that was asked for before says
-        nothing about it.
     """
 
     def __init__(self, control: ControlMachine | None, policy: Policy, count: int, *,
@@ -109,7 +107,6 @@ class AcyclicOutput:
         self._written_at = [-math.inf] * count
         self._due: list[int] = []
         self._lacking: set[int] | None = None   # setpoints that the word waits for
-        self.word_left_at = -math.inf
         self.forget()
 
     def forget(self) -> None:
@@ -236,7 +233,6 @@ class AcyclicOutput:
         :param again: it is written again if the drive takes no notice.
         :return: it is, or was, the current one.
         """
-        self.word_left_at = now
         if again:
             self.word_unanswered(now)
         control = self._control

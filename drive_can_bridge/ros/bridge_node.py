@@ -45,7 +45,7 @@ from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import rearm_would_jump
+from drive_can_bridge.core.sentences import bus_hangs, rearm_would_jump
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
@@ -274,7 +274,12 @@ class BridgeNode(LifecycleNode):
     def _parameter_refusal(self, name: str, value: Any) -> str:
         runtime = self._runtime
         drive = None if runtime is None else runtime.drive_of(name)
-        if drive is not None and name.endswith('.rearm') and value == 'immediate':
+        if drive is None:
+            return ''
+        with drive.exchange.entered() as entered:
+            if not entered:
+                return bus_hangs(drive.exchange.bus.name)
+        if name.endswith('.rearm') and value == 'immediate':
             for setpoint in drive.session.setpoints.held:
                 return rearm_would_jump(setpoint.parameter.name)
         return ''

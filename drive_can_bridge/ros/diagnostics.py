@@ -98,8 +98,8 @@ class Attendance:
         if not missing:
             return
         for drive in missing:
-            with drive.exchange.lock:
-                told = absence(drive)
+            with drive.exchange.entered() as entered:
+                told = absence(drive) if entered else sentences.bus_hangs(drive.exchange.bus.name)
             self._log.speaker(drive.name).warning(
                 told if told.code == 'never_seen' else sentences.not_seen(told))
         online = sum(drive.session.online for drive in self._drives)
@@ -150,11 +150,11 @@ class BusReporter:
         level, message = DiagnosticStatus.OK, sentences.bus_up(
             exchange.bus.interface, str(exchange.bus.channel))
         state = exchange.bus_state
-        if exchange.enter():
-            exchange.lock.release()
+        with exchange.entered() as entered:
+            hangs = not entered
         if state == 'up' and link.controller or state == 'down' and link.controller == BUS_OFF:
             state = link.controller
-        if exchange.hung:
+        if hangs:
             state, level = 'hangs', DiagnosticStatus.ERROR
             message = sentences.bus_hangs(exchange.bus.name)
         elif exchange.bus_state != 'up':
@@ -212,8 +212,8 @@ class DriveReporter:
         # the session belongs to the threads of the bus; what is computed of many samples does not
         state, level, command_age = DriveState.OFFLINE, DiagnosticStatus.ERROR, math.nan
         message, more = sentences.bus_hangs(drive.exchange.bus.name), dict[str, str]()
-        if drive.exchange.enter():
-            try:
+        with drive.exchange.entered() as entered:
+            if entered:
                 state = session.state
                 level, message = self._judge(state, rejected, now)
                 command_age = session.setpoints.age(now)
@@ -223,8 +223,6 @@ class DriveReporter:
                     more = {'control_state': known, **more}
                 if session.fault_watch is not None:
                     more = {**more, 'fault_code': session.fault_watch.text}
-            finally:
-                drive.exchange.lock.release()
         self._latencies = statistics.latency.count, statistics.latency.total
         self._requests = statistics.requests_ok + statistics.requests_failed
         facts = {

@@ -196,7 +196,7 @@ class Link:
             self._prepare_thread()
             self._keep_open()
         except BusMisconfigured as error:
-            if not self._closing:
+            if not self._ended():
                 self._listener.bus_misconfigured(in_words(error))
         except Exception as error:  # noqa: BLE001  outermost loop of a thread: nothing is silent
             self._tell_tried()
@@ -230,7 +230,7 @@ class Link:
             try:
                 self._loss = NOT_READ_YET
                 self._port = port = self._open()
-                if self._closing:   # it took longer than anybody waits
+                if self._ended():   # it took longer than anybody waits
                     return
                 self.taken = False
                 port.error_witness = self.error_witness
@@ -246,7 +246,7 @@ class Link:
                 self._tell_tried()
                 self._read(port, frame)
             except BusUnavailable as error:
-                if self._closing:
+                if self._ended():
                     return
                 self.taken = error.taken
                 reason = gone(adapter_of(self.bus)) if opened and self._gone() else in_words(error)
@@ -257,6 +257,10 @@ class Link:
                 reported = reason
                 self._tell_tried()
             self._end.wait(self._now() + self.bus.reconnect_period)
+
+    def _ended(self) -> bool:
+        """Tell whether it was stopped meanwhile, by another thread."""
+        return self._closing
 
     def _gone(self) -> bool:
         """Tell whether the adapter was unplugged; its name goes a moment after it."""

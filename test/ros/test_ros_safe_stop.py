@@ -154,16 +154,17 @@ def test_a_bus_that_hangs_holds_up_no_stop_of_another(bridge: StartBridge, clien
     one = bridge(parameters(buses={'hung': bus, 'main': dict(bus)}, lift=LIFT,
                             conveyor={**CONVEYOR, 'bus': 'hung'}), autostart=False)
     one.played['conveyor'].fault('silent')
-    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-        assert client.transition(transition)
+    assert client.transition(Transition.TRANSITION_CONFIGURE)
+    begun = clock().now()
+    assert client.transition(Transition.TRANSITION_ACTIVATE)
     one.online('lift')
     assert client.call('/lift/enable', SetBool, SetBool.Request(data=True)).success
     ending = clock().worker(one.node.stop, 'ending')
     with one.record() as recorder, late(one.node.exchanges['hung']):
-        pause(2.0 * GRACE)
+        pause(begun + GRACE + 0.3 - clock().now())
         assert one.node.drives['lift'].session.active
         ending.start()
-        pause(1.0)
+        pause(0.3)
         assert last_cycles(recorder) == [(0, 0, 0, 0)] * 3
         assert one.node.drives['lift'].session.stopped
     ending.join()
@@ -181,6 +182,8 @@ def test_a_bus_that_hangs_keeps_nobody_else_from_being_served(bridge: StartBridg
             assert answer.success is (drive == 'lift')
             assert drive == 'lift' or answer.message == refused
         assert client.set('/conveyor', ramp_time=1.0) == [(False, refused)]
+        assert client.set('/drive_can_bridge', **{'drives.conveyor.command_timeout': 0.5}) == [
+            (False, refused)]
         assert client.get('/lift', 'ramp_time') != [None]
         for status in ('bus hung', 'drive conveyor'):
             client.diagnostics(f'drive_can_bridge: {status}', lambda status: (

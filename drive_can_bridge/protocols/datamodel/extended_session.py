@@ -383,7 +383,10 @@ class ExtendedSession(Session):
             self.duty.channel(CYCLE, Happened.ANSWERED)
             self._side.found(now)
         slot = self._side.status_slot
-        if self.control is not None and slot is not None:
+        # by number, a word may have left since this was asked for
+        if self.control is not None and slot is not None and (
+                self._side.control_slot is not None
+                or self._answers.book.began_at > self.control.word_left_at):
             self.interlock.status(raws[slot] if slot < len(raws) else None, now)
             self.control_changed(now)
         if self._answers.book.stop_shown and self._side.output.has(_CYCLE):

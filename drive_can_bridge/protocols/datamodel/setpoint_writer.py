@@ -122,7 +122,7 @@ class ControlByNumber:
             yield now
             raw = yield self._read(status)
             now = self._channel.now
-            if self._transactor.asked_at <= self._output.word_left_at:
+            if self._transactor.asked_at <= self._control.word_left_at:
                 continue
             self._session.interlock.status(raw, now)
             self._session.control_changed(now)

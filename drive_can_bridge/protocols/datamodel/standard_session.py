@@ -168,7 +168,7 @@ class StandardSession(Session):
         if self.control is None:
             return
         known, asked_at = self._status_slot is None, self._round.status_asked_at
-        if self._status_slot is not None and asked_at > self._side.output.word_left_at:
+        if self._status_slot is not None and asked_at > self.control.word_left_at:
             # an answer that has waited here for a process that stood still is no news
             known = now - asked_at <= self.retry.timeout + TOLERANCE
             self.interlock.status(raws[self._status_slot], now)

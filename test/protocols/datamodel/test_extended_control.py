@@ -2,6 +2,7 @@
 """Conversations about control: the word and the status, each with a slot and without."""
 
 from dataclasses import replace
+from functools import partial
 
 from builders import (
     ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, parameter,
@@ -13,6 +14,7 @@ from extended_builders import (
 )
 import pytest
 from saying import says
+from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, FrameRejected, Noted, StationLost
@@ -464,4 +466,46 @@ def test_status_that_was_asked_for_before_a_stop_left_confirms_nothing(
     assert talk.control_outcomes() == []
     assert ASK_STATUS in [text for _, text in talk.until(10.13)]
     talk.hears('10200D31#0001000000000000', 10.131)
+    assert talk.control_outcomes() == [(action.value, True, 'ready')]
+
+
+def test_nor_does_a_cycle_that_left_before_it() -> None:
+    """The word is written by number, and the status comes with the cycle."""
+    talk = beside()
+    exchange(talk, 10.02, READY)
+    talk.asks(ControlAction.ENABLE, 10.025)
+    assert at_once(talk, 10.04, READY) == [NEUTRAL, ENABLE]
+    assert talk.until(10.06 + TICK) == [(10.06, NEUTRAL)]
+    assert talk.asks(ControlAction.QUICK_STOP, 10.061) == [QUICK_STOP]
+    talk.control_outcomes()
+    talk.hears(READY, 10.062)       # answers what left at 10.06
+    assert talk.control_outcomes() == []
+    assert at_once(talk, 10.08, READY) == [NEUTRAL, DISABLE]
+    assert talk.control_outcomes() == [('quick_stop', True, 'ready')]
+
+
+@pytest.mark.parametrize('action', [ControlAction.DISABLE, ControlAction.QUICK_STOP])
+def test_nor_does_a_status_by_number_where_cycles_hold_the_word(action: ControlAction) -> None:
+    """It is told to stop while the question is under way, and drops out by itself just before."""
+    talk = Conversation(drive(request=(WORD, SPEED), response=(ACTUAL, CURRENT), control=CONTROL,
+                              mapping='assume'))
+    status = [0.03, '10200D31#0001000000000000']
+    line = Timeline(talk, lambda text: (0.002, '103FFFF0#03E800FA00000000') if (
+        text.startswith('003FFFF0')) else tuple(status) if text == ASK_STATUS else None)
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    line.plan(10.3, partial(talk.asks, ControlAction.ENABLE))
+    line.live(10.35)
+    status[1] = '10200D31#0003000000000000'
+    line.live(10.8)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    status[1] = '10200D31#0001000000000000'
+    now = 10.8
+    while line.when(ASK_STATUS)[-1] < 10.8:
+        now += 0.001
+        line.live(now)
+    line.plan(now + 0.001, partial(talk.asks, action))
+    line.live(now + 0.032)
+    assert talk.control_outcomes() == []
+    line.live(now + 0.3)
     assert talk.control_outcomes() == [(action.value, True, 'ready')]
