@@ -22,9 +22,9 @@ def drive(name: str = 'lift', **changes: Any) -> Any:
     facts: dict[str, Any] = {
         'bus_state': 'up', 'advice': sentences.maps_unread(), 'ever_online': False,
         'online': False, 'active': True, 'defect': '', 'state': DriveState.OFFLINE, 'lost_at': 0,
-        'lost_for': sentences.NOTHING, **changes}
+        'lost_for': sentences.NOTHING, 'hangs': False, **changes}
     exchange = SimpleNamespace(bus=SimpleNamespace(name='main'), bus_state=facts['bus_state'],
-                               lock=nullcontext())
+                               entered=lambda: nullcontext(not facts['hangs']))
     session = SimpleNamespace(offline_advice=facts['advice'], **{
         key: facts[key] for key in ('ever_online', 'online', 'active', 'defect', 'state')})
     return SimpleNamespace(name=name, exchange=exchange, session=session,
@@ -85,11 +85,13 @@ def test_who_is_missing_is_told_with_a_sum() -> None:
         ('', says('drives_missing', online=12, drives=16, missing=['a', 'b']))]
 
 
-def test_on_a_bus_that_is_down_they_are_told_too() -> None:
+@pytest.mark.parametrize(('bus', 'expected'), [
+    ({'bus_state': 'down'}, 'bus_of_drive_down'), ({'hangs': True}, 'bus_hangs')])
+def test_on_a_bus_that_is_down_they_are_told_too(bus: dict[str, Any], expected: str) -> None:
     log = Lines()
-    Attendance(log, [drive(bus_state='down')], clock()).look()  # type: ignore[arg-type, list-item]
+    Attendance(log, [drive(**bus)], clock()).look()     # type: ignore[arg-type, list-item]
     assert log.lines == [
-        ('lift', says('not_seen', why=says('bus_of_drive_down', bus='main'))),
+        ('lift', says('not_seen', why=says(expected, bus='main'))),
         ('', says('drives_missing', online=0, drives=1, missing=['lift']))]
 
 
