@@ -63,7 +63,7 @@ class ValueRefused(DriveCanError, ValueError):
 
 
 class TransportError(DriveCanError):
-    """A frame was not sent, but the bus is still there: its queue is full."""
+    """A frame was not sent, but the bus is still there: its queue is full, or it hangs."""
 
 
 class BusUnavailable(DriveCanError, OSError):

@@ -26,7 +26,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
 from drive_can_bridge.core.sentences import (
-    answer_late, bridge_inactive, bus_hangs, internal_error, NOTHING, Sentence)
+    answer_late, bridge_inactive, internal_error, NOTHING, Sentence)
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -287,8 +287,8 @@ class DriveNode(DriveListener):
         self._asked[request] = completed    # its outcome may come before the next line
         try:
             self.exchange.submit(self.session, request)
-        except TransportError:  # no other drive's stop waits for it
-            self._refuse(request, bus_hangs(self.exchange.bus.name))
+        except TransportError as error:     # no other drive's stop waits for it
+            self._refuse(request, error.sentence)
         except Exception as error:  # noqa: BLE001  told as the drive's; whoever asks is not left out
             self._refuse(request, internal_error(type(error).__name__, str(error)))
 

@@ -229,12 +229,13 @@ class Homing:
         if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING and (
                 self._now >= self._write_at):
             self._go(Step.LEAVING)
-            self._channel.run(self._write(self._mode), self._written, self._now)
+            # it may show it when it is enabled
+            self._channel.run(self._write(self._mode, self._session.retry.attempts),
+                              self._written, self._now)
 
-    def _write(self, mode: int) -> Generator[Ask, Reply, Sentence]:
-        """Write the mode of a drive that is disabled: it may show it when it is enabled."""
-        reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'),
-                          attempts=self._session.retry.attempts)
+    @staticmethod
+    def _write(mode: int, attempts: int = 1) -> Generator[Ask, Reply, Sentence]:
+        reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'), attempts=attempts)
         return NOTHING if reply.data is not None else sentences.mode_refused(mode)
 
     def _written(self, failure: Sentence) -> None:
@@ -252,9 +253,8 @@ class Homing:
         step = self._step
 
         def look() -> Generator[Ask, Reply, Sentence]:
-            reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'))
-            if reply.data is None:
-                return sentences.mode_refused(mode)
+            if failure := (yield from self._write(mode)):
+                return failure
             until = self._channel.now + self._session.configuration.control_timeout
             while self._step is step and self._machine.operating and self._channel.now < until:
                 shown = yield Ask(states.MODE_SHOWN)

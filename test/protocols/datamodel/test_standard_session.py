@@ -539,12 +539,8 @@ def enabled(**options: object) -> Conversation:
     return talk
 
 
-def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
-    talk = controlled()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)], 'no period later'
-    assert talk.control_outcomes() == []
+def disabled_while_its_status_is_asked_for(talk: Conversation) -> None:
+    """Have a drive that was told to enable report that it is, and tell it to disable."""
     round_of(talk, 10.04, ENABLED)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.until(10.0605) == [(10.06, ASK)]
@@ -553,6 +549,15 @@ def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
     assert talk.control_outcomes() == []
     round_of(talk, 10.08, READY)
     assert talk.control_outcomes() == [('disable', True, 'ready')]
+
+
+def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
+    talk = controlled()
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)], 'no period later'
+    assert talk.control_outcomes() == []
+    disabled_while_its_status_is_asked_for(talk)
 
 
 def test_nor_does_it_where_the_word_is_written_by_hand() -> None:
@@ -562,14 +567,7 @@ def test_nor_does_it_where_the_word_is_written_by_hand() -> None:
     talk.asks(ControlAction.ENABLE, 10.01)
     round_of(talk, 10.02, READY)
     talk.until(10.03)
-    round_of(talk, 10.04, ENABLED)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.until(10.0605) == [(10.06, ASK)]
-    assert talk.asks(ControlAction.DISABLE, 10.061) == [DISABLE_WORD]
-    talk.hears(READY, 10.062)
-    assert talk.control_outcomes() == []
-    round_of(talk, 10.08, READY)
-    assert talk.control_outcomes() == [('disable', True, 'ready')]
+    disabled_while_its_status_is_asked_for(talk)
 
 
 def test_nor_does_it_where_the_status_is_read_by_hand() -> None:
