@@ -83,7 +83,7 @@ def namespace() -> str:
 def _client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ClientProcess]:
     client = ClientProcess(tmp_path_factory.mktemp('client'))
     yield client
-    client.process.kill()
+    client.process.finish()
 
 
 @pytest.fixture

@@ -22,6 +22,8 @@ from waiting import DEADLINE, wait_for
 ROOT = Path(__file__).resolve().parents[2]
 #: lines of an output that are shown of a process when a test fails
 SHOWN = 40
+#: s within which a process ends that is not needed any more
+PATIENCE = 10.0
 #: executable -> module, for trees that are not installed
 EXECUTABLES = {'drive_can_bridge': 'drive_can_bridge.ros.start',
                'drive_can': 'drive_can_bridge.cli.start'}
@@ -185,6 +187,20 @@ class Process(Told):
         self.send(number)
         return self.wait(timeout)
 
+    def finish(self) -> None:
+        """
+        End it as a user does, and kill it only where that does not help.
+
+        What is killed leaves a port in shared memory to its successor, which may not be heard by
+        whoever still has the old one open (eProsima/Fast-DDS, pull request 4728).
+        """
+        if self.running:
+            self.send(signal.SIGTERM)
+            self.send(signal.SIGCONT)
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(PATIENCE)
+        self.kill()
+
     def kill(self) -> None:
         """End it, whatever it is doing."""
         if self.running:
@@ -250,7 +266,10 @@ class Processes:
                            *arguments], 'bridge', **streams)
 
     def end(self) -> None:
-        """End what is still running."""
+        """End what is still running, drives last."""
+        for process in self.started:
+            if not isinstance(process, Simulator):
+                process.finish()
         for process in self.started:
             process.kill()
 

@@ -114,7 +114,11 @@ class Client:
 
     def latched(self, topic, wanted, timeout):
         messages = self.listen(topic, Bool, latched=True)
-        self.until(lambda: messages and messages[-1] is wanted, timeout, f'{topic} {wanted}')
+        try:
+            self.until(lambda: messages and messages[-1] is wanted, timeout, f'{topic} {wanted}')
+        except Failed as failure:   # who did not hear whom?
+            raise Failed(f'{failure}: heard {list(messages)}, publishers that are known: '
+                         f'{self.node.count_publishers(topic)}') from None
 
     def flashed(self, topic, timeout):
         messages = self.listen(topic, Bool, latched=True)

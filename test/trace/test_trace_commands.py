@@ -52,6 +52,12 @@ def trace(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def pictures(programs: None, threads: None) -> None:
+    """Skip where none can be drawn; the first time on a machine, fonts are looked for."""
+    pytest.importorskip('matplotlib')
+
+
 @pytest.mark.parametrize('story', STORIES)
 def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
                monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,6 +89,7 @@ def test_lines(story: str, file: Path, capsys: pytest.CaptureFixture[str],
     assert replayed(STORIES[story], step) == STORIES[story]
 
 
+@pytest.mark.usefixtures('pictures')
 def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
                                    capsys: pytest.CaptureFixture[str]) -> None:
     text = file.read_text()
@@ -94,7 +101,6 @@ def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
         json.loads, capsys.readouterr().out.splitlines())] == [('lift', None), (None, 'main')]
     assert drive_can('decode', trace, '--summary', '--drive', 'l*', '--params-file', file) == 0
     assert 'conveyor' not in capsys.readouterr().out
-    pytest.importorskip('matplotlib')
     picture = tmp_path / 'values.svg'
     for chosen, code, told in (
             ('conveyor', 0, ''), ('lift', 1, 'none of these values is in the trace\n'),
@@ -105,9 +111,9 @@ def test_what_is_said_of_one_drive(file: Path, trace: Path, tmp_path: Path,
     assert 'conveyor.actual_speed' in picture.read_text()
 
 
+@pytest.mark.usefixtures('pictures')
 def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
                                   capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip('matplotlib')
     picture = tmp_path / 'values.svg'
     picture.symlink_to('/dev/full')
     assert drive_can('decode', trace, '--params-file', file, '--plot', picture) == 1
@@ -125,9 +131,9 @@ def test_a_format_whose_module_is_not_there(file: Path, trace: Path,
         '(pip install asammdf)\n')
 
 
+@pytest.mark.usefixtures('pictures')
 def test_plot(file: Path, trace: Path, tmp_path: Path) -> None:
     picture = tmp_path / 'values.png'
-    pytest.importorskip('matplotlib')
     assert drive_can('decode', '--params-file', file, '--plot', picture,
                      'conveyor.actual_speed', 'conveyor.speed_setpoint', trace) == 0
     assert picture.read_bytes().startswith(b'\x89PNG')
