@@ -329,7 +329,8 @@ class ControlMachine:
         text = stuck_text(
             self._reports, self._table, self._wording, self.state, self._timeout, self._sending,
             self.word, sent=self._sent, pulsed=under_way.pulsed,
-            acknowledged=self._pulse < RESET_CYCLES, more=self._rules.remark(self._sending))
+            acknowledged=self._pulse < RESET_CYCLES, fault=self.fault_text,
+            more=self._rules.remark(self._sending))
         if self._sending is ControlAction.QUICK_STOP and self._reports.braking:
             under_way.deadline = now + self._timeout    # `disable` would end the braking
             self._answers.answer(under_way, False, text)

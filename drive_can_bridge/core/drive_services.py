@@ -196,7 +196,9 @@ class DriveServices:
         elif self._absence:
             refusal = self._absence
         elif not session.online:
-            refusal = sentences.drive_offline()
+            refusal = (sentences.drive_offline_because(session.state.value)
+                       if session.state is DriveState.MAPPING_DIFFERS else
+                       sentences.drive_offline())
         else:
             refusal = (
                 session.setpoints.untold_text if action is ControlAction.ENABLE else NOTHING)

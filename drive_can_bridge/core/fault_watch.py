@@ -6,12 +6,14 @@ It is looked for once, when a fault shows: in samples where it is mapped, otherw
 like that of a user.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.control import ControlCompleted
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import (
     Event, Noted, ProcessDataReceived, RequestCompleted, StationLost,
@@ -38,6 +40,8 @@ class Watched(Protocol):
     interlock: CommandInterlock
     report: Reporter
     sample_parameters: tuple[Parameter, ...]
+    active: bool
+    online: bool
 
     @property
     def shows_fault(self) -> bool:
@@ -60,11 +64,13 @@ class FaultWatch:
     :ivar text: number and name of the fault, ``7 overcurrent``; '' without a fault, or where the
         number could not be read.
     :ivar unread: why it could not be read.
+    :ivar error_code: 603Fh of a CANopen drive that has a fault, if it is known.
     """
 
     def __init__(self, session: Watched, table: FaultTable) -> None:
         self.text = ''
         self.unread = NOTHING
+        self.error_code: int | None = None
         self._session = session
         self._parameter = session.configuration.profile.parameters[table.parameter]
         self._names = dict(table.codes)
@@ -75,14 +81,36 @@ class FaultWatch:
         self.shows = False
         self._wanted = False    # the number is to be read; what is under way is of a fault before
         self._request: ReadRequest | None = None
+        self._ended: list[ControlCompleted] = []    # by the fault: they tell its number
 
-    def look(self, events: Iterable[Event]) -> None:
-        """Look at what has happened; there may be more to be told, and to be sent, then."""
+    def look(self, events: list[Event]) -> None:
+        """
+        Look at what has happened; there may be more to be told, and to be sent, then.
+
+        What a fault has ended is answered as soon as its number is known, or cannot be read.
+        """
         for event in tuple(events):
             if isinstance(event, ProcessDataReceived):
                 self.sampled(event.raws, event.received_at)
             elif isinstance(event, StationLost):
                 self._gone()
+            elif isinstance(event, ControlCompleted) and (
+                    event.message.code == 'fault_while_enabling'):
+                events.remove(event)
+                self._ended.append(event)
+        if self._ended and not self._is_told_soon:
+            obeyed = self._session.interlock.obeyed
+            fault = '' if obeyed is None else obeyed.fault_text
+            events += [replace(each, message=sentences.fault_while_enabling(
+                each.message.fields['status'], fault)) for each in self._ended]
+            self._ended.clear()
+
+    @property
+    def _is_told_soon(self) -> bool:
+        """Which fault it is will be known, or why it is not."""
+        session = self._session
+        return session.active and session.online and session.shows_fault and (
+            not self.shows or self._wanted or self._request is not None)
 
     def take(self, event: RequestCompleted) -> bool:
         """Take the end of a request; tell whether it was ours."""
@@ -95,9 +123,10 @@ class FaultWatch:
         if isinstance(outcome, ReadValue):
             self._known(outcome.raw)
         elif isinstance(outcome, Failure):
-            self.unread = outcome.reason
-            self._tell(sentences.fault_unread(outcome.reason))
-            self._have_refusals_tell(sentences.number_unread(outcome.reason))
+            self.unread = (outcome.reason if outcome.reason.code != 'no_answer' else
+                           sentences.no_answer_briefly())
+            self._tell(sentences.fault_unread(self.unread))
+            self._have_refusals_tell(sentences.number_unread(self.unread))
         return True
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:
@@ -128,7 +157,9 @@ class FaultWatch:
     def _known(self, raw: int) -> None:
         name = self._names.get(raw, '')
         parameter = self._parameter
-        number = f'{raw:04X}h' if parameter.index == ERROR_CODE else parameter.shown(raw)
+        if parameter.index == ERROR_CODE:
+            self.error_code = raw
+        number = parameter.shown(raw) if self.error_code is None else f'{raw:04X}h'
         self.text = f'{number} {name}' if name else number
         self._tell(sentences.fault_named(number, name))
 
@@ -139,7 +170,7 @@ class FaultWatch:
     def _gone(self) -> None:
         if self.shows:
             self.shows = self._wanted = False
-            self.text, self.unread = '', NOTHING
+            self.text, self.unread, self.error_code = '', NOTHING, None
             self._have_refusals_tell('')
 
     def _have_refusals_tell(self, text: str) -> None:

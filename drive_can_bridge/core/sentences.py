@@ -86,6 +86,11 @@ def no_answer(timeout: float, attempts: int) -> str:
 
 
 @sentence
+def no_answer_briefly() -> str:
+    return 'no answer'
+
+
+@sentence
 def no_answer_offline() -> str:
     return 'no answer; drive offline'
 
@@ -397,8 +402,10 @@ def reset_not_reported() -> str:
 
 
 @sentence
-def fault_present(timeout: float, status: str) -> str:
-    return f'fault still present after {timeout:g} s ({status})'
+def fault_present(timeout: float, status: str, fault: str = '') -> str:
+    still = f'still present after {timeout:g} s ({status})'
+    return (f'fault {fault}: remove its cause, then reset it again; {still}' if fault else
+            f'fault {still}')
 
 
 @sentence
@@ -570,8 +577,9 @@ def fault_gone(status: str) -> str:
 
 
 @sentence
-def fault_while_enabling(status: str) -> str:
-    return f'fault while enabling ({status}): reset it first'
+def fault_while_enabling(status: str, fault: str = '') -> str:
+    return (f'fault {fault}: remove its cause, then reset it first; it came while enabling '
+            f'({status})' if fault else f'fault while enabling ({status}): reset it first')
 
 
 @sentence

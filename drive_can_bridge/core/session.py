@@ -234,9 +234,13 @@ class Session(ABC):
         self._leave_owing(sentences.stop_not_possible())
         self.go_idle(sentences.deactivated())
 
-    def stop_left(self) -> None:
-        """End a stop that nobody acknowledges: send nothing more."""
-        self._leave_owing(sentences.stop_not_answered())
+    def stop_left(self, why: Sentence = NOTHING) -> None:
+        """
+        End a stop that was not enough: send nothing more.
+
+        :param why: what is wrong with it; by default, nobody acknowledges it.
+        """
+        self._leave_owing(why or sentences.stop_not_answered())
         self.go_idle(sentences.deactivated())
 
     def stop_ended(self) -> None:

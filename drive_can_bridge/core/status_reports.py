@@ -231,17 +231,18 @@ def state_text(reports: StatusReports, table: ControlTable, wording: Wording | N
 
 def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | None, state: str,
                timeout: float, sending: ControlAction, word: int, *, sent: bool, pulsed: bool,
-               acknowledged: bool, more: Sentence = NOTHING) -> Sentence:
+               acknowledged: bool, fault: str = '', more: Sentence = NOTHING) -> Sentence:
     """
     Say that nothing was confirmed in time, and as much as is known of the reason.
 
     :param sending: what the current control word is for.
     :param pulsed: the pulse that resets a fault has left.
     :param acknowledged: ``sent`` says that the drive has acknowledged the word.
+    :param fault: which one it is, if somebody knows.
     :param more: what the family knows.
     """
     if pulsed and reports.answered:
-        return sentences.fault_present(timeout, reports.text)
+        return sentences.fault_present(timeout, reports.text, fault)
     remarks: list[Sentence] = []
     if not sent:
         remarks.append(sentences.word_not_acknowledged(word) if acknowledged else

@@ -100,6 +100,18 @@ class TestKnown:
         (_, success, message), = partner.talk.control_outcomes()
         assert (success, message) == (False, says('reset_first', fault='7 overcurrent'))
 
+    def test_so_do_an_enable_that_it_ended_and_a_reset_that_did_not_help(
+            self, name: str, mapped: bool) -> None:
+        partner = meet(name, mapped=mapped, control_timeout=0.5)
+        for action, code in ((ControlAction.ENABLE, 'fault_while_enabling'),
+                             (ControlAction.RESET_FAULT, 'fault_present')):
+            partner.talk.session.services.submit(ControlRequest(action), partner.now)
+            trip(partner, 7)
+            partner.live(0.5)
+            (_, success, message), = partner.talk.control_outcomes()
+            assert (success, message.code) == (False, code)
+            assert message.fields['fault'] == '7 overcurrent'
+
     def test_a_number_without_a_name(self, name: str, mapped: bool) -> None:
         partner = meet(name, mapped=mapped)
         assert says('fault_named', number='8', name='') in trip(partner, 8)
@@ -131,7 +143,8 @@ def test_a_number_that_cannot_be_read(name: str) -> None:
     partner.registers[211] = 8
     partner.live(1.0)
     notes = [note.text for note in partner.talk.events(Noted)]
-    assert notes.count(says('fault_unread')) == 1
+    why = says('refused_by_drive' if name == 'canopen_pkw' else 'no_answer_briefly')
+    assert notes.count(says('fault_unread', reason=why)) == 1
     assert text(partner) == ''
     partner.talk.session.services.submit(ControlRequest(ControlAction.ENABLE), partner.now)
     assert partner.talk.control_outcomes() == [('enable', False, says(

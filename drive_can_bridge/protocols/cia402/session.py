@@ -510,10 +510,11 @@ class Cia402Session(Session):
                                         + exchange.timer.stop_spacing))
 
     def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
-        emergency = self._node.emergency
         if refusal or action is not ControlAction.ENABLE or not self._machine.fault:
             return refusal
-        missed = emergency is not None and emergency.code == HEARTBEAT_ERROR
+        # nobody heard the emergency where the bridge itself was gone
+        emergency, watch = self._node.emergency, self.fault_watch
+        missed = HEARTBEAT_ERROR in (emergency and emergency.code, watch and watch.error_code)
         return sentences.bridge_missed() if missed else NOTHING
 
     # -- the stop ---------------------------------------------------------------------------------
@@ -577,11 +578,14 @@ class Cia402Session(Session):
 
     def _release(self, now: float) -> None:
         """Come to the end, as soon as the drive does not watch the bridge any more."""
+        why = NOTHING
+        if self._answers.book.stop_shown and self._rules.state in states.MOVING:
+            why = sentences.stop_failed([sentences.still_in_state(self._rules.state.value)])
         if self.owed or self._runs_on:      # then it is to stop by itself
-            self.stop_left()
+            self.stop_left(why)
             return
         self._channel.run(self._bring_up.release(self._stop.answer_time),
-                          lambda _: self.stop_left(), now, Priority.STOP)
+                          lambda _: self.stop_left(why), now, Priority.STOP)
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -1,15 +1,18 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
-from builders import INT16, parameter, write
+from builders import INT16, parameter, RO, write
 import pytest
 from saying import says
 from servo_builders import Axis, TABLE
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.fault_watch import FaultWatch
+from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.protocols.cia402.states import State
 
+ERROR = parameter('error', None, index=0x603F, subindex=0, access=RO)
 ENABLE, DISABLE, QUICK_STOP = (
     ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
@@ -145,6 +148,14 @@ class TestWhatKeepsItFromEnabling:
         assert axis.asks(ControlAction.RESET_FAULT) == [
             ('reset_fault', True, State.READY_TO_SWITCH_ON.value)]
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+
+
+    def test_one_that_faulted_while_there_was_no_bridge(self) -> None:
+        axis = Axis(objects={(0x603F, 0): b'\x30\x81'}, table=(*TABLE, ERROR))
+        axis.session.fault_watch = FaultWatch(axis.session, FaultTable('error', (), None))
+        axis.drive.becomes(axis.drive.FAULT)
+        axis.online()
+        assert axis.session.services.control_refusal(ENABLE) == says('bridge_missed')
 
 
 class TestQuickStop:

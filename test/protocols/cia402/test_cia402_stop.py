@@ -136,6 +136,13 @@ class TestTheEnd:
         assert why is None or told == says('may_still_be_running', why=says(
             'stop_failed', what=[why]))
 
+    def test_one_that_brakes_for_longer_has_answered(self) -> None:
+        axis = running(control_timeout=0.5)
+        axis.drive.ramp = 1000
+        end(axis)
+        assert doubts(axis) == [says('may_still_be_running', why=says('stop_failed', what=[
+            says('still_in_state', state='operation enabled')]))]
+
     def test_in_the_middle_of_the_set_up(self) -> None:
         axis = Axis()
         axis.deaf = True
