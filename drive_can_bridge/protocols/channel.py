@@ -485,7 +485,8 @@ class Channel(Generic[StepT, ReplyT]):
             key = transactor.key(step)
             if key is not None:
                 self._quarantine.begin(key, since + transactor.silence)
-        if silent and hurried:  # it had to make room, or is not believed: that was no attempt
+        # it had to make room, or is not believed: that was no attempt
+        if silent and hurried and transactor.repeatable(step):
             queue.attempts_left += 1
         if silent and queue.attempts_left > 0:
             queue.repeated = True

@@ -101,6 +101,10 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
         """Tell whether a reply says that nobody answered, and a late answer may come."""
 
+    def repeatable(self, step: StepT) -> bool:
+        """Tell whether a step that had to make room, or is not believed, is done once more."""
+        return True
+
     @property
     def silence(self) -> float:
         """How many s after its deadline an answer may still come."""

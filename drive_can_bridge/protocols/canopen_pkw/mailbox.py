@@ -164,7 +164,15 @@ class MailboxTransactor(Transactor[Step, Reply]):
         return (step.attempts or self.retry.attempts) if isinstance(step, Read) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
-        return isinstance(reply, Silence) and isinstance(step, Read)
+        return isinstance(reply, Silence) and (isinstance(step, Read) or reply.sent)
+
+    def repeatable(self, step: Step) -> bool:
+        return isinstance(step, Read)
+
+    def answers(self, answer: Message, step: Step) -> bool:
+        """Tell whether an answer may be that to a step that was given up, or to its 00h."""
+        return answer.code == Function.NONE or pkw.answers(
+            answer, self._make_request(step, answer.toggle))
 
     def begin(self, step: Step, now: float) -> None:
         self.expect(step, math.inf)     # until its request is made
@@ -284,15 +292,17 @@ class MailboxTransactor(Transactor[Step, Reply]):
     def _send_step(self, step: Step, now: float) -> None:
         # inverted after function 00h, too: a late answer to the request before never fits
         self._toggle = not self._toggle
-        left = self._left
-        if isinstance(step, Read):
-            self._request = pkw.read_request(step.address, step.count, self._toggle)
-        else:
-            self._request = pkw.write_request(step.address, step.words, self._toggle)
+        left, self._request = self._left, self._make_request(step, self._toggle)
+        if isinstance(step, Write):
             self._open.append(self._request)
             left = partial(self._write_left, step)
         self.deadline = self._until = now + self._patience(step)
         self._send(self._request, left)
+
+    def _make_request(self, step: Step, toggle: bool) -> Message:
+        if isinstance(step, Read):
+            return pkw.read_request(step.address, step.count, toggle)
+        return pkw.write_request(step.address, step.words, toggle)
 
 
 MailboxChannel = Channel[Step, Reply]

@@ -175,9 +175,10 @@ class PkwSession(Session):
         self._layout = Layout(options.layout)
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._started_at = -math.inf    # by NMT, the last time
-        self._channel = MailboxChannel(MailboxTransactor(
+        self._transactor = MailboxTransactor(
             self._send, order=options.abort_code_order, retry=self.retry,
-            sent=SentWrites(self.sent, placement)))
+            sent=SentWrites(self.sent, placement))
+        self._channel = MailboxChannel(self._transactor)
         self._writers = Writers(self, self._channel)
         self._rounds = Rounds(self, self._channel, self._writers)
         self._exchange = PolledExchange(self, self, self._channel)
@@ -384,8 +385,9 @@ class PkwSession(Session):
                 self._exchange.received_at = now - age
                 message = pkw.decode(data, self._layout)
                 if not self._channel.receive(message, now):
-                    self.report.unasked(sentences.unasked_pkw(str(message)),
-                                        self._channel.late(now - age), now)
+                    late = self._channel.late(
+                        now - age, lambda step: self._transactor.answers(message, step))
+                    self.report.unasked(sentences.unasked_pkw(str(message)), late, now)
             elif self._node_says(identifier, data, now):
                 self._end_futile_stop(now)
                 self._writers.again.heard(now, hurry=True)

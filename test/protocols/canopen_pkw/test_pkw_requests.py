@@ -6,14 +6,16 @@ from typing import Any
 
 from builders import Conversation, read, write
 from pkw_builders import (
-    ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, FLC, FLC_2, IDLE, IDLE_ANSWER,
-    KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_1, reading, SPEED, START, started,
-    STATUS, TABLE,
+    ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, DISABLE_1, echo, FLC, FLC_2, IDLE,
+    IDLE_ANSWER, KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_1, reading, running, SPEED,
+    START, started, STATUS, TABLE,
 )
 import pytest
 from saying import says
 
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.events import AnswerLate
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -210,6 +212,40 @@ def test_lost_answer_of_a_write_is_never_repeated() -> None:
     assert talk.hears(IDLE_ANSWER, 10.161) == ['505#5E0200AA0A000000'], 'the next one'
     talk.hears('485#5E0200AA00000000', 10.162)
     assert talk.outcomes() == [[says('no_answer', timeout=0.1, attempts=1), 'written']]
+
+
+@pytest.mark.parametrize('late', ['485#8C02002A00000000', '485#8C02004E30000906'])
+def test_late_answer_to_a_write_is_no_sign_of_a_second_station(late: str) -> None:
+    talk = online(parameter_timeout=0.2, period=5.0)
+    assert asked(talk, write((FLC, 44))) == '505#8C02002A2C000000'
+    assert talk.until(10.3) == []
+    assert talk.hears(late, 10.36) == []
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
+    late_by, = talk.events(AnswerLate)
+    assert late_by == AnswerLate(pytest.approx(0.1))
+    talk.hears(late, 10.37)     # and one too many
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 1)
+
+
+@pytest.mark.parametrize('foreign', [
+    '485#8D02002A00000000', '485#8C02002500000000', '485#8D02004E30000906',
+])
+def test_what_answers_nothing_that_was_asked_is_rejected(foreign: str) -> None:
+    talk = online(parameter_timeout=0.2, period=5.0)
+    assert asked(talk, write((FLC, 44))) == '505#8C02002A2C000000'
+    assert talk.until(10.3) == []
+    talk.hears(foreign, 10.36)
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (0, 1)
+
+
+def test_write_that_has_to_make_room_is_never_repeated() -> None:
+    talk = running(parameter_timeout=0.2)
+    assert talk.submits(write((FLC, 44)), 10.095) == ['505#8C02002A2C000000']
+    assert talk.asks(ControlAction.QUICK_STOP, 10.1) == []
+    sent = talk.served(11.0, lambda text: None if text[:9] == '505#8C020' else echo(text, '4100'))
+    assert sent[0] == (10.15, DISABLE_1)
+    assert [text for _, text in sent if text[:9] == '505#8C020'] == []
+    assert talk.outcomes() == [[says('no_answer', timeout=0.2, attempts=1)]]
 
 
 def test_write_waits_until_the_function_byte_is_known() -> None:
