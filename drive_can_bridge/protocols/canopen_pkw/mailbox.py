@@ -26,6 +26,11 @@ runs where a drive is to stop. As a device answers in order, an answer is that t
 that it fits. It proves a blind one only if nothing else was written since; otherwise that is
 written again at once: a device that keeps nothing but the newest request while it is busy takes
 no notice of one that has the function byte of the request that it was busy with.
+
+Other writes cannot be written again to be sure, and some device may acknowledge one long after it
+has answered others, function 00h among them. So as long as that may happen, the next one to the
+same address gets the other toggle, behind function 00h where it is that of the last request. Where
+both toggles are taken, an answer that may be a late one is not believed.
 """
 
 from collections import deque
@@ -45,7 +50,7 @@ from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
-from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.channel import Channel, LATE_MAX
 from drive_can_bridge.protocols.transactor import Transactor
 
 #: s that an answer to function 00h is waited for at most
@@ -154,6 +159,9 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._request: Message | None = None
         #: writes in order, the one under way included, whose answers may still come
         self._open: deque[Message] = deque(maxlen=OPEN_MAX)
+        #: writes that were given up and are not to be done twice, until a late answer may come
+        self._given_up: deque[tuple[float, Message]] = deque(maxlen=OPEN_MAX)
+        self._late_until = -math.inf    # the answer to the request under way may come, at last
         self._until = math.inf          # an answer counts; the deadline may be a moment before
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
@@ -176,7 +184,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def begin(self, step: Step, now: float) -> None:
         self.expect(step, math.inf)     # until its request is made
-        if self._synchronised or isinstance(step, Write) and step.blind:
+        if _is_blind(step) or (
+                self._synchronised and self._next_toggle(step, now) != self._toggle):
             self._send_step(step, now)
             return
         self._request = pkw.idle_request()
@@ -192,6 +201,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def receive(self, answer: Message, now: float) -> Reply | bool:
         request, step, since = self._request, self.step, self._writes_since(answer)
+        late_until = self._take_late(answer, now)
         if request is None or step is None:
             return False
         if request.code == Function.NONE:
@@ -204,6 +214,10 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._send_step(step, now)
             return True
         if not pkw.answers(answer, request):
+            return False
+        if late_until is not None and not _is_blind(step):
+            # the other of the two may come as long; not longer: one of them may be lost
+            self._late_until = min(self._late_until, late_until)
             return False
         if isinstance(step, Read):
             self._open.clear()
@@ -228,6 +242,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
             return False
         sent = request.code != Function.NONE
         if sent or self._abandoned or isinstance(step, Write):
+            if sent and isinstance(step, Write) and not step.blind:
+                self._given_up.append((self._late_until, request))
             self.forget()
             return Silence(sent)
         self._send_step(step, now)
@@ -250,6 +266,23 @@ class MailboxTransactor(Transactor[Step, Reply]):
         if found:
             self._open = deque(found[1:], maxlen=OPEN_MAX)
         return found
+
+    def _take_late(self, answer: Message, now: float) -> float | None:
+        """Take an answer; return until when it might be that to a write that was given up."""
+        for place, (until, request) in enumerate(self._given_up):
+            if now < until and pkw.answers(answer, request):
+                del self._given_up[place]
+                return until
+        return None
+
+    def _next_toggle(self, step: Step, now: float) -> bool:
+        """Return the toggle of the request for a step: inverted, if no late answer has only it."""
+        inverted = not self._toggle
+        if isinstance(step, Read) or step.blind:
+            return inverted
+        taken = {request.toggle for until, request in self._given_up
+                 if now < until and request.address == step.address}
+        return self._toggle if taken == {inverted} else inverted
 
     def _left(self, sent: bool, now: float) -> None:
         """Record a request that the bus refused; or took, if late, after all."""
@@ -290,19 +323,24 @@ class MailboxTransactor(Transactor[Step, Reply]):
         return False
 
     def _send_step(self, step: Step, now: float) -> None:
-        # inverted after function 00h, too: a late answer to the request before never fits
-        self._toggle = not self._toggle
+        # after function 00h, too: a late answer to the request before never fits
+        self._toggle = self._next_toggle(step, now)
         left, self._request = self._left, self._make_request(step, self._toggle)
         if isinstance(step, Write):
             self._open.append(self._request)
             left = partial(self._write_left, step)
         self.deadline = self._until = now + self._patience(step)
+        self._late_until = self._until + self.silence + LATE_MAX
         self._send(self._request, left)
 
     def _make_request(self, step: Step, toggle: bool) -> Message:
         if isinstance(step, Read):
             return pkw.read_request(step.address, step.count, toggle)
         return pkw.write_request(step.address, step.words, toggle)
+
+
+def _is_blind(step: Step) -> bool:
+    return isinstance(step, Write) and step.blind
 
 
 MailboxChannel = Channel[Step, Reply]

@@ -60,6 +60,7 @@ class PkwObserver(Observer):
         self.stopping = False
         self.blocked_until = -math.inf      # a heartbeat has said: not operational
         self.toggle: int | None = None
+        self.idled = False      # the last request was function 00h
 
     def bus_went_up(self) -> None:
         self.disarm()
@@ -103,12 +104,13 @@ class PkwObserver(Observer):
             wait = TIMEOUT if self.asked[0][3] & 0x7F else min(TIMEOUT, 0.1)
             wait = min(wait, 0.02 if stops else 0.04)   # a stop that the bus took late
             assert now >= self.asked[1] + wait - 1e-7, 'one request at a time'
-        self.asked = data, now
+        free = self.idled and self.asked is None and code in WRITES     # 00h was answered
+        self.asked, self.idled = (data, now), code == 0
         if code == 0:
             assert data == bytes(8)
             return
         assert code in READS | WRITES
-        if self.toggle is not None:
+        if self.toggle is not None and not free:
             assert toggle != self.toggle, 'the toggle alternates'
         self.toggle = toggle
         if code in READS:

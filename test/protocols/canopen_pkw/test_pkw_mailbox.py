@@ -340,3 +340,124 @@ def test_what_must_not_be_executed_twice_is_sent_once(told: Box) -> None:
     assert told.take() == ['C70100AA07000000']
     assert told.hears('C70100AA00000000', 1.22) == Answered((0, 0))
     assert told.take() == []
+
+
+# -- late answers to what must not be executed twice: the device may answer others meanwhile ------
+
+
+def gives_up(box: Box, write: Write, now: float) -> list[str]:
+    """Have a write sent that nobody answers; return what was sent."""
+    sent = box.begin(write, now)
+    if sent == ['0000000000000000']:
+        assert box.hears('0000000000000000', now) is True
+        sent = box.take()
+    assert box.box.handle_timer(now + 0.5) == Silence(sent=True)
+    return sent
+
+
+def reads(box: Box, now: float) -> str:
+    """Read register 455; return what was sent."""
+    sent = box.begin(READ, now)
+    if sent == ['0000000000000000']:
+        assert box.hears('0000000000000000', now) is True
+        sent = box.take()
+    assert isinstance(box.hears(sent[0], now), Answered)
+    return sent[0]
+
+
+FIRST, SECOND = Write(Address(652), (44,)), Write(Address(652), (33,))
+
+
+def test_write_has_not_the_toggle_of_one_that_was_given_up(box: Box) -> None:
+    assert gives_up(box, FIRST, 1.0) == ['8C02002A2C000000']
+    assert reads(box, 1.51) == 'C70100A500000000'
+    assert box.begin(SECOND, 1.52) == ['0000000000000000']
+    assert box.hears('0000000000000000', 1.53) is True
+    assert box.take() == ['8C0200AA21000000']
+    assert box.hears('8C02002A00000000', 1.54) is False
+    assert box.hears('8C0200AA00000000', 1.55) == Answered((0, 0))
+    assert reads(box, 1.56) == 'C701002500000000'
+
+
+@pytest.mark.parametrize('late', ['8C02002A00000000', '8C02004E30000906'])
+def test_once_the_late_answer_has_come_the_toggle_is_free(box: Box, late: str) -> None:
+    gives_up(box, FIRST, 1.0)
+    reads(box, 1.51)
+    assert box.hears(late, 1.52) is False
+    assert box.begin(SECOND, 1.53) == ['8C02002A21000000']
+    assert box.hears('8C02002A00000000', 1.54) == Answered((0, 0))
+
+
+@pytest.mark.parametrize('now, sent', [
+    (2.49, '0000000000000000'), (2.5, '8C02002A21000000'),
+])
+def test_the_toggle_is_free_when_no_late_answer_can_come_any_more(
+        box: Box, now: float, sent: str) -> None:
+    """That is a time-out and 0.5 s after it was given up."""
+    gives_up(box, FIRST, 1.0)
+    reads(box, 1.51)
+    assert box.begin(SECOND, now) == [sent]
+
+
+@pytest.mark.parametrize('write, sent', [
+    (Write(Address(653), (33,)), '8D02002A21000000'),
+    (Write(Address(0x2007, 0x03), (33,)), '0720033A21000000'),
+])
+def test_another_address_is_not_mistaken(box: Box, write: Write, sent: str) -> None:
+    gives_up(box, FIRST, 1.0)
+    reads(box, 1.51)
+    assert box.begin(write, 1.52) == [sent]
+
+
+def test_two_registers_may_be_refused_by_the_late_answer_of_one(box: Box) -> None:
+    """A refusal does not say which function is refused."""
+    gives_up(box, FIRST, 1.0)
+    reads(box, 1.51)
+    assert box.begin(Write(Address(652), (33, 34)), 1.52) == ['0000000000000000']
+
+
+def test_where_both_toggles_are_taken_the_first_answer_is_not_believed(box: Box) -> None:
+    assert gives_up(box, FIRST, 1.0) == ['8C02002A2C000000']
+    assert gives_up(box, FIRST, 1.51) == ['8C0200AA2C000000']
+    assert box.begin(SECOND, 2.02) == ['0000000000000000']
+    assert box.hears('0000000000000000', 2.03) is True
+    assert box.take() == ['8C02002A21000000']
+    assert box.hears('8C02002A00000000', 2.04) is False
+    assert box.hears('8C02004E30000906', 2.05) == Refused(0x06090030)
+
+
+def test_lost_answers_are_not_waited_for_for_ever(box: Box) -> None:
+    """It was the answer to the third; that to the first will never come."""
+    assert gives_up(box, FIRST, 1.0) == ['8C02002A2C000000']
+    assert gives_up(box, FIRST, 1.51) == ['8C0200AA2C000000']
+    box.begin(SECOND, 2.02)
+    assert box.hears('0000000000000000', 2.03) is True
+    assert box.take() == ['8C02002A21000000']
+    assert box.hears('8C02002A00000000', 2.04) is False
+    assert box.box.handle_timer(2.53) == Silence(sent=True)
+    assert box.begin(SECOND, 2.54) == ['0000000000000000']
+    assert box.hears('0000000000000000', 2.55) is True
+    assert box.take() == ['8C02002A21000000']
+    assert box.hears('8C02002A00000000', 2.56) == Answered((0, 0))
+
+
+def test_write_that_had_to_make_room_has_its_time_to_be_late(box: Box) -> None:
+    assert box.begin(FIRST, 1.0) == ['8C02002A2C000000']
+    box.box.abandon(1.05)
+    assert box.box.handle_timer(1.05) == Silence(sent=True)
+    assert reads(box, 1.06) == 'C70100A500000000'
+    assert box.begin(SECOND, 2.49) == ['0000000000000000']
+
+
+def test_what_stops_a_drive_waits_for_no_toggle(box: Box) -> None:
+    assert gives_up(box, Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
+    reads(box, 1.51)
+    assert box.begin(blind(0), 1.52) == ['C701002A00000000']
+
+
+def test_what_the_bus_refused_takes_no_toggle(box: Box) -> None:
+    assert box.begin(FIRST, 1.0) == ['8C02002A2C000000']
+    box.left(False, 1.0)
+    assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
+    assert box.begin(SECOND, 1.1) == ['8C02002A21000000']
+    assert box.hears('8C02002A00000000', 1.11) == Answered((0, 0))

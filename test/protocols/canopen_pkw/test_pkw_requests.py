@@ -214,6 +214,25 @@ def test_lost_answer_of_a_write_is_never_repeated() -> None:
     assert talk.outcomes() == [[says('no_answer', timeout=0.1, attempts=1), 'written']]
 
 
+def test_late_acknowledgement_is_not_that_of_the_next_write() -> None:
+    """The device answers others meanwhile, and refuses the next one."""
+    talk = online(parameter_timeout=0.2, period=5.0)
+    assert asked(talk, write((FLC, 44))) == '505#8C02002A2C000000'
+    assert talk.until(10.261) == []
+    assert talk.submits(read(FLC_2), 10.265) == [IDLE]
+    assert talk.hears(IDLE_ANSWER, 10.266) == ['505#8D0200A500000000']
+    assert talk.hears('485#8D0200A53C000000', 10.267) == []
+    # the toggle is that of the one that was given up
+    assert talk.submits(write((FLC, 33)), 10.27) == [IDLE]
+    assert talk.hears(IDLE_ANSWER, 10.271) == ['505#8C0200AA21000000']
+    assert talk.hears('485#8C02002A00000000', 10.4) == []
+    assert talk.hears('485#8C0200CE30000906', 10.46) == []
+    assert talk.outcomes() == [
+        [says('no_answer', timeout=0.2, attempts=1)], [60],
+        [says('refused_by_drive', number=0x06090030)]]
+    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
+
+
 @pytest.mark.parametrize('late', ['485#8C02002A00000000', '485#8C02004E30000906'])
 def test_late_answer_to_a_write_is_no_sign_of_a_second_station(late: str) -> None:
     talk = online(parameter_timeout=0.2, period=5.0)
