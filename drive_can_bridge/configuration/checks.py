@@ -203,9 +203,9 @@ def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfig
     """Look for drives whose round of polling does not fit their period."""
     for drive in drives:
         shortest = FAMILIES[drive.protocol].shortest_period(drive, bus.bitrate)
-        if drive.period < shortest:
-            # rounded up: what is named here has to pass
-            allowed = math.ceil(shortest * 1e5 - 1e-6) / 1e5
+        # rounded up, but not for what binary fractions add: what is named here has to pass
+        allowed = math.ceil(shortest * 1e5 - 1e-6) / 1e5
+        if drive.period < min(shortest, allowed):
             tree.wrong(
                 ('drives', drive.name, 'period'),
                 says('period_too_short', period=drive.period, bitrate=bus.bitrate, least=allowed))

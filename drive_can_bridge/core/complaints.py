@@ -138,8 +138,8 @@ WORDS = {
         '{station} collides with drive {other} (station {other_station}) on bus {bus}: both '
         'use {purpose}; allowed is a station of its own',
     'period_too_short':
-        '{period:g} s is too short for a round of polling at {bitrate} bit/s, allowed is at '
-        'least {least:g} s',
+        '{period:.9g} s is too short for a round of polling at {bitrate} bit/s, allowed is at '
+        'least {least:.9g} s',
     'period_in_seconds':
         '{period:g} s from one exchange to the next: it is in seconds, {period:g} ms are '
         '{shorter:g}',

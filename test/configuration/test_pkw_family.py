@@ -153,6 +153,21 @@ def test_round_that_does_not_fit(tmp_path: Path) -> None:
            least=0.00624)]
 
 
+# two reads: 4 frames of 135 bits and 2 ms; most of them are no binary fractions
+@pytest.mark.parametrize(('bitrate', 'least'), [
+    (500_000, 0.00308), (250_000, 0.00416), (125_000, 0.00632), (800_000, 0.00268),
+    (1_000_000, 0.00254), (33_333, 0.01821), (47_543, 0.01336), (10_000, 0.056)])
+def test_the_shortest_period_that_is_named_is_allowed(tmp_path: Path, bitrate: int,
+                                                      least: float) -> None:
+    text = changed(changed(FILE, 'bitrate: 250000', f'bitrate: {bitrate}'),
+                   '        cyclic_request: [speed]\n', '')
+    too_short = changed(text, 'period: 0.1', f'period: {least - 1e-5:.5f}')
+    problem, = problems(tmp_path, too_short, PROFILE)
+    assert problem == at('f.yaml:15: drives.pump.period', 'period_too_short', least=least)
+    assert problem.endswith(f' {least} s')
+    assert problems(tmp_path, changed(text, 'period: 0.1', f'period: {least}'), PROFILE) == []
+
+
 @pytest.mark.parametrize(('old', 'new', 'problem'), [
     ('station: 5', 'station: 0',
      at('f.yaml:13: drives.pump.station', 'value_out_of_range', value=0, least=1, most=127,

@@ -198,6 +198,25 @@ def test_a_period_that_is_too_short(tmp_path: Path, bitrate: int, period: str,
               bitrate=bitrate, least=pytest.approx(shortest, abs=5e-6)) in found(tmp_path, text)
 
 
+# reads of 1 ms and two frames of 135 bits each
+@pytest.mark.parametrize(('reads', 'bitrate', 'least'), [
+    ('[actual]', 500_000, 0.00154),
+    ('[status, position]', 500_000, 0.00308),
+    ('[ramp, speed, status, position]', 500_000, 0.00616),
+    ('[ramp, speed, status, position]', 800_000, 0.00535),
+])
+def test_the_shortest_period_that_is_named_is_allowed(tmp_path: Path, reads: str, bitrate: int,
+                                                      least: float) -> None:
+    text = changed(MIXED, 'bitrate: 125000', f'bitrate: {bitrate}')
+    text = changed(text, '        cyclic_request: [speed, limit]\n', '')
+    text = changed(with_keys('allow_fast_cycle: true', text=text),
+                   '[actual, current, status]', reads)
+    too_short = changed(text, 'period: 0.02', f'period: {least - 1e-5:.5f}')
+    assert found(tmp_path, too_short) == [
+        at('f.yaml:15: drives.conveyor.period', 'period_too_short', least=least)]
+    assert found(tmp_path, changed(text, 'period: 0.02', f'period: {least}')) == []
+
+
 LISTS = {
     'three reads': '[actual, ramp, position]',      # 209, 30, 214
     'one read': '[actual]',
