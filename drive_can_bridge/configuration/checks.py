@@ -53,6 +53,9 @@ class Adapters(Protocol):
     def check_bitrate(self, interface: str, bitrate: int) -> Sentence | None:
         """Say why an adapter cannot be set to a bit rate; None: it may be possible."""
 
+    def serial_port(self, bus: BusConfiguration) -> tuple[str, ...]:
+        """Return what the serial port of a bus is known by here; empty: there is none."""
+
 
 def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfiguration]:
     """Check the ``buses`` of a tree that has passed its schema; return those that can be used."""
@@ -67,7 +70,7 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
             continue
         bus = BusConfiguration(name=name, **values, options={
             key: value for key, value in entry.items() if key not in values})
-        _look_for_twin(tree, bus, buses)
+        _look_for_twin(tree, bus, buses, adapters)
         if len(tree.problems) == known:
             buses[name] = bus
     _look_for_channels_of_others(tree, buses.values())
@@ -120,12 +123,18 @@ def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> No
                        says('no_home', value=values['trace_directory']))
 
 
-def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration]) -> None:
+def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration],
+                   adapters: Adapters | None) -> None:
+    """Look for an earlier bus at the same place; a serial port can be opened only once."""
+    path = ('buses', bus.name, 'channel')
+    port = set(adapters.serial_port(bus)) if adapters is not None else set()
     for other in others.values():
+        if adapters is not None and not port.isdisjoint(adapters.serial_port(other)):
+            tree.wrong(path, says('port_of_other_bus', channel=bus.channel, bus=other.name))
+            return
         if (bus.interface, str(bus.channel)) == (other.interface, str(other.channel)):
             tree.suspicious(
-                ('buses', bus.name, 'channel'),
-                says('channel_of_other_bus', channel=bus.channel, bus=other.name))
+                path, says('channel_of_other_bus', channel=bus.channel, bus=other.name))
             return
 
 

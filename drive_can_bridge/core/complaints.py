@@ -119,6 +119,8 @@ WORDS = {
     'channel_of_other_bus':
         '{channel!r} is also the channel of bus {bus}; identifiers and load are checked for '
         'each bus alone',
+    'port_of_other_bus':
+        '{channel!r} is the serial port of bus {bus}, too, allowed is a port of its own',
     'name_of_other_channel':
         "bus {bus} has a channel of this name: decode takes what other programs' traces have "
         'of it for this bus',

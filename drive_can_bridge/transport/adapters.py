@@ -18,8 +18,9 @@ import can
 import can.interfaces
 
 from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.sentences import Sentence
-from drive_can_bridge.transport.bus_identity import SERIAL_INTERFACES
+from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')
@@ -88,6 +89,12 @@ def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
         return None
     return says('no_bitrate', bitrate=bitrate, interface=interface,
                 allowed=', '.join(str(rate) for rate in sorted(rates)))
+
+
+def serial_port(bus: BusConfiguration) -> tuple[str, ...]:
+    """Return what the serial port of a bus is known by on this host; empty: there is none."""
+    identity = identity_of(bus)
+    return identity.names if identity.port else ()
 
 
 class _Unusable(Exception):

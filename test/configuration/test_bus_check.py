@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is wrong with a bus or with the whole: one changed line each."""
 
+from collections.abc import Iterator
+import os
 from pathlib import Path
 
 from configuration_builders import at, changed, FILE, load, local, parts, problems, warnings, write
@@ -8,8 +10,10 @@ import pytest
 from saying import says
 
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.sentences import Sentence, uncoded
+from drive_can_bridge.transport import adapters
 
 CASES = [
     ('bitrate: 125000', 'bitrate: 10000',
@@ -96,6 +100,9 @@ class Adapters:
     def check_bitrate(self, interface: str, bitrate: int) -> Sentence | None:
         return uncoded('impossible, allowed is 500000') if bitrate == 500 * 100 else None
 
+    def serial_port(self, bus: BusConfiguration) -> tuple[str, ...]:
+        return ()
+
 
 @pytest.mark.parametrize(('old', 'new', 'expected'), [
     ('interface: virtual', 'interface: virtul',
@@ -163,6 +170,46 @@ def test_bus_that_is_opened_twice(tmp_path: Path) -> None:
                    '      other: {interface: virtual, channel: demo}\n    drives:\n')
     assert warnings(tmp_path, text) == [
         at('f.yaml:9: buses.other.channel', 'channel_of_other_bus', channel='demo', bus='main')]
+
+
+@pytest.fixture
+def terminal() -> Iterator[str]:
+    near, far = os.openpty()
+    yield os.ttyname(far)
+    os.close(near)
+    os.close(far)
+
+
+def with_serial_buses(first: str, interface: str, second: str) -> str:
+    """Return a good file with a serial bus, and one more of this interface."""
+    text = changed(changed(FILE, 'interface: virtual', 'interface: slcan'), 'demo', f"'{first}'")
+    return changed(text, '    drives:\n',
+                   f"      other: {{interface: {interface}, channel: '{second}'}}\n    drives:\n")
+
+
+@pytest.mark.parametrize(('interface', 'spelled'), [
+    ('slcan', '{port}'), ('slcan', '/dev/..{port}'), ('slcan', '{port}@115200'),
+    ('slcan', '{folder}/adapter'), ('robotell', '{port}')])
+def test_serial_port_of_two_buses(tmp_path: Path, terminal: str, interface: str,
+                                  spelled: str) -> None:
+    (tmp_path / 'adapter').symlink_to(terminal)
+    second = spelled.format(port=terminal, folder=tmp_path)
+    text = with_serial_buses(terminal, interface, second)
+    assert problems(tmp_path, text, adapters=adapters) == [
+        at('f.yaml:9: buses.other.channel', 'port_of_other_bus', bus='main',
+           channel=second.replace(f'{tmp_path}/', ''))]
+
+
+def test_serial_port_of_two_buses_that_is_not_plugged_in(tmp_path: Path) -> None:
+    text = with_serial_buses('/dev/no_such_port', 'slcan', '/dev/../dev/no_such_port')
+    assert problems(tmp_path, text, adapters=adapters) == [
+        at('f.yaml:9: buses.other.channel', 'port_of_other_bus', bus='main')]
+
+
+def test_serial_ports_of_their_own(tmp_path: Path, terminal: str) -> None:
+    text = with_serial_buses(terminal, 'slcan', '/dev/no_such_port')
+    assert problems(tmp_path, text, adapters=adapters) == []
+    assert warnings(tmp_path, text, adapters=adapters) == []
 
 
 def test_bus_with_the_name_of_another_channel(tmp_path: Path) -> None:
