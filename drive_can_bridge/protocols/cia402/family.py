@@ -227,6 +227,9 @@ class Cia402(Family):
                     if place in taken:
                         yield Complaint(listed, says('mapped_already', name=parameter.name,
                                                      taken=taken[place]))
+                    elif pdo.is_map(parameter.index):
+                        yield Complaint(listed, says('mapped_already', name=parameter.name,
+                                                     taken='a mapping parameter'))
                     taken.setdefault(place, f"the same object as '{parameter.name}'")
                 elif parameter.index == STATUS_WORD:
                     yield Complaint(listed, says('status_word_mapped', name=parameter.name))

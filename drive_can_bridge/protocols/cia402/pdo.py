@@ -26,6 +26,9 @@ RPDO_COMMUNICATION, TPDO_COMMUNICATION, MAPPING_OFFSET = 0x1400, 0x1800, 0x200
 COB_ID, TRANSMISSION, INHIBIT_TIME, EVENT_TIMER = 1, 2, 3, 5
 INVALID, NO_REMOTE, LONG_IDENTIFIER = 1 << 31, 1 << 30, 1 << 29
 SYNCHRONOUS, EVENT_PROFILE, EVENT_MAKER = 1, 255, 254
+#: what says how a drive exchanges: identifiers and mapping of PDOs, SYNC, heartbeats,
+#: interpolation time
+_MAPS = frozenset((*range(0x1400, 0x1C00), 0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
 #: bytes of a number -> its code for struct, without and with sign
 _CODES = {1: 'Bb', 2: 'Hh', 4: 'Ii'}
 
@@ -33,6 +36,11 @@ _CODES = {1: 'Bb', 2: 'Hh', 4: 'Ii'}
 def width(parameter: Parameter) -> int:
     """Return how many bytes a parameter takes in the drive; a BOOLEAN is one."""
     return 1 if parameter.type is ParameterType.BOOL else parameter.type.bits // 8
+
+
+def is_map(index: int) -> bool:
+    """Tell whether an object is a mapping parameter."""
+    return index in _MAPS
 
 
 def mapping_entry(index: int, subindex: int, length: int) -> int:

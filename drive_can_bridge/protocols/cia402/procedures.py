@@ -18,16 +18,13 @@ from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
-from drive_can_bridge.protocols.cia402.pdo import width
+from drive_can_bridge.protocols.cia402.pdo import is_map, width
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
 NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
-#: what says how a drive exchanges: identifiers and mapping of PDOs, SYNC, heartbeats,
-#: interpolation time
+#: cell of every mapping parameter
 MAP = 'communication'
-_MAPS = frozenset((0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
-_PDOS = range(0x1400, 0x1C00)
 #: s that a drive may take until it acknowledges that all is stored: CiA 301 sets no limit. Told
 #: once more, it would wear its memory once more.
 STORE_TIMEOUT = 5.0
@@ -38,7 +35,7 @@ def cells(parameter: Parameter) -> Cells:
     index = parameter.index
     if index is None:
         return frozenset()
-    if index in _MAPS or index in _PDOS:
+    if is_map(index):
         return frozenset(((index, parameter.subindex or 0), MAP))
     return frozenset(((index, parameter.subindex or 0),))
 

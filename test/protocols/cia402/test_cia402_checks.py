@@ -90,6 +90,21 @@ def test_what_the_bridge_sends_by_itself() -> None:
             'built_in', name='status_word', family='cia402')}
 
 
+@pytest.mark.parametrize('index', [
+    0x1400, 0x15FF, 0x1600, 0x1800, 0x1A00, 0x1BFF, 0x1005, 0x1006, 0x1016, 0x1017, 0x60C2])
+def test_mapping_parameters_are_no_setpoints(index: int) -> None:
+    further = parameter('further', None, index=index, subindex=1)
+    assert wrong(request=(VELOCITY_TARGET, further)) == {'cyclic_request': says(
+        'mapped_already', name='further', taken='a mapping parameter')}
+    assert wrong(response=(VELOCITY, further)) == {}
+
+
+@pytest.mark.parametrize('index', [0x13FF, 0x1C00, 0x1007, 0x60C1])
+def test_what_is_next_to_mapping_parameters(index: int) -> None:
+    further = parameter('further', None, index=index, subindex=1)
+    assert wrong(request=(VELOCITY_TARGET, further)) == {}
+
+
 def test_times() -> None:
     for period in (0.0105, 66.0):
         assert wrong('pv', transmission='event', period=period) == {'period': says(
