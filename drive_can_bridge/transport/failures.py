@@ -62,6 +62,11 @@ def is_misconfiguration(error: BaseException) -> bool:
     return False
 
 
+def is_undefined(error: BaseException) -> bool:
+    """Tell whether an adapter uses a vendor's library that it has not found, and went on."""
+    return type(error) is NameError
+
+
 def _is_missing_library(error: OSError) -> bool:
     """Tell whether a vendor's library is not installed: told in words, not by the kernel."""
     text = str(error).lower()

@@ -18,6 +18,7 @@ from typing import Any
 import can
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.complaints import says
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
@@ -32,7 +33,8 @@ from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
 from drive_can_bridge.transport.failures import (
-    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, with_cause,
+    in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, is_undefined,
+    with_cause,
 )
 from drive_can_bridge.transport.serial_writer import (
     AdapterAnswers, announcing, SerialWriter, watched,
@@ -292,7 +294,10 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         port = Port(opened, clock, kernel_errors=bus.interface in _KERNEL_ERRORS, lock=lock)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
-        text = f'{where}: {in_words(error)}'
+        reason = in_words(error)
+        if is_undefined(error):
+            reason = says('driver_missing', interface=bus.interface, why=reason)
+        text = f'{where}: {reason}'
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
         if is_absence(error) and is_absent(bus):

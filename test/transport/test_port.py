@@ -19,8 +19,9 @@ import can
 from clocks import HandClock, REAL
 import pytest
 
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import BusUnavailable, TransportError
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module
 from drive_can_bridge.transport.port import open_port, Port
@@ -253,6 +254,21 @@ def test_controller_that_is_bus_off_is_not_opened(tmp_path: Path,
     with pytest.raises(BusUnavailable, match='^bus-off; .*"ip link set can7 down"'):
         port_module._check_carrier('can7')
     assert set(asked) == {('/sys/class/net', 'can7', 'carrier')}
+
+
+class NoLibrary(FakeBus):
+    """As Kvaser's adapter where canlib is not installed: nothing of it is defined."""
+
+    def __init__(self, channel: object, **_: object) -> None:
+        canGetNumberOfChannels()    # type: ignore[name-defined]  # noqa: F821
+
+
+def test_an_adapter_without_its_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('can.interface._get_class_for_interface', lambda _: NoLibrary)
+    with pytest.raises(BusMisconfigured) as caught:
+        open_port(BusConfiguration('main', 'kvaser', 0), REAL)
+    assert str(caught.value) == 'kvaser 0: ' + complaints.says(
+        'driver_missing', interface='kvaser', why="name 'canGetNumberOfChannels' is not defined")
 
 
 # -- serial adapters ------------------------------------------------------------------------------
