@@ -228,7 +228,7 @@ def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration
                 terminal.link(link / bus.name)
             output.say(f'bus {bus.name}: slcan {terminal.path}')
         else:
-            output.say(f'bus {bus.name}: {bus.interface} {bus.channel}')
+            output.say(f'bus {bus.name}: {bus.place}')
     stack.enter_context(simulation)
     for drive in simulation.drives.values():
         output.say(f'drive {describe(drive)[0]}')

@@ -12,6 +12,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.text import printable
 
 _PLACE = re.compile(r'(.*?):(\d+): (?:([\w.\[\]-]+): )?(.*)', re.DOTALL)
 
@@ -67,8 +68,8 @@ def summary(drive: DriveConfiguration, bus: BusConfiguration, share: float) -> s
 
     :param share: of the bus that its exchange takes at worst.
     """
-    return (f'{drive.name}: bus {drive.bus} ({bus.interface} {bus.channel}), {drive.protocol}, '
-            f'station {drive.station}, profile {drive.profile.name}, '
+    return (f'{drive.name}: bus {drive.bus} ({bus.place}), {drive.protocol}, '
+            f'station {drive.station}, profile {printable(drive.profile.name)}, '
             f'period {1000 * drive.period:g} ms, '
             f'request {_names(drive.cyclic_request)}, response {_names(drive.cyclic_response)}, '
             f'load {100 * share:.1f} %')

@@ -13,6 +13,7 @@ from typing import Any
 
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.text import printable
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,11 @@ class BusConfiguration:
     trace_directory: str = ''
     trace_files: int = 20
     options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def place(self) -> str:
+        """Name the bus as people do, printable: ``slcan /dev/ttyACM0``."""
+        return printable(f'{self.interface} {self.channel}')
 
 
 @dataclass(frozen=True)

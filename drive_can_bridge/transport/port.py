@@ -253,7 +253,7 @@ def open_port(bus: BusConfiguration, clock: Clock, routes: Sequence[Route] = (),
     :raises BusUnavailable: device absent, busy, or refusing for now; or another process has it:
         nothing was written then.
     """
-    where = f'{bus.interface} {bus.channel}'
+    where = bus.place
     reason = check_channel(bus.interface, bus.channel)
     if reason is not None:
         raise BusMisconfigured(f'{where}: {reason}')

@@ -55,6 +55,8 @@ def test_lines(story: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
             Path('f.yaml').write_text(changed(Path('f.yaml').read_text(), *rest.split(' => ')))
         elif verb == 'write':
             Path(file).write_text(json.loads(text))
+        elif verb == 'copy':
+            Path(json.loads(text)).write_text(Path(file).read_text())
         elif verb == 'pipe':
             Path(file).unlink(missing_ok=True)
             os.mkfifo(file)
@@ -65,6 +67,14 @@ def test_lines(story: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
             Path(file).write_text(BESIDE_DEEP[file] + nest * (200_000 // len(nest)))
         return []
     assert replayed(STORIES[story], step) == STORIES[story]
+
+
+def test_a_long_channel_is_cut(tmp_path: Path) -> None:
+    path = write(tmp_path, changed(FILE, 'channel: demo', f'channel: {100_000 * "x"}'))
+    done = run('validate', str(path))
+    assert done.returncode == 0
+    assert f'(virtual {247 * "x"}…)' in done.stdout
+    assert max(map(len, done.stdout.splitlines())) < 500
 
 
 @pytest.mark.parametrize(('arguments', 'program'), [
