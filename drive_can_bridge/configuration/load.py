@@ -25,6 +25,7 @@ from drive_can_bridge.configuration.checks import (
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
 from drive_can_bridge.configuration.profiles import ProfileStore
+from drive_can_bridge.configuration.quality_check import check_qualities
 from drive_can_bridge.configuration.schema import (
     ALL_OPTIONS, check_schema, check_value, checked_bridge, complete, definition,
 )
@@ -205,6 +206,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
 def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration:
     _forget_findings(tree)
     check_schema(tree, checked_bridge(), override=partial(_sentence, tree))
+    check_qualities(tree)
     values = complete('bridge', tree.data)
     _look_for_directories(tree, values['profile_directories'])
     store = ProfileStore(values['profile_directories'])

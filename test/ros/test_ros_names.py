@@ -127,10 +127,10 @@ def test_every_quality_can_be_overridden(bridge: StartBridge, client: Client, ke
 
 
 def test_a_quality_that_does_not_exist(bridge: StartBridge, client: Client) -> None:
-    bridge({**parameters(), 'qos_overrides': {
-        '/conveyor/actual_speed': {'publisher': {'reliability': 'perhaps'}}}}, autostart=False)
+    name = 'qos_overrides./conveyor/actual_speed.publisher.reliability'
+    bridge(autostart=False, arguments=('-p', f'{name}:=perhaps'))
     assert not client.transition(1)
-    client.wait_logged('perhaps', ERROR)
+    client.wait_logged(f"{name}: 'perhaps'", ERROR)
     assert client.state() == 'unconfigured'
     assert '/conveyor' not in client.nodes()
 
