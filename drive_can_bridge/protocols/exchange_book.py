@@ -11,6 +11,11 @@ that exchange, as far as samples are concerned. What it *shows* is another thing
 answer to a cycle before, which is merely late. So it shows that the oldest cycle was heard of
 which no answer has been seen; and one that comes while nothing waits is late where there is such a
 cycle, and nobody's where there is none.
+
+Some never come, and no answer says which. So cycles are given up after a while, or a drive that
+has lost a few would never be seen to answer the last one; but not those from before a stop that
+nothing has shown yet. What a gateway has held may come all the same, all at once. That is seen by
+being more than one answer since the last cycle: these are to what was given up, as far as it goes.
 """
 
 from collections import deque
@@ -93,6 +98,10 @@ class CycleTimer:
 
 #: s, and periods, after which nobody believes that an answer will come
 HORIZON, HORIZON_PERIODS = 0.5, 2.0
+#: s that the cycles of a stop take at most
+STOP_MAX = 1.0
+#: s after which nothing comes any more, not even all at once
+HELD_MAX = 5.0
 
 
 class Asked(NamedTuple):
@@ -122,8 +131,9 @@ class ExchangeBook:
     """
 
     __slots__ = (
-        '_asked', '_horizon', '_limit', '_period', '_runs', '_since', '_statistics', 'awaiting',
-        'began_at', 'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
+        '_asked', '_came', '_given_up', '_heard_at', '_horizon', '_kept', '_limit', '_period',
+        '_runs', '_since', '_statistics', '_steady', 'awaiting', 'began_at', 'missed_in_row',
+        'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
                  timer: CycleTimer | None = None) -> None:
@@ -134,8 +144,13 @@ class ExchangeBook:
         self.stale = 0
         self.stop_shown = False
         self._asked: deque[Asked] = deque()
+        self._given_up: deque[Asked] = deque()  # before those
+        self._came = 0              # answers since the last cycle
+        self._steady = False        # the one before was answered once
+        self._heard_at = -math.inf
         self._period = drive.period
         self._horizon = max(HORIZON, HORIZON_PERIODS * drive.period)
+        self._kept = self._horizon + max(STOP_MAX, drive.control_timeout)
         self._runs = 0
         self._since = -math.inf     # what waits for its answer was sent then
         self.overdue = 0.0
@@ -167,6 +182,10 @@ class ExchangeBook:
         self.began_at = now
         if runs:
             self.doubt()
+        steady = self._came == 1
+        if steady and self._steady:     # nothing is held
+            self._given_up.clear()
+        self._steady, self._came = steady, 0
         self._forget_older(now)
         self._asked.append(Asked(now, -1 if runs else self._runs))
 
@@ -181,8 +200,11 @@ class ExchangeBook:
 
     def heard(self, received_at: float) -> None:
         """Record an answer: to the oldest cycle that may still get one."""
-        if self._asked:
-            at, neutral = self._asked.popleft()
+        of = self._given_up if self._came and self._given_up else self._asked or self._given_up
+        if of:
+            at, neutral = of.popleft()
+            self._came += 1
+            self._heard_at = received_at
             self.stop_shown = self.stop_shown or neutral == self._runs
             self.overdue = max(0.0, received_at - at - self._period)
 
@@ -195,7 +217,7 @@ class ExchangeBook:
             left that it could answer.
         """
         self._forget_older(received_at)
-        if not self._asked:
+        if not self._asked and not self._given_up:
             return None
         before = self.overdue
         self.heard(received_at)
@@ -209,11 +231,29 @@ class ExchangeBook:
     def forget_asked(self) -> None:
         """Record that no answer to any cycle up to now is on its way."""
         self._asked.clear()
+        self._given_up.clear()
+
+    def give_up(self, silent: int) -> None:
+        """
+        Give up the answers to cycles from before a stop.
+
+        :param silent: but to so many that were sent since the drive has been silent.
+        """
+        asked = self._asked
+        before = [at for at, neutral in asked if neutral != self._runs]
+        kept = min(silent, sum(at > self._heard_at for at in before))
+        for _ in range(len(before) - kept):
+            self._given_up.append(asked.popleft())
 
     def _forget_older(self, now: float) -> None:
-        asked = self._asked
+        asked, given_up = self._asked, self._given_up
         while len(asked) > 1 and now - asked[0][0] > self._horizon:     # the last: as late as ever
-            asked.popleft()
+            if (not self.stop_shown and asked[-1].neutral == self._runs != asked[0].neutral
+                    and now - asked[0][0] <= self._kept):
+                break   # a stop is not shown by answers to what it ended
+            given_up.append(asked.popleft())
+        while given_up and now - given_up[0][0] > HELD_MAX:
+            given_up.popleft()
 
     # -- answers ----------------------------------------------------------------------------------
 

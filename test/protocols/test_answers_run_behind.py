@@ -7,8 +7,10 @@ and is named as one that may; one that heard it is not, whatever got lost before
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 import heapq
 from itertools import count
+import math
 from typing import Any
 
 from builders import (
@@ -18,7 +20,7 @@ from literal_drives import ExtendedDrive, ServoDrive
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import AnswerLate, Event, FrameRejected, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.session import Session
@@ -97,6 +99,7 @@ KINDS = {
     'cannord group of four': lambda period: _cannord(period, 4),
     '29 bit': lambda period: _extended(period, slot=False),
     '29 bit, word in a slot': lambda period: _extended(period, slot=True),
+    '29 bit, setpoint only': lambda period: _extended(period, slot=False, mapping='assume'),
     '29 bit, maps assumed': lambda period: _extended(period, slot=True, mapping='assume'),
 }
 
@@ -104,14 +107,16 @@ KINDS = {
 class Bus:
     """Sessions that share a bus, and drives whose answers take a while."""
 
-    def __init__(self, kind: str, period: float, delay: float) -> None:
+    def __init__(self, kind: str, period: float, delay: float, missed_limit: int = 3) -> None:
         configurations, self.devices = KINDS[kind](period)
-        self.sessions: Sequence[Session] = make_sessions(configurations)
+        self.sessions: Sequence[Session] = make_sessions([
+            replace(each, missed_limit=missed_limit) for each in configurations])
         self.events: list[list[Event]] = [[] for _ in self.sessions]
         self.delay = delay
         self.now = 10.0
         self.deaf: set[int] = set()
         self.lose = 0           # so many answers get lost
+        self.held_until = -math.inf     # by a gateway, which then lets them go
         self.coming: list[tuple[float, int, int, Frame]] = []
         self.number = count()
         self.sent: list[tuple[float, Frame]] = []
@@ -140,7 +145,7 @@ class Bus:
                 self.lose -= 1
             else:
                 heapq.heappush(self.coming, (
-                    self.now + self.delay, next(self.number), index, each))
+                    max(self.now + self.delay, self.held_until), next(self.number), index, each))
 
     def live(self, seconds: float) -> None:
         end = self.now + seconds
@@ -167,8 +172,15 @@ class Bus:
             self.live(1.0)
         for value in (0.0, 100.0):
             leader.services.command(0, value, self.now)
-            self.live(0.15)
+            self.live(max(0.15, 1.1 * leader.configuration.period))
         assert all(device.runs for device in self.devices)
+
+    def run_on(self, seconds: float) -> None:
+        """Go on with commands, which grow old."""
+        end = self.now + seconds
+        while self.now < end:
+            self.sessions[0].services.command(0, 100.0, self.now)
+            self.live(min(0.1, end - self.now))
 
     def stop(self) -> list[bool]:
         """End; return of which drives it was said that they may still be running."""
@@ -186,10 +198,13 @@ class Bus:
 
 LAGS = [(period, lag * period) for period in (0.01, 0.05) for lag in (
     0.2, 0.9, 1.3, 1.6, 2.2, 2.7)]
+#: longer than what sets up a servo waits for an answer
+LONG_LAGS = [(0.15, 0.4), (0.2, 0.45)]
+BEHIND = [(kind, *lag) for kind in KINDS for lag in (*LAGS, *LONG_LAGS)
+          if kind != 'cia402' or lag in LAGS]
 
 
-@pytest.mark.parametrize(('period', 'delay'), LAGS)
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
         kind: str, period: float, delay: float) -> None:
     for place in range(5):
@@ -200,8 +215,7 @@ def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
         assert bus.stop() == [True] * len(bus.devices)
 
 
-@pytest.mark.parametrize(('period', 'delay'), LAGS)
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: float) -> None:
     for place in range(5):
         bus = Bus(kind, period, delay)
@@ -325,6 +339,80 @@ def test_a_group_whose_answers_take_longer_than_a_period_comes_online(
                    for events in bus.events for event in events)
 
 
+# -- answers that are held, and come all at once --------------------------------------------------
+
+
+#: period, ``missed_limit``, s of answers that are held until the stop, and from then on
+HELD = [(0.2, 3, 0.56, 0.5), (0.2, 3, 0.5, 0.45), (0.2, 3, 0.42, 0.3), (0.1, 30, 0.55, 0.45),
+        (0.1, 30, 0.25, 0.3), (0.1, 30, 0.65, 0.3), (0.1, 30, 1.5, 0.55), (0.02, 3, 0.05, 0.3),
+        (0.02, 100, 0.6, 0.06), (0.02, 100, 0.6, 0.2)]
+ALONE = [kind for kind in KINDS if 'group' not in kind]
+
+
+@pytest.mark.parametrize(('period', 'limit', 'held', 'longer'), HELD)
+@pytest.mark.parametrize('kind', ALONE)
+def test_what_was_held_until_a_stop_does_not_show_it(
+        kind: str, period: float, limit: int, held: float, longer: float) -> None:
+    for place in range(5):
+        bus = Bus(kind, period, 0.002, limit)
+        bus.run()
+        bus.run_on(0.2 * place * period)
+        bus.held_until = bus.now + held + longer
+        bus.run_on(held)
+        bus.deaf = {0}
+        assert bus.stop() == [True]
+        assert bus.devices[0].runs
+
+
+@pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])
+def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: float) -> None:
+    for place in range(5):
+        bus = Bus('29 bit, setpoint only', 0.1, 0.002, 30)
+        bus.run()
+        bus.run_on(0.02 * place)
+        bus.held_until = bus.now + held + longer
+        bus.run_on(held)
+        bus.deaf = {0}
+        bus.sessions[0].services.submit(ControlRequest(ControlAction.QUICK_STOP), bus.now)
+        bus.look()
+        bus.live(2.5)
+        done, = (each for each in bus.events[0] if isinstance(each, ControlCompleted))
+        assert (done.success, done.message.code) == (False, 'may_still_be_running')
+
+
+@pytest.mark.parametrize(('period', 'limit', 'lost'), [
+    (0.2, 3, 2), (0.2, 30, 12), (0.1, 30, 4), (0.1, 30, 20), (0.02, 100, 3), (0.02, 100, 80)])
+@pytest.mark.parametrize('kind', ALONE)
+def test_what_was_lost_until_a_stop_is_no_doubt(
+        kind: str, period: float, limit: int, lost: int) -> None:
+    for place in range(5):
+        bus = Bus(kind, period, 0.002, limit)
+        bus.run()
+        bus.run_on(0.2 * place * period)
+        bus.lose = 1000
+        bus.run_on(lost * period)
+        bus.lose = 0
+        assert bus.stop() == [False]
+
+
+@pytest.mark.parametrize(('period', 'limit', 'lost'), [
+    (0.4, 3, 1), (0.4, 30, 12), (0.2, 30, 12), (0.1, 30, 20), (0.02, 100, 80)])
+def test_what_was_lost_until_a_quick_stop_is_no_doubt(
+        period: float, limit: int, lost: int) -> None:
+    for place in range(5):
+        bus = Bus('29 bit, setpoint only', period, 0.002, limit)
+        bus.run()
+        bus.run_on(0.2 * place * period)
+        bus.lose = 1000
+        bus.run_on(lost * period)
+        bus.lose = 0
+        bus.sessions[0].services.submit(ControlRequest(ControlAction.QUICK_STOP), bus.now)
+        bus.look()
+        bus.live(2.5)
+        done, = (each for each in bus.events[0] if isinstance(each, ControlCompleted))
+        assert done.success
+
+
 # -- late answers are counted, and are no sign of a second station --------------------------------
 
 
@@ -370,3 +458,33 @@ def test_at_most_one_for_each_missed_exchange(kind: str) -> None:
         bus.live(0.0005)
     assert statistics.late <= 2
     assert statistics.rejected >= 3 - 1
+
+
+@pytest.mark.parametrize(('held', 'missed'), [(0.28, 2), (0.7, 6), (1.5, 14), (4.0, 39)])
+@pytest.mark.parametrize('kind', ['cannord', '29 bit, maps assumed'])
+def test_answers_that_were_held_are_late_however_late(
+        kind: str, held: float, missed: int) -> None:
+    bus = Bus(kind, 0.1, 0.002)
+    bus.live(0.05)
+    statistics = bus.sessions[0].statistics
+    bus.held_until = bus.now + held
+    bus.live(held + 1.0)
+    assert (statistics.missed, statistics.late, statistics.rejected) == (missed, missed, 0)
+
+
+@pytest.mark.parametrize('kind', ['cannord', '29 bit, maps assumed'])
+def test_what_was_missed_long_ago_hides_no_second_station(kind: str) -> None:
+    bus = Bus(kind, 0.1, 0.002)
+    bus.deaf = {0}
+    bus.live(3.0)
+    bus.deaf = set()
+    bus.live(1.0)
+    statistics = bus.sessions[0].statistics
+    rejected, late = statistics.rejected, statistics.late
+    assert (rejected, late) == (0, 0)
+    twice = {'cannord': '003#310B0000'}.get(kind, '103FFFF0#0000000000010000')
+    for _ in range(20):
+        bus.live(0.1)
+        bus.sessions[0].receive_frame(frame(twice), bus.now)
+        bus.look()
+    assert statistics.rejected > 10
