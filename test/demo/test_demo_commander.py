@@ -1,11 +1,24 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What ``drive_can demo --drive`` commands."""
 
+from collections.abc import Callable
+import os
+import signal
+import sys
+from typing import Any
+
 import pytest
 
 pytest.importorskip('rclpy')
 
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import uninstall_signal_handlers
+from waiting import wait_for
+
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Value
+from drive_can_bridge.resources import config_file
+from drive_can_bridge.ros.demo import commander
 from drive_can_bridge.ros.demo.commander import commanded, limits, neutral, SINE_PERIOD
 
 SPEED = Parameter('speed_setpoint', ParameterType.INT16, scale=0.1, unit='rpm', scaled=True,
@@ -47,3 +60,27 @@ def test_nothing_is_commanded_that_would_be_refused(parameter: Parameter) -> Non
 def test_neutral_is_what_arms() -> None:
     parameter = Parameter('speed', scale=0.1, scaled=True, neutral=5.0)
     assert parameter.raw_from_value(neutral(parameter)) == parameter.neutral_raw
+
+
+@pytest.mark.filterwarnings('error::pytest.PytestUnraisableExceptionWarning')
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(('owner', 'step'), [
+    (rclpy, 'init'), (Node, 'create_publisher'), (Node, 'create_client'),
+    (Node, 'create_subscription'), (Node, 'create_timer')],
+    ids=['init', 'publisher', 'client', 'subscription', 'timer'])
+def test_it_may_be_ended_while_it_still_begins(
+        monkeypatch: pytest.MonkeyPatch, owner: Any, step: str, number: int) -> None:
+    true_step: Callable[..., Any] = getattr(owner, step)
+
+    def ended(*arguments: Any, **options: Any) -> Any:
+        done = true_step(*arguments, **options)
+        os.kill(os.getpid(), number)
+        wait_for(lambda: not rclpy.ok(), 'the handler of rclpy')
+        return done
+    monkeypatch.setattr(owner, step, ended)
+    monkeypatch.setattr(sys, 'argv', ['commander', str(config_file('demo.yaml'))])
+    try:
+        assert commander.main() == 0
+    finally:
+        rclpy.try_shutdown()
+        uninstall_signal_handlers()

@@ -13,6 +13,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import rclpy
+from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -20,10 +21,10 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
 
 from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.monitor.snapshot import read_status, Report
-from drive_can_bridge.ros.middleware import RCLError
+from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.monitor.client import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.quantities import quantity_of
@@ -93,7 +94,19 @@ class _DriveCommander:
 def main() -> int:
     """Command all drives of a parameter file, until the process is ended."""
     configuration = configuration_from_file(sys.argv[1])
-    rclpy.init(args=[])
+    try:
+        rclpy.init(args=[])
+        _command(configuration)
+    except KeyboardInterrupt:   # SIGINT
+        pass
+    except (ExternalShutdownException, NotInitializedException, *GONE):
+        if rclpy.ok():
+            raise
+        # SIGTERM: rclpy takes the context away, from whatever is being done or still made
+    return 0
+
+
+def _command(configuration: BridgeConfiguration) -> None:
     node = Node(NODE_NAME, start_parameter_services=False, enable_rosout=False)
     drives = {name: _DriveCommander(node, drive, delay=index * SINE_PERIOD / 8)
               for index, (name, drive) in enumerate(configuration.drives.items())}
@@ -109,14 +122,8 @@ def main() -> int:
             drive.command(time.monotonic())
     node.create_subscription(DiagnosticArray, '/diagnostics', take, QoSProfile(depth=10))
     node.create_timer(COMMAND_PERIOD, command)
-    try:
+    if rclpy.ok():  # an executor that cannot be made any more complains at its own end
         rclpy.spin(node)
-    except ExternalShutdownException:  # SIGTERM
-        pass
-    except RCLError:    # SIGTERM in the middle of a command
-        if rclpy.ok():
-            raise
-    return 0
 
 
 def neutral(parameter: Parameter) -> Value:
