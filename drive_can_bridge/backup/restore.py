@@ -325,6 +325,7 @@ class RestoreResult:
     What became of it.
 
     :param written: names of the settings that were written, in that order.
+    :param unconfirmed: that under way when the conversation ended, which may have been written.
     :param steps: steps of the profile that failed.
     :param stored: the drive was told to store all, and said that it has.
     :param wrong: what is not as in the file. Empty after an interruption: nothing was compared.
@@ -334,6 +335,7 @@ class RestoreResult:
     """
 
     written: list[str] = field(default_factory=list)
+    unconfirmed: list[str] = field(default_factory=list)
     steps: list[FailedStep] = field(default_factory=list)
     stored: bool = False
     wrong: list[NotAsInFile] = field(default_factory=list)
@@ -402,7 +404,7 @@ class Restorer:
         try:
             if self._stopped or result.enabled:
                 result.stopped = [change.name for change in self._plan.changes
-                                  if change.name not in result.written]
+                                  if change.name not in (*result.written, *result.unconfirmed)]
             elif result.trouble is None:
                 self._compare()
         except DriveCanError as error:
@@ -458,6 +460,10 @@ class Restorer:
             self._interrupted = True
             # the write under way is known before this is raised
             outcome = heard[0] if heard else WriteOutcome(name, False, reason='interrupted')
+        except DriveCanError:
+            if heard and name not in self._result.written:
+                self._result.unconfirmed.append(name)
+            raise
         if outcome.ok:
             self._reasons.pop(name, None)
             self._note_written(name)

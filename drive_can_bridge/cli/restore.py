@@ -14,7 +14,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import counting, print_table
-from drive_can_bridge.client.drive import Drive, Enabled, Source
+from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.requests import tells_nothing
@@ -216,7 +216,9 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         # what nothing was compared after is told by what was written
         early = str(result.trouble or ('' if result.stopped is None else why))
         for change in plan.changes:
-            if early and change.name not in result.written:
+            if change.name in result.unconfirmed:
+                _print_outcome(drive, change.name, False, None, change.value, NOT_CONFIRMED)
+            elif early and change.name not in result.written:
                 _print_outcome(drive, change.name, False, None, change.value, early)
             elif change.name not in wrong:
                 _print_outcome(drive, change.name, True, change.value, change.value, '')
@@ -233,6 +235,8 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
                  f'({_WHY_VOLATILE[drive.facts.persist_writes]})')
     if result.trouble is not None:
         complain(f'{drive.name}: {result.trouble}')
+    for name in result.unconfirmed:
+        complain(f'{drive.name}: {name}: {NOT_CONFIRMED}')
     if result.stopped is not None:
         complain(
             f'{drive.name}: {why}. Written: {_list(result.written)}. Not written: '

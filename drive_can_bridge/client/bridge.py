@@ -19,7 +19,7 @@ from drive_can_bridge.core.parameters import (
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, taken_apart
-from drive_can_bridge.ros.client.search import find_drives, Graph
+from drive_can_bridge.ros.client.search import find_drives, Graph, NoAnswer
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
 
@@ -163,8 +163,11 @@ class BridgedDrive(Drive):
 
     def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
         # the bridge tries what is offline, too
-        answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
-            parameters=[message_of(name, parameter, value)]))
+        try:
+            answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
+                parameters=[message_of(name, parameter, value)]))
+        except NoAnswer as trouble:
+            return WriteOutcome.under_way(name, parameter, trouble)
         result, = answer.results
         return WriteOutcome(name, result.successful, parameter, result.reason)
 

@@ -359,7 +359,10 @@ class DirectDrive(Drive):
         request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),),
                                blind=blind)
         self._conversation.submit(self.name, request)
-        outcome, = self._conversation.wait(request)
+        try:
+            outcome, = self._conversation.wait(request)
+        except DriveCanError as trouble:
+            return WriteOutcome.under_way(name, parameter, trouble)
         if isinstance(outcome, Written):
             return WriteOutcome(name, True, parameter, outcome.note)
         reason = outcome.reason if isinstance(outcome, Failure) else no_result()

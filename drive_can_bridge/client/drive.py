@@ -39,6 +39,11 @@ from drive_can_bridge.core.roles import Role
 from drive_can_bridge.process.signals import finish_first
 
 
+#: of a write under way when the conversation ended, and of those that were to follow
+NOT_CONFIRMED = 'not confirmed: it may have been written'
+ENDED_BEFORE = 'ended before'
+
+
 class Enabled(Enum):
     """Whether a drive may move by the word of its master."""
 
@@ -79,12 +84,20 @@ class WriteOutcome:
     :param ok: acknowledged by the drive, or read back; or sent, where ``reason`` says that nothing
         more is known (``verify_writes: false``).
     :param reason: why it failed, in words; or that note.
+    :param trouble: what ended the conversation while the drive was asked to take it: whether it
+        did nobody knows; None: nothing.
     """
 
     name: str
     ok: bool
     parameter: Parameter | None = None
     reason: str = ''
+    trouble: DriveCanError | None = None
+
+    @classmethod
+    def under_way(cls, name: str, parameter: Parameter, trouble: DriveCanError) -> 'WriteOutcome':
+        """Return that of a write under way when the conversation ended."""
+        return cls(name, False, parameter, NOT_CONFIRMED, trouble)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +239,8 @@ class Drive(ABC):
         :param values: in the units of the parameters; raw names take raw integers.
         :param blind: nobody looks first whether the drive is there, or has the value already: it
             may hear although its answers get lost.
-        :param told: is told each outcome before the next write begins.
+        :param told: is told each outcome before the next write begins; also that of one under way
+            when the conversation ends.
         :raises KeyboardInterrupt: on Ctrl-C; not before the write under way has its outcome, and
             ``told`` knows it.
         """
@@ -242,6 +256,8 @@ class Drive(ABC):
                 found[name] = outcome
                 if told is not None:
                     told(outcome)
+                if outcome.trouble is not None:
+                    raise outcome.trouble
         return found
 
     @abstractmethod
@@ -269,7 +285,11 @@ class Drive(ABC):
 
     @abstractmethod
     def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
-        """Write a value that nothing speaks against; without looking first if ``blind``."""
+        """
+        Write a value that nothing speaks against; without looking first if ``blind``.
+
+        :raises DriveCanError: the conversation has ended, before the drive was asked to take it.
+        """
 
 
 class NoDrive(DriveCanError, KeyError):

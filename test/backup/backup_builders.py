@@ -53,6 +53,7 @@ class Shop:
     One drive of each family, simulated, and a parameter file for whoever wants to reach them.
 
     :ivar file: the parameter file.
+    :ivar wire: what connects everybody.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -61,6 +62,7 @@ class Shop:
         assert world.current is not None
         self.clock = world.current.clock
         channel = f'backup_{next(_CHANNELS)}'
+        self.wire = world.current.wires.of(channel)
         self.file.write_text(ALL_FAMILIES.read_text().replace(
             'channel: all_families', f'channel: {channel}'))
         self.simulation = Simulation(configuration_from_file(self.file), self.clock)

@@ -35,6 +35,7 @@ class Fate(Enum):
     AWAY = 'power is cut before it, for 5 s'
     CUT = 'it is obeyed, then power is cut for 5 s'
     BUS = 'the bus is lost before it'
+    BUS_BEHIND = 'it is obeyed, and the bus is lost before its answer'
     SIGNAL = 'it is done, and a signal came meanwhile'
     BROKEN_OFF = 'it is done, and a second signal breaks in'
     ENABLED = 'it is done, and somebody enables the drive'
@@ -143,6 +144,9 @@ class ScriptedDrive(Drive):
             self.registers[name] = int(value)
         if fate is Fate.KILLED_AFTER:
             raise Killed
+        if fate is Fate.BUS_BEHIND:
+            self._bus_lost = True
+            return WriteOutcome.under_way(name, parameter, DriveCanError('bus main: is gone'))
         if fate is Fate.CUT:
             self._away_until = self.now + 5.0
         self._mute = self._mute or fate is Fate.MUTE

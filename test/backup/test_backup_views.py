@@ -8,6 +8,7 @@ import signal
 from typing import Any
 
 from backup_builders import Command, Shop
+from builders import frame
 import pytest
 from transcripts import replayed, stories
 
@@ -99,6 +100,11 @@ class Story:
             self.shop.drives[name].set_value('status_word', 0x0002)
             return outcome
         self.patch.setattr(DirectDrive, 'put', enabled_by_now)
+
+    def _behind(self, seen: str, then: str) -> None:
+        """Have a stranger send a frame once another one is on the bus."""
+        self.shop.wire.watchers.append(
+            lambda each: self.shop.wire.carry(frame(then)) if each == frame(seen) else None)
 
     def _store_fails(self, reason: str) -> None:
         put = DirectDrive.put

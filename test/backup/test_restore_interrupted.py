@@ -59,6 +59,16 @@ def test_nothing_is_written_to_a_drive_that_somebody_enables(number: int) -> Non
         *['asked', 'write'] * number, 'asked', 'write']
 
 
+@pytest.mark.parametrize('number', range(2, 5))
+def test_what_was_under_way_when_the_bus_was_lost_may_have_been_written(number: int) -> None:
+    drive = ScriptedDrive({number: Fate.BUS_BEHIND})
+    result = restored(drive)
+    name = list(SETTINGS)[number - 2]
+    assert (result.unconfirmed, drive.registers[name]) == ([name], FILE[name])
+    assert result.written == list(SETTINGS)[:number - 2]
+    assert str(result.trouble) == 'bus main: is gone'
+
+
 def test_a_drive_that_is_enabled_by_now_is_told_nothing() -> None:
     drive = ScriptedDrive()
     drive.is_enabled = True
@@ -79,12 +89,15 @@ def test_whatever_comes_between() -> None:
         fates, told = set(story.values()), f'{story}: {result}'
         # left in its mode only where nothing could be done about it, and then it is said
         if drive.in_mode:
-            assert fates & {Fate.DEAF, Fate.BUS, Fate.REFUSED, Fate.LOST}, told
+            assert fates & {Fate.DEAF, Fate.BUS, Fate.BUS_BEHIND, Fate.REFUSED, Fate.LOST}, told
             assert result.steps, told
         # nothing is said to be written that is not
         for name in result.written:
             assert drive.registers[name] == FILE[name], told
         assert not result.complete or drive.registers == FILE, told
+        # and nothing not to be that may be
+        assert len(result.unconfirmed) <= (Fate.BUS_BEHIND in fates), told
+        assert not set(result.unconfirmed) & set(result.stopped or ()), told
         # nothing but the way out of the mode once somebody has enabled it
         assert set(drive.moving) <= {'mode'}, told
         assert drive.now < 40.0, told
