@@ -8,7 +8,7 @@ import re
 from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
 from drive_can_bridge.cli.output import counting, print_table
-from drive_can_bridge.client.drive import Drive, Drives, WriteOutcome
+from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.yaml_nodes import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES
@@ -89,8 +89,11 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
                 for name in wanted:
                     drive.write({name: checked[drive, name][0]}, told=told)
                     step()
-    finally:    # also what was written before Ctrl-C, or before the bus was lost
-        _show(args, drives, wanted, outcomes)
+    finally:    # also where Ctrl-C, another master or the loss of the bus came between
+        known = {(drive, outcome.name) for drive, outcome in outcomes}
+        _show(args, drives, wanted, [*outcomes, *(
+            (drive, WriteOutcome(name, False, drive.find(name), ENDED_BEFORE))
+            for drive, name in checked if (drive, name) not in known)])
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
 
 
@@ -147,11 +150,12 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
                         'reason': outcome.reason})
             continue
         result = outcome.reason or 'written'
+        refused = not outcome.ok and outcome.trouble is None
         rows.append((
             drive.name if len(drives) > 1 else '', outcome.name, wanted[outcome.name],
             parameter.unit if parameter else '', parameter.address if parameter else '',
             parameter.storage.value if parameter and parameter.storage else '',
-            result if outcome.ok else f'not written: {result}'))
+            f'not written: {result}' if refused else result))
     if rows:
         print_table(_HEADINGS, rows, numbers=('value',))
     lost = dict.fromkeys(FAMILIES[drive.facts.protocol].keeps_by

@@ -7,8 +7,10 @@ import io
 import json
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
+from typing import Any
 
 from builders import frame
 from client_builders import a_world, CONVEYOR, LIFT, parameter_file, stranger, World
@@ -17,6 +19,8 @@ from transcripts import replayed, shown, stories
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import open_drives
+from drive_can_bridge.client.direct import DirectDrive
+from drive_can_bridge.client.drive import WriteOutcome
 
 #: why nobody is asked
 REFUSED = {
@@ -53,8 +57,19 @@ def test_no_option_is_abbreviated(run: Run) -> None:
     assert ended.value.code == 2
 
 
+def interrupt(patch: pytest.MonkeyPatch) -> None:
+    """Have Ctrl-C typed during the first write."""
+    put = DirectDrive.put
+
+    def interrupted(*args: Any, **options: Any) -> WriteOutcome:
+        patch.setattr(DirectDrive, 'put', put)
+        signal.raise_signal(signal.SIGINT)
+        return put(*args, **options)
+    patch.setattr(DirectDrive, 'put', interrupted)
+
+
 @pytest.mark.parametrize('story', STORIES)
-def test_lines(story: str, run: Run, world: World) -> None:
+def test_lines(story: str, run: Run, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     def step(step: str) -> list[str]:
         first, *words = step.split()
         if first in ('read', 'write'):
@@ -62,6 +77,13 @@ def test_lines(story: str, run: Run, world: World) -> None:
             return shown(lines, errors.splitlines(), code)
         if first == 'frames':
             return [str(len(world.seen()))]
+        if first == 'behind':
+            seen, then = map(frame, words)
+            world.wire.watchers.append(lambda each: world.send(then) if each == seen else None)
+            return []
+        if first == 'interrupted':
+            interrupt(monkeypatch)
+            return []
         drive = world.drives[words[0]]
         if first == 'set':
             drive.set_value(words[1], float(words[2]))
