@@ -486,7 +486,8 @@ class Channel(Generic[StepT, ReplyT]):
             if key is not None:
                 self._quarantine.begin(key, since + transactor.silence)
         # it had to make room, or is not believed: that was no attempt
-        if silent and hurried and transactor.repeatable(step):
+        if silent and hurried and transactor.repeatable(
+                step, users=queue.priority is Priority.USERS):
             queue.attempts_left += 1
         if silent and queue.attempts_left > 0:
             queue.repeated = True

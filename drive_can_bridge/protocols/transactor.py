@@ -101,8 +101,12 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
         """Tell whether a reply says that nobody answered, and a late answer may come."""
 
-    def repeatable(self, step: StepT) -> bool:
-        """Tell whether a step that had to make room, or is not believed, is done once more."""
+    def repeatable(self, step: StepT, *, users: bool) -> bool:
+        """
+        Tell whether a step that had to make room, or is not believed, is done once more.
+
+        :param users: somebody else asked for it: a write of theirs is done once.
+        """
         return True
 
     @property

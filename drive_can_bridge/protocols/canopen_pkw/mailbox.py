@@ -174,7 +174,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
     def unanswered(self, step: Step, reply: Reply) -> bool:
         return isinstance(reply, Silence) and (isinstance(step, Read) or reply.sent)
 
-    def repeatable(self, step: Step) -> bool:
+    def repeatable(self, step: Step, *, users: bool) -> bool:
         return isinstance(step, Read)
 
     def answers(self, answer: Message, step: Step) -> bool:

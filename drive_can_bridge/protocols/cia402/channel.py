@@ -192,6 +192,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
     def unanswered(self, step: Ask, reply: Reply) -> bool:
         return reply is SILENT
 
+    def repeatable(self, step: Ask, *, users: bool) -> bool:
+        return not users or step.data is None
+
     def abandon(self, until: float) -> None:
         self._abandoned = self.busy
         self.deadline = min(self.deadline, until)

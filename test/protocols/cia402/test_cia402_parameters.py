@@ -211,3 +211,17 @@ def test_a_stop_does_not_wait_for_what_stores() -> None:
     axis.deliver(axis.talk.deactivate(axis.now))
     axis.live(1.0)
     assert axis.session.stopped
+
+
+@pytest.mark.parametrize(('request_', 'frame', 'times'), [
+    (write((WORD, 3)), '605#2B03200003000000', 1), (read(WORD), '605#4003200000000000', 4)])
+def test_what_makes_room_for_a_stop_is_written_once(
+        axis: Axis, request_: Any, frame: str, times: int) -> None:
+    takes = axis.drive.takes
+    axis.drive.takes = lambda sent: (    # type: ignore[method-assign]
+        [] if str(sent).startswith(frame) else takes(sent))
+    axis.deliver(axis.talk.submits(request_, axis.now))
+    axis.session._channel.make_room(axis.now)
+    axis.live(2.0)
+    assert axis.take().count(frame) == times
+    assert len(axis.talk.events(RequestCompleted)) == 1
