@@ -130,6 +130,8 @@ MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
+#: what ends these like Ctrl-C; the last one when a terminal is closed, or its ssh session breaks off
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
 #: only shows things: a reader who stops has seen enough
 SHOWING = ('validate', 'decode', 'profile')
 #: exit codes of what could not be done, where 1 says something else
@@ -158,7 +160,9 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
         _look_after_outputs()
     code = None
     if argv is None and endless:  # until the subcommand looks after signals itself
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        for number in _ENDING:
+            if signal.getsignal(number) is not signal.SIG_IGN:      # nohup
+                signal.signal(number, signal.default_int_handler)
     try:
         if argv is None:
             let_signals_in()
@@ -194,7 +198,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
         return failed
     finally:
         if argv is None and endless:  # all is done; Python takes a moment to leave
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in (signal.SIGINT, *_ENDING):
                 signal.signal(number, signal.SIG_IGN)
 
 

@@ -3,7 +3,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 import math
 from pathlib import Path
 import sys
@@ -282,13 +282,16 @@ class _Status:
 
     def show(self, text: str) -> None:
         """Replace the line."""
-        if self._stream is not None:
-            self._stream.write(f'\r{text.ljust(self._width)}')
-            self._stream.flush()
-            self._width = len(text)
+        self._write(f'\r{text.ljust(self._width)}')
+        self._width = len(text)
 
     def clear(self) -> None:
         """Take the line away."""
-        if self._stream is not None and self._width:
-            self._stream.write(f'\r{" " * self._width}\r')
-            self._stream.flush()
+        if self._width:
+            self._write(f'\r{" " * self._width}\r')
+
+    def _write(self, text: str) -> None:
+        if self._stream is not None:
+            with suppress(OSError):     # the terminal has gone; the trace is to be whole
+                self._stream.write(text)
+                self._stream.flush()

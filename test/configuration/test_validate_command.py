@@ -1,12 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can validate`` as a user runs it, and the front end around it."""
 
+from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 import json
 import os
 from pathlib import Path
 import re
+import signal
 import subprocess
 import sys
 
@@ -16,6 +18,7 @@ from transcripts import replayed, shown, stories
 
 import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.process.beginning import SIGNALS
 
 ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
 STORIES = stories(__file__, 'validate.yaml')
@@ -211,3 +214,38 @@ def test_an_interrupt_is_how_the_endless_ones_end(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(front_end, '_run', stop)
     for endless in (['simulate'], ['record'], ['decode', '--live']):
         assert front_end.main(endless) == 0
+
+
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    """Have the handlers of signals put back."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures('handlers')
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('words', ['simulate', 'record', 'decode --live', 'read --watch=1'])
+def test_they_end_so_by_a_signal_and_when_their_terminal_is_closed(
+        monkeypatch: pytest.MonkeyPatch, words: str, number: int) -> None:
+    def stop(*_: object) -> int:
+        if signal.getsignal(number) is not signal.SIG_DFL:
+            signal.raise_signal(number)
+        return 3
+    monkeypatch.setattr(front_end, '_run', stop)
+    monkeypatch.setattr(sys, 'argv', ['drive_can', *words.split()])
+    assert front_end.main() == 0
+    signal.raise_signal(signal.SIGTERM)     # all is done
+
+
+@pytest.mark.usefixtures('handlers')
+def test_a_terminal_that_is_not_to_matter_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    def go_on(*_: object) -> int:
+        signal.raise_signal(signal.SIGHUP)
+        return 3
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)    # as nohup has it
+    monkeypatch.setattr(front_end, '_run', go_on)
+    monkeypatch.setattr(sys, 'argv', ['drive_can', 'record'])
+    assert front_end.main() == 3

@@ -2,9 +2,11 @@
 """``drive_can record`` and ``drive_can decode``, as a user runs them."""
 
 from collections.abc import Callable, Iterator
+import errno
 import json
 import os
 from pathlib import Path
+import sys
 
 from asked_bus import drive_can
 from builders import frame
@@ -12,6 +14,7 @@ import pytest
 from transcripts import replayed, shown, stories
 from world import World
 
+from drive_can_bridge.cli import record
 
 STORIES = stories(__file__, 'commands.yaml')
 FILE = """
@@ -186,6 +189,25 @@ def test_record_then_decode(talker: Callable[[float], None], file: Path, tmp_pat
     assert len(lines) > 200 and all(' main conveyor ' in line for line in lines)
     assert drive_can('decode', '--live', '--params-file', file, '--seconds', '0.5') == 0
     assert understood(capsys.readouterr().out.splitlines()) == understood(lines)
+
+
+def test_a_trace_is_whole_although_its_terminal_has_gone(
+        talker: Callable[[float], None], file: Path, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def gone(*_: object) -> int:
+        raise OSError(errno.EIO, 'Input/output error')
+
+    def closed(_: object) -> None:
+        monkeypatch.setattr(sys.stderr, 'write', gone)
+        raise KeyboardInterrupt
+    output = tmp_path / 'out.asc'
+    talker(5.0)
+    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
+    looks: list[Callable[[object], None]] = [record._Rotating.look, closed]
+    monkeypatch.setattr(record._Rotating, 'look', lambda own: looks.pop(0)(own))
+    assert drive_can('record', '-o', output, '--params-file', file) == 0
+    assert output.read_text().splitlines()[-1] == 'End TriggerBlock'
+    assert capsys.readouterr().out.startswith('main: ')
 
 
 def test_record_in_files_of_limited_size(talker: Callable[[float], None], file: Path,
