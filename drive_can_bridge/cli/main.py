@@ -130,7 +130,7 @@ MODULES = dict.fromkeys(('stop', 'enable', 'disable', 'reset'), 'control')
 ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 #: options that make a subcommand one of these
 ENDLESS_OPTIONS = ('--live', '--watch')
-#: what ends these like Ctrl-C; the last one when a terminal is closed, or its ssh session breaks off
+#: what ends these like Ctrl-C; SIGHUP comes when a terminal is closed, or its ssh session breaks
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
 #: only shows things: a reader who stops has seen enough
 SHOWING = ('validate', 'decode', 'profile')

@@ -8,9 +8,7 @@ import sys
 from typing import Any
 
 import pytest
-
 pytest.importorskip('rclpy')
-
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import uninstall_signal_handlers
