@@ -238,6 +238,14 @@ def programs() -> None:
     """Let a test run programs to their ends, however long that takes."""
 
 
+@pytest.fixture
+def foreground() -> Iterator[None]:
+    """Let Ctrl-C raise, also where these tests began in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 # -- beside each other ----------------------------------------------------------------------------
 
 

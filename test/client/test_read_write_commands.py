@@ -68,6 +68,7 @@ def interrupt(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(DirectDrive, 'put', interrupted)
 
 
+@pytest.mark.usefixtures('foreground')
 @pytest.mark.parametrize('story', STORIES)
 def test_lines(story: str, run: Run, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     def step(step: str) -> list[str]:

@@ -217,7 +217,7 @@ def test_an_interrupt_is_how_the_endless_ones_end(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.fixture
-def handlers() -> Iterator[None]:
+def handlers(foreground: None) -> Iterator[None]:
     """Have the handlers of signals put back."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     yield

@@ -379,6 +379,11 @@ class TestWatches:
         assert axis.session.online
         assert says('watch_stays', what='1016h.01h') in notes(axis)
 
+    def test_an_entry_without_a_time_watches_nobody(self) -> None:
+        axis = meet(objects={**FITS, (0x1016, 1): bytes.fromhex('00007F00')}, mapping='verify')
+        assert axis.session.online
+        assert says('nothing_stops') in notes(axis)
+
     def test_a_drive_without_a_producer_is_not_watched(self) -> None:
         axis = Axis()
         del axis.drive.objects[0x1017, 0]
