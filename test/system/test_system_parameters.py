@@ -160,8 +160,9 @@ def test_ctrl_c_waits_for_the_write_under_way(processes: Processes, client: Clie
     simulator.frame('#02BC', since=before)
     write.send(signal.SIGINT)
     assert write.wait() == 130
-    assert [line.split()[0] for line in write.lines] == ['name', 'ramp_time']
+    assert [line.split()[0] for line in write.lines] == ['name', 'ramp_time', 'maximum_speed']
     assert write.lines[1].endswith('  written')
+    assert write.lines[2].endswith('  not written: ended before')
     assert write.errors == ['drive_can write: interrupted']
     assert not simulator.frames('#2710', since=before)
 
