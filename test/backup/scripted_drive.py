@@ -146,7 +146,7 @@ class ScriptedDrive(Drive):
             raise Killed
         if fate is Fate.BUS_BEHIND:
             self._bus_lost = True
-            return WriteOutcome.under_way(name, parameter, DriveCanError('bus main: is gone'))
+            return WriteOutcome.under_way(name, parameter, DriveCanError('gone'))
         if fate is Fate.CUT:
             self._away_until = self.now + 5.0
         self._mute = self._mute or fate is Fate.MUTE

@@ -66,7 +66,7 @@ def test_what_was_under_way_when_the_bus_was_lost_may_have_been_written(number: 
     name = list(SETTINGS)[number - 2]
     assert (result.unconfirmed, drive.registers[name]) == ([name], FILE[name])
     assert result.written == list(SETTINGS)[:number - 2]
-    assert str(result.trouble) == 'bus main: is gone'
+    assert str(result.trouble) == 'gone'
 
 
 def test_a_drive_that_is_enabled_by_now_is_told_nothing() -> None:
