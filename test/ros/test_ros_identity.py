@@ -76,6 +76,9 @@ def test_is_read_whenever_the_drive_comes_online(bridge: StartBridge, client: Cl
     [(success, reason)] = client.set(BRIDGE, **{NAME: 'somebody else'})
     assert not success and 'read-only' in reason
     assert client.get(BRIDGE, NAME) == [second]
+    # what lets the bridge write this one lets nobody write nonsense elsewhere
+    [(success, reason)] = client.set(BRIDGE, drives__conveyor__command_timeout=-1.0)
+    assert not success and reason
 
 
 def test_what_cannot_be_read_is_left_out(bridge: StartBridge, client: Client, tmp_path: Path,
