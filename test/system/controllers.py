@@ -21,6 +21,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from ros2_control_twin import Constraints, HardwareTwin, run, System, TrajectoryTwin
 import yaml
 
+from drive_can_bridge.ros.middleware import GONE
+
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 PERIOD = 0.01
 
@@ -105,6 +107,9 @@ def main():
         serve(Manager(node, robot), executor)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except GONE:    # a signal came while it was publishing
+        if rclpy.ok():
+            raise
     finally:
         rclpy.try_shutdown()
 
