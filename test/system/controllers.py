@@ -107,7 +107,7 @@ def main():
         serve(Manager(node, robot), executor)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except GONE:    # a signal came while it was publishing
+    except GONE:    # a signal came amid a call of rclpy
         if rclpy.ok():
             raise
     finally:
