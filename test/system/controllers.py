@@ -16,12 +16,11 @@ import sys
 import threading
 import time
 
+from ending import until_told_to_end
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from ros2_control_twin import Constraints, HardwareTwin, run, System, TrajectoryTwin
 import yaml
-
-from drive_can_bridge.ros.middleware import GONE
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'ros2_control'
 PERIOD = 0.01
@@ -100,18 +99,11 @@ def main():
     rclpy.init(args=['--ros-args', *(
         part for topic in ('joint_states', 'joint_commands')
         for part in ('-r', f'/robot_{topic}:=/{namespace}/robot_{topic}'))])
-    try:
+    with until_told_to_end():
         node = rclpy.create_node('controller_manager', namespace=namespace)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         serve(Manager(node, robot), executor)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except GONE:    # a signal came amid a call of rclpy
-        if rclpy.ok():
-            raise
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -15,11 +15,12 @@ import sys
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
+from ending import until_told_to_end
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
 from service_handshake import shake_hands
 from std_msgs.msg import Bool, Float64, Int64
@@ -258,12 +259,8 @@ def serve(client):
 
 def main():
     rclpy.init()
-    try:
+    with until_told_to_end():
         serve(Client(rclpy.create_node('system_test_client')))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':
