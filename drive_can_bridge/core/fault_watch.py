@@ -54,6 +54,8 @@ class Watched(Protocol):
 
 #: 603Fh: manuals write what is in it, as in emergencies, with four hexadecimal digits
 ERROR_CODE = 0x603F
+#: how what a fault has ended is answered: with which one it is
+_ENDED = ('fault_while_enabling', 'fault_while_homing')
 
 
 class FaultWatch:
@@ -94,15 +96,14 @@ class FaultWatch:
                 self.sampled(event.raws, event.received_at)
             elif isinstance(event, StationLost):
                 self._gone()
-            elif isinstance(event, ControlCompleted) and (
-                    event.message.code == 'fault_while_enabling'):
+            elif isinstance(event, ControlCompleted) and event.message.code in _ENDED:
                 events.remove(event)
                 self._ended.append(event)
         if self._ended and not self._is_told_soon:
             obeyed = self._session.interlock.obeyed
             fault = '' if obeyed is None else obeyed.fault_text
-            events += [replace(each, message=sentences.fault_while_enabling(
-                each.message.fields['status'], fault)) for each in self._ended]
+            events += [replace(each, message=sentences.CODES[each.message.code](
+                **{**each.message.fields, 'fault': fault})) for each in self._ended]
             self._ended.clear()
 
     @property

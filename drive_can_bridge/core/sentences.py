@@ -537,6 +537,11 @@ def homing_stopped(step: str) -> str:
 
 
 @sentence
+def fault_while_homing(step: str, fault: str = '') -> str:
+    return f'{reset_first(fault)}; {homing_stopped(step)}'
+
+
+@sentence
 def homing_failed() -> str:
     return 'the drive reports a homing error (bit 13)'
 

@@ -116,7 +116,7 @@ class Homing:
     def stop(self) -> None:
         """Forget it: the channel was cleared, or the drive is lost."""
         if self.under_way:
-            self._answer(False, sentences.homing_stopped(self._step.value))
+            self._answer(False, self._stopped())
             self._finish()
 
     def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
@@ -213,7 +213,7 @@ class Homing:
         if failure and self._machine.operating:
             self._machine.drop(failure)     # in whatever mode it is, it is not driven
         elif failure:                       # it was stopped meanwhile
-            told = sentences.homing_stopped(self._step.value)
+            told = self._stopped()
         self._answer(not told, told or sentences.homed())
         if failure:
             self._go(Step.HOLDING)
@@ -223,7 +223,7 @@ class Homing:
     def _interrupted(self, status: int) -> None:
         """Go back to the mode of a drive that was stopped, as soon as it is disabled."""
         if self._request is not None:
-            self._answer(False, sentences.homing_stopped(self._step.value))
+            self._answer(False, self._stopped())
         self._rules.homing_bits = 0
         self._deadline = math.inf
         if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING and (
@@ -264,6 +264,12 @@ class Homing:
             return sentences.mode_refused(mode)
         # PDOs do not pass through the channel: its own time may be that of long ago
         self._channel.run(look(), then, self._now)
+
+    def _stopped(self) -> Sentence:
+        """Say how far it came; the watch for faults adds which one it was that stopped it."""
+        step = self._step.value
+        return (sentences.fault_while_homing(step) if self._machine.fault else
+                sentences.homing_stopped(step))
 
     def _answer(self, success: bool, message: Sentence) -> None:
         request, self._request = self._request, None

@@ -24,6 +24,7 @@ IP_TARGET = parameter('interpolation', None, index=0x60C1, subindex=1, type=INT3
                       neutral_from='position', arming_tolerance=10.0)
 MODES_OF = parameter('mode_shown', None, index=0x6061, subindex=0, type=ParameterType.INT8,
                      access=RO)
+ERROR = parameter('error', None, index=0x603F, subindex=0, access=RO)
 RAMP = parameter('acceleration', None, index=0x6083, subindex=0, type=ParameterType.UINT32)
 MODE_TARGETS = {'csv': VELOCITY_TARGET, 'pv': VELOCITY_TARGET, 'csp': TARGET, 'pp': TARGET,
                 'tq': TORQUE_TARGET, 'cst': TORQUE_TARGET, 'vl': SPEED_VL, 'ip': IP_TARGET}

@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
-from builders import INT16, parameter, RO, write
+from builders import INT16, parameter, write
 import pytest
 from saying import says
-from servo_builders import Axis, TABLE
+from servo_builders import Axis, ERROR, TABLE
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
@@ -12,7 +12,6 @@ from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.protocols.cia402.states import State
 
-ERROR = parameter('error', None, index=0x603F, subindex=0, access=RO)
 ENABLE, DISABLE, QUICK_STOP = (
     ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
 

@@ -7,17 +7,20 @@ from typing import Any
 from literal_drives import ServoDrive
 import pytest
 from saying import says
-from servo_builders import Axis, OBJECTS, POSITION, TARGET
+from servo_builders import Axis, ERROR, OBJECTS, POSITION, TABLE, TARGET
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.cia402.states import State
 
 #: how far it is with homing while it moves
 AWAY = 'on its way'
+UNREAD = says('number_unread', reason=says('no_answer_briefly'))
 
 
 class PositionDrive(ServoDrive):
@@ -259,6 +262,26 @@ class TestHoming:
         assert drive.number(0x6060) == number
         assert axis.session.busy == ''
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
+
+    @pytest.mark.parametrize('told', ['7305h encoder', UNREAD, ''])
+    def test_a_fault_that_stops_it_is_named(self, told: Any, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True, table=(*TABLE, ERROR))
+        if told:
+            axis.session.fault_watch = FaultWatch(
+                axis.session, FaultTable('error', ((0x7305, 'encoder'),), None))
+        drive.objects[0x603F, 0] = b'\x05\x73'
+        takes = drive.takes
+        if told is UNREAD:
+            drive.takes = lambda sent: [] if str(sent).startswith(  # type: ignore[method-assign]
+                '605#403F60') else takes(sent)
+        drive.homing = -1
+        home(axis, 0.2)
+        drive.becomes(drive.FAULT)
+        axis.live(2.0)
+        (_, success, message), = axis.talk.control_outcomes()
+        assert (success, message) == (False, says('fault_while_homing', step=AWAY))
+        assert message.fields.get('fault', '') == told     # type: ignore[attr-defined]
+        assert drive.number(0x6060) == number
 
     @pytest.mark.parametrize('phase', range(0, 40, 5))
     @pytest.mark.parametrize('step', ['changing to mode 6', 'going back to the mode'])
