@@ -328,6 +328,31 @@ class TestHoming:
         assert axis.talk.control_outcomes() == [('home', True, 'homed')]
         assert drive.found == 1
 
+    def test_nor_do_they_where_the_start_is_ignored(self, mode: str, number: int) -> None:
+        axis, drive = meet(mode, homing=True, homing_timeout=0.5)
+        drive.homing, runs_down = -1, drive.runs_down
+
+        def keeps() -> None:
+            runs_down()
+            drive.bits = 0x1400 if drive.number(0x6060) == 6 else drive.bits
+            drive.becomes(drive.state)
+        drive.runs_down = keeps     # type: ignore[method-assign]
+        assert home(axis, 1.0) == [('home', False, says('homing_timed_out', step=AWAY))]
+        assert (drive.state, drive.number(0x6060)) == (drive.ENABLED, number)
+
+    def test_one_that_is_there_at_once_is_so_again(self, mode: str, number: int) -> None:
+        """By methods 35 and 37: within the cycle in which bit 4 rose."""
+        axis, drive = meet(mode, homing=True)
+        drive.homing, control = -1, drive._control
+
+        def at_once(word: int) -> None:
+            control(word)
+            if drive.number(0x6060) == 6 and word & 0x10:
+                drive.bits = 0x1400
+                drive.becomes(drive.state)
+        drive._control = at_once    # type: ignore[method-assign]
+        assert [*home(axis), *home(axis)] == [('home', True, 'homed')] * 2
+
     def test_nor_do_they_where_bit_12_falls_late(self, mode: str, number: int) -> None:
         axis, drive = meet(mode, homing=True)
         drive.homing = 30
