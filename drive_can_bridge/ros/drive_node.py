@@ -33,7 +33,7 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
-from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.log import FEW, Log
 from drive_can_bridge.ros.middleware import GONE, latched_quality, publisher, quality_overrides
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
@@ -261,7 +261,10 @@ class DriveNode(DriveListener):
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
             self._may_run = self._may_run or event.danger
-            if event.warning:
+            if event.text.code == 'emergency':
+                # each tells of another error, and a drive may have any number of them
+                self._log.warn('emergency', event.text, few=FEW)
+            elif event.warning:
                 self._log.warning(event.text, urgent=event.danger)
             else:
                 self._log.info(event.text)

@@ -14,8 +14,9 @@ what was held is written in the end, in the order in which it came last, and wha
 even be held is counted.
 
 ============== ======================================================================
-of one line    :data:`FEW` times at once (a topic: once), then a summary every
-               :data:`SUM_UP` s; after :data:`QUIET` s without it, it is news again
+of one line    :data:`FEW` times at once (a topic: once, unless it says otherwise),
+               then a summary every :data:`SUM_UP` s; after :data:`QUIET` s without
+               it, it is news again
 of a speaker   :data:`BURST` different lines at once, then :data:`RATE` a second
 of all         :data:`BURST_OF_ALL` at once, then :data:`RATE_OF_ALL` a second
 ============== ======================================================================
@@ -155,13 +156,14 @@ class Speaker:
         """Log what does not work."""
         self._say(Level.ERROR, text, urgent=True)
 
-    def warn(self, topic: str, text: str, *, once: bool = False) -> None:
+    def warn(self, topic: str, text: str, *, once: bool = False, few: int = 1) -> None:
         """
         Log a warning whose text may vary; what repeats is counted, and the newest text told.
 
         :param once: repetitions are not logged at all, until :meth:`reset`.
+        :param few: times that it is written at once, at most :data:`FEW`.
         """
-        self._say(Level.WARNING, text, topic=topic, once=once)
+        self._say(Level.WARNING, text, topic=topic, once=once, few=few)
 
     def reset(self) -> None:
         """Begin anew: the next warning of each topic is news."""
@@ -194,7 +196,7 @@ class Speaker:
             self._emit(newest.level, f'{newest.text} (this came last, {ago:.0f} s ago)')
 
     def _say(self, level: Level, text: str, *, topic: str = '', once: bool = False,
-             urgent: bool = False) -> None:
+             urgent: bool = False, few: int = FEW) -> None:
         limit = self._limit
         with limit.lock:
             if limit.over:
@@ -213,7 +215,6 @@ class Speaker:
             if quiet or anew:
                 known.era, known.in_era = self._era, 0
             self._topics[topic or text] = known
-            few = 1 if topic else FEW
             if ((not known.held or quiet or anew and topic)
                     and written < FEW and known.in_era < few
                     and self._wait(urgent, now) <= 0.0):

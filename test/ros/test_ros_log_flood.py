@@ -7,6 +7,11 @@ import pytest
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
+from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.statistics import DriveStatistics
+from drive_can_bridge.protocols.canopen.network import Emergency, encode_emergency
+from drive_can_bridge.protocols.canopen.node import Node
 from drive_can_bridge.ros import log as log_module
 
 FLIPS = 400
@@ -40,3 +45,24 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
     assert lines.index(f'lift: {DANGER}') == 20
     client.wait_logged(f'{DANGER} (this came last, ')
     assert len(client.logged(0)) - before <= 20 + 1 + 4 + 1
+
+
+def test_emergencies_that_vary_are_a_few_lines_and_a_sum(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_module, 'SUM_UP', 1.0)
+    one = bridge(parameters(lift={**LIFT, 'parameter_timeout': 60.0}), simulated=False)
+    client.listen()
+    client.wait_logged('active: ')
+    lift = one.node.drives['lift']
+    told = [Emergency(0x2300 + number) for number in range(200)]
+    node, report = Node(5, heartbeat_timeout=0.0), Reporter(DriveStatistics(), NOTHING)
+    for emergency in told:
+        node.take_emergency(encode_emergency(5, emergency).data, report)
+    with lift.exchange.lock:
+        for event in report.take():
+            lift.handle_event(event)
+    assert node.facts()['emergency'] == told[-1].text
+    newest = sentences.emergency(told[-1].text)
+    client.wait_logged(f'lift: {newest} (and 194 more like it in ', WARN)
+    lines = [line for line in client.logged(0) if line.startswith('lift: emergency')]
+    assert lines[:-1] == [f'lift: {sentences.emergency(each.text)}' for each in told[:5]]

@@ -77,6 +77,7 @@ class Log:
              'urgent': lambda: speaker.warning(rest, urgent=True),
              'error': lambda: speaker.error(rest),
              'topic': partial(speaker.warn, topic, text),
+             'few': partial(speaker.warn, topic, text, few=FEW),
              'once': partial(speaker.warn, topic, text, once=True),
              'numbers': lambda: [speaker.info(str(number)) for number in range(int(rest))],
              'reset': speaker.reset, 'end': lambda: self.limit.sum_up(all_of_it=True),
