@@ -121,7 +121,8 @@ class Requests(Generic[Key]):
     """
     The requests of one drive, and their answers.
 
-    What is answered so early in a trace that it may have been asked before is no surprise.
+    What is answered so early in a trace that it may have been asked before is no surprise, unless
+    the trace holds its request.
 
     :param timeout: s that an answer may take.
     :param content: (span, words or None) -> the parameters, and what these words are.
@@ -232,7 +233,8 @@ class Requests(Generic[Key]):
             return Verdict.LATE, now - late
         if self._certain_from != self._certain_from:    # NaN
             self._certain_from = now + self._timeout
-        return Verdict.NORMAL if now < self._certain_from else Verdict.UNASKED, math.nan
+        before = now < self._certain_from and key not in self.about
+        return Verdict.NORMAL if before else Verdict.UNASKED, math.nan
 
     def _tell(self, now: float, direction: Direction, asked: Asked, words: Sequence[int] | None,
               **more: Any) -> None:
