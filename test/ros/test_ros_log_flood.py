@@ -1,6 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A drive whose status flips in every cycle, and what a running bridge writes of it."""
 
+from typing import Any
+
 from bridges import LIFT, parameters, StartBridge
 from clients import Client, WARN
 import pytest
@@ -20,14 +22,17 @@ GONE = sentences.fault_gone(sentences.status_word(1))
 DANGER = sentences.may_still_be_running(sentences.stop_not_answered())
 
 
-def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
-        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def lift(bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a drive that nobody answers for: nothing is told but what is told here."""
     monkeypatch.setattr(log_module, 'SUM_UP', 1.0)
-    # nobody answers, so that nothing is told but what is told here
     one = bridge(parameters(lift={**LIFT, 'parameter_timeout': 60.0}), simulated=False)
     client.listen()
     client.wait_logged('active: ')
-    lift = one.node.drives['lift']
+    return one.node.drives['lift']
+
+
+def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(lift: Any, client: Client) -> None:
     before = len(client.logged(0))
     with lift.exchange.lock:
         for _ in range(FLIPS):
@@ -47,13 +52,7 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(
     assert len(client.logged(0)) - before <= 20 + 1 + 4 + 1
 
 
-def test_emergencies_that_vary_are_a_few_lines_and_a_sum(
-        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_module, 'SUM_UP', 1.0)
-    one = bridge(parameters(lift={**LIFT, 'parameter_timeout': 60.0}), simulated=False)
-    client.listen()
-    client.wait_logged('active: ')
-    lift = one.node.drives['lift']
+def test_emergencies_that_vary_are_a_few_lines_and_a_sum(lift: Any, client: Client) -> None:
     told = [Emergency(0x2300 + number) for number in range(200)]
     node, report = Node(5, heartbeat_timeout=0.0), Reporter(DriveStatistics(), NOTHING)
     for emergency in told:
