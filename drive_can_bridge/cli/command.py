@@ -154,6 +154,8 @@ def output(text: str) -> str:
     """Read the name of a file, or directory, that is written; its last slash matters to some."""
     if text in ('', '-'):
         raise ArgumentTypeError(f'{text!r} names no file')
+    if text == '/dev/stdout':   # descriptor 1 is not ours where libraries write to it
+        return f'/dev/fd/{sys.stdout.fileno()}'
     return text
 
 

@@ -25,7 +25,7 @@ from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import nearest
-from drive_can_bridge.process.beginning import let_signals_in
+from drive_can_bridge.process.beginning import keep_output, let_signals_in
 
 #: what for, subcommand, one line of help
 GROUPS: dict[str, dict[str, str]] = {
@@ -132,6 +132,8 @@ ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 ENDLESS_OPTIONS = ('--live', '--watch')
 #: what ends these like Ctrl-C; SIGHUP comes when a terminal is closed, or its ssh session breaks
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
+#: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
+WITH_ROS = (*GROUPS['By hand'], *GROUPS['Parameters of drives'], 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
 SHOWING = ('validate', 'decode', 'profile')
 #: exit codes of what could not be done, where 1 says something else
@@ -157,6 +159,8 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     endless = wanted in ENDLESS or any(
         word.partition('=')[0] in ENDLESS_OPTIONS for word in arguments)
     if argv is None:
+        if wanted in WITH_ROS:
+            keep_output()
         _look_after_outputs()
     code = None
     if argv is None and endless:  # until the subcommand looks after signals itself

@@ -7,6 +7,7 @@ nobody does, Python answers SIGINT with a traceback. Standard streams that the s
 closed (``>&-``) go to nobody: else the next file or socket that is opened would be taken for one.
 """
 
+import io
 import os
 import signal
 import sys
@@ -30,6 +31,23 @@ def open_streams() -> None:
     for descriptor, name, mode in ((0, 'stdin', 'r'), (1, 'stdout', 'w'), (2, 'stderr', 'w')):
         if getattr(sys, name) is None:
             setattr(sys, name, open(descriptor, mode, encoding='utf-8', closefd=False))
+
+
+def keep_output() -> None:
+    """
+    Keep standard output to what Python prints; what libraries write goes to standard error.
+
+    Fast DDS writes its complaints to descriptor 1, amid what other programs read.
+    """
+    former = sys.stdout
+    unbuffered = bool(getattr(former, 'write_through', False))
+    kept = io.TextIOWrapper(
+        open(os.dup(1), 'wb', 0 if unbuffered else -1, closefd=False), former.encoding,
+        former.errors, line_buffering=bool(former.line_buffering), write_through=unbuffered)
+    os.dup2(2, 1)
+    # who asks for the size of a terminal asks the other one
+    for name in ('stdout', '__stdout__'):
+        setattr(sys, name, kept)
 
 
 def hold_signals() -> None:

@@ -3,8 +3,10 @@
 
 from argparse import ArgumentTypeError
 import math
+import os
 from pathlib import Path
 import shlex
+import subprocess
 import sys
 
 import pytest
@@ -60,6 +62,21 @@ def test_no_line_has_all_that_a_file_has(tmp_path: Path,
 def test_documents_are_json_whatever_the_values(capsys: pytest.CaptureFixture[str]) -> None:
     print_json({'a': math.nan, 'b': -math.inf, 'c': 1.5, 'd': 'nan'})
     assert capsys.readouterr().out == '{"a": "nan", "b": "-inf", "c": 1.5, "d": "nan"}\n'
+
+
+@pytest.mark.usefixtures('programs')
+@pytest.mark.parametrize('command', ['read', 'stop', 'monitor'])
+def test_what_libraries_of_ros_write_is_no_output_of_ours(command: str, tmp_path: Path) -> None:
+    for module in ('rclpy', 'rcl_interfaces'):     # the first that is imported
+        (tmp_path / f'{module}.py').write_text(
+            "import os\nos.write(1, b'[RTPS_TRANSPORT_SHM Error]\\n')\n"
+            "raise ImportError('no', name='rclpy')\n")
+    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get('PYTHONPATH')]))
+    done = subprocess.run(
+        [sys.executable, '-m', 'drive_can_bridge.cli.start', '--json', command],
+        capture_output=True, text=True, env={**os.environ, 'PYTHONPATH': path}, check=False)
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr.splitlines()[0] == '[RTPS_TRANSPORT_SHM Error]'
 
 
 TABLE = """\

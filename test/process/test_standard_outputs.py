@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Standard outputs that keep nobody waiting: any descriptors will do, and a clock by hand."""
 
+from array import array
 from collections.abc import Iterator
 from contextlib import suppress
 import ctypes
@@ -9,6 +10,7 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+import termios
 import threading
 import time
 
@@ -195,7 +197,7 @@ def test_lines_of_both_keep_nobody_waiting_and_their_order_where_they_go_the_sam
 
 CLOSED = """
 import os, sys
-from drive_can_bridge.process.beginning import begin
+from drive_can_bridge.process.beginning import begin, keep_output
 begin()
 print('output')
 print('error', file=sys.stderr)
@@ -211,3 +213,36 @@ def test_streams_that_somebody_closed_go_to_nobody() -> None:
     done = subprocess.run(['sh', '-c', 'exec "$@" <&- >&-', 'sh', sys.executable, '-c', CLOSED],
                           capture_output=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, b'', b'error\n')
+
+
+KEPT = """
+import os, shutil, sys
+from drive_can_bridge.cli.command import output
+from drive_can_bridge.process.beginning import begin, keep_output
+begin()
+keep_output()
+os.write(1, b'library\\n')
+print('ours', sys.stdout.isatty(), shutil.get_terminal_size().columns, flush=True)
+with open(output('/dev/stdout'), 'w') as file:
+    file.write('a file')
+"""
+
+
+@pytest.mark.usefixtures('programs')
+def test_standard_output_is_kept_from_libraries() -> None:
+    command = [sys.executable, '-c', KEPT]
+    environment = {name: value for name, value in os.environ.items() if name != 'COLUMNS'}
+    done = subprocess.run(command, capture_output=True, env=environment, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0, b'ours False 80\na file', b'library\n')
+    done = subprocess.run(['sh', '-c', 'exec "$@" >&-', 'sh', *command], capture_output=True,
+                          env=environment, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b'', b'library\n')
+    keyboard, screen = os.openpty()
+    fcntl.ioctl(screen, termios.TIOCSWINSZ, array('H', [24, 132, 0, 0]))
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=screen,
+                          stderr=subprocess.PIPE, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, b'library\n')
+    assert os.read(keyboard, PIECE) == b'ours True 132\r\na file'
+    for descriptor in (keyboard, screen):
+        os.close(descriptor)
