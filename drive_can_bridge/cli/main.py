@@ -257,6 +257,8 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         parser.error(f'there is no subcommand {wanted!r}'
                      + (f', did you mean {near}?' if near else ''))
     args, rest = parser.parse_known_args(arguments)
+    # answers every question, also where none is asked
+    rest = [word for word in rest if word != '--yes']
     if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only
         args.words += [word for word in rest if not word.startswith('-')]
         rest = [word for word in rest if word.startswith('-')]

@@ -116,6 +116,17 @@ def test_each_has_two_examples_that_are_understood(
         assert args.subcommand == subcommand
 
 
+@pytest.mark.parametrize('subcommand', SUBCOMMANDS)
+def test_whoever_says_yes_to_everything_may_say_it_everywhere(subcommand: str) -> None:
+    for example in EXAMPLES[subcommand]:
+        first, *rest = shlex.split(example)
+        for words in ([first, '--yes', *rest], [first, *rest, '--yes']):
+            assert understood(words)[1].subcommand == subcommand
+            assert '--yes' not in getattr(understood(words)[1], 'words', ())
+    with pytest.raises(SystemExit, match='2'):
+        understood([*shlex.split(EXAMPLES[subcommand][0]), '--yes=no'])
+
+
 def test_the_file_of_the_environment_stands_for_the_option_where_no_bridge_is_asked(
         monkeypatch: pytest.MonkeyPatch) -> None:
     def file(*words: str) -> str:
