@@ -41,7 +41,7 @@ INTERNAL: dict[str, set[str]] = {
     'panel': {'', 'clock', 'core', 'monitor'},
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
-    'ros.client': {'', 'clock', 'core', 'ros.recognition'},
+    'ros.client': {'', 'clock', 'core', 'process', 'ros.recognition'},
     'ros.monitor': {
         '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
     'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},

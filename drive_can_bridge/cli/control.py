@@ -106,7 +106,7 @@ def _stop(args: Namespace, graph: Any) -> int:
     domain = graph.client_node.context.get_domain_id()
     present = [each for each in bridges() if _concerns(each, args.namespace, args.words)]
     stop = Stop(graph, args.namespace, args.words, [
-        each.name for each in present if each.domain == domain and '~' not in each.name])
+        each.name for each in present if each.domain == domain and each.has_place])
     try:
         graph.wait(stop.look, float('inf'))
     except KeyboardInterrupt:
@@ -114,18 +114,17 @@ def _stop(args: Namespace, graph: Any) -> int:
         _show(args, stop.answers())
         raise
     known = {short(name) for name in stop.seen}
-    unseen = [Answer(each.name, False, _of_host(each, domain), bridge=True) for each in present
-              if each.domain != domain or each.name not in known]
+    unseen = [Answer(each.name, False,
+                     f'{each.silence(domain)}: its drives may still be running', bridge=True)
+              for each in present if each.domain != domain or each.name not in known]
     return _show(args, [*unseen, *stop.answers()])
 
 
 def _concerns(present: Present, namespace: str | None, words: Sequence[str]) -> bool:
     """Tell whether a bridge of this host may have one of the drives that are meant."""
-    if not present.name or '~' in present.name:     # nobody knows where it is
-        return True
+    if namespace is not None or not present.has_place:
+        return present.may_be_in(namespace)
     place = present.name.rpartition('/')[0]
-    if namespace is not None:
-        return place == namespace
     return not words or any(not word.startswith('/') or _may_mean(word, f'{place}/')
                             for word in words)
 
@@ -136,14 +135,6 @@ def _may_mean(word: str, place: str) -> bool:
     if literal.startswith(place):
         return '/' not in literal[len(place):]
     return is_pattern(word) and place.startswith(literal)
-
-
-def _of_host(present: Present, domain: int) -> str:
-    where = f'process {present.process}'
-    if present.domain not in (None, domain):
-        where += f', ROS domain {present.domain}'
-    return (f'this bridge of this host ({where}) does not answer here: its drives may still be '
-            'running')
 
 
 def _show(args: Namespace, answers: Sequence[Any]) -> int:

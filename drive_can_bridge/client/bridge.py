@@ -197,7 +197,8 @@ class BridgeSource:
 
     :param namespace: where they run; None: anywhere, if there is only one.
     :raises WhichBridge: there are several, and not together.
-    :raises NoBridge: there is none, or it does not answer.
+    :raises NoBridge: there is none.
+    :raises SilentBridge: it does not answer.
     """
 
     def __init__(self, namespace: str | None, clock: Clock) -> None:

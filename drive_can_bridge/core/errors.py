@@ -12,7 +12,8 @@ The errors of the package.
      +-- TransportError         the bus is there, and does not take a frame
      +-- BusUnavailable         device absent, busy or lost: try again (also an OSError)
      +-- BusMisconfigured       unknown interface, driver missing, impossible bit rate
-     +-- NoBridge               none is running, or it does not answer
+     +-- NoBridge               none is running
+     +-- SilentBridge           one is in the graph, or holds drives on this host; none answers
      +-- WhichBridge            several are running, and nobody has said which one is meant
 
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
@@ -83,7 +84,11 @@ class BusMisconfigured(DriveCanError):
 
 
 class NoBridge(DriveCanError):
-    """No bridge is running, or it does not answer."""
+    """No bridge is running."""
+
+
+class SilentBridge(DriveCanError):
+    """A bridge is in the graph, or holds drives on this host, and does not answer."""
 
 
 class WhichBridge(DriveCanError):

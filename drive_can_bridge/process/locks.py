@@ -17,6 +17,7 @@ graph. It goes with the process, as the locks do: whether it answers or not, it 
 
 from collections.abc import Sequence
 import errno
+from fnmatch import fnmatchcase
 import hashlib
 import os
 from pathlib import Path
@@ -148,6 +149,23 @@ class Present(NamedTuple):
     process: int
     domain: int | None
     name: str
+
+    @property
+    def has_place(self) -> bool:
+        """Its namespace is known."""
+        return bool(self.name) and '~' not in self.name
+
+    def may_be_in(self, namespace: str | None) -> bool:
+        """Tell whether it may run in a namespace, or one of a pattern; None: anywhere."""
+        return (namespace is None or not self.has_place
+                or fnmatchcase(self.name.rpartition('/')[0], namespace))
+
+    def silence(self, domain: int) -> str:
+        """Say that it does not answer in a ROS domain."""
+        where = f'process {self.process}'
+        if self.domain not in (None, domain):
+            where += f', ROS domain {self.domain}'
+        return f'this bridge of this host ({where}) does not answer here'
 
 
 class Presence:

@@ -19,7 +19,7 @@ from transcripts import replayed, shown, stories
 from drive_can_bridge.cli import control
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.process.locks import bridges, Presence
-from drive_can_bridge.ros.client import calls
+from drive_can_bridge.ros.client import calls, search
 
 HOIST = {**LIFT, 'station': 3}
 Run = Callable[..., tuple[int, list[str], str]]
@@ -30,8 +30,9 @@ STORIES = stories(__file__, 'by_hand.yaml')
 def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run a command; return exit code, lines, and standard error."""
     # others may use this host meanwhile
-    monkeypatch.setattr(control, 'bridges', lambda: [
-        each for each in bridges() if each.process == os.getpid()])
+    for module in (control, search):
+        monkeypatch.setattr(module, 'bridges', lambda: [
+            each for each in bridges() if each.process == os.getpid()])
 
     def started(*words: str) -> tuple[int, list[str], str]:
         capsys.readouterr()
@@ -210,6 +211,31 @@ def test_a_drive_that_is_not_online_is_a_failure(
 @pytest.mark.usefixtures('bench')
 def test_no_bridge_at_all(run: Run) -> None:
     replay('no bridge at all', run)
+
+
+@pytest.mark.usefixtures('bench')
+@pytest.mark.parametrize('words', [
+    ('read',), ('read', '--namespace', 'cell'), ('write', 'ramp_time=1'),
+    ('backup', '-o', 'x.yaml'), ('restore', 'kept.yaml', '--dry-run'),
+    ('compare', 'lift', 'hoist'), ('enable', 'lift'), ('disable', '/c*/lift')], ids=' '.join)
+def test_one_that_hangs_and_has_left_the_graph_is_named(
+        run: Run, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('kept.yaml').write_text('/lift: {ros__parameters: {ramp_time: 1.0}}\n')
+    domain = int(os.environ['ROS_DOMAIN_ID'])
+    failed = 2 if words[0] == 'compare' else 1      # calls every trouble 2
+    hung, elsewhere = Presence(domain, '/cell/bridge'), Presence(domain + 1, '/cell/other')
+    try:
+        code, lines, errors = run(*words)
+        assert (code, lines) == (failed, [])
+        assert f'/cell/bridge: this bridge of this host (process {os.getpid()})' in errors
+        assert '/cell/other' not in errors
+        assert run('read', '--namespace', 'hall')[0] == 1
+        hung.withdraw()
+        assert run(*words)[0] == failed
+    finally:
+        hung.withdraw()
+        elsewhere.withdraw()
 
 
 @pytest.mark.usefixtures('nowhere')

@@ -21,7 +21,7 @@ from drive_can_bridge.client import find_source, open_drives
 from drive_can_bridge.client.bridge import BridgedDrive
 from drive_can_bridge.client.drive import Drive, Enabled
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
+from drive_can_bridge.core.errors import DriveCanError, SilentBridge, WhichBridge
 from drive_can_bridge.core.parameters import Access, Storage
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.client import calls, search
@@ -272,8 +272,8 @@ def test_what_may_be_a_bridge_and_answers_nothing_is_named(
     monkeypatch.setattr(search, '_ANSWER_TIMEOUT', 1.0)
     hang(client, '/mute/bridge')
     offer(client, '/mute/bridge', 'get_parameter_types', GetParameterTypes)
-    with pytest.raises(NoBridge, match=r'^no bridge answers in namespace /mute \(ROS domain '
-                                       r'\d+\): /mute/bridge does not'):
+    with pytest.raises(SilentBridge, match=r'^no bridge answers in namespace /mute \(ROS domain '
+                                           r'\d+\): /mute/bridge does not$'):
         find_source(namespace='mute')
 
 

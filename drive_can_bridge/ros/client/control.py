@@ -197,7 +197,8 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
     :param words: names, patterns or full names; a full name says which bridge is meant.
     :raises UnknownDrive: a word names none.
     :raises WhichBridge: there are several, and not together.
-    :raises NoBridge: there is none, or it does not answer.
+    :raises NoBridge: there is none.
+    :raises SilentBridge: it does not answer.
     """
     nodes: dict[str, None] = {}
     known: dict[str | None, list[str]] = {}

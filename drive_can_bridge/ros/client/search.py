@@ -23,8 +23,9 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.errors import DriveCanError, NoBridge, WhichBridge
+from drive_can_bridge.core.errors import DriveCanError, NoBridge, SilentBridge, WhichBridge
 from drive_can_bridge.core.text import is_ros_name
+from drive_can_bridge.process.locks import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
@@ -267,7 +268,8 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     :param namespace: where they run, ``/cell``, '' for the root; None: anywhere.
     :raises WhichBridge: there are several, and in several namespaces, or two of one name, or with
         drives of one name, or one that does not answer.
-    :raises NoBridge: there is none, or it does not answer.
+    :raises NoBridge: there is none.
+    :raises SilentBridge: it does not answer.
     """
     search = _search(graph, namespace, lambda names: bool(_which(names)))
     names = search.names
@@ -278,29 +280,42 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     if silent and len(names) > 1:
         raise WhichBridge(f'several bridges are running: {", ".join(names)}, and not every one '
                           f'answers: {", ".join(silent)}')
-    bridges: dict[str, str] = {}
+    bridge_of: dict[str, str] = {}
     for name in names:
         for drive in search.found[name].drives or ():
-            if drive in bridges:
-                raise WhichBridge(f'{bridges[drive]} and {name} have a drive {drive} each: start '
-                                  'each in a namespace of its own')
-            bridges[drive] = name
-    if silent or not bridges:
-        raise NoBridge(nobody(namespace, silent))
-    return bridges
+            if drive in bridge_of:
+                raise WhichBridge(f'{bridge_of[drive]} and {name} have a drive {drive} each: '
+                                  'start each in a namespace of its own')
+            bridge_of[drive] = name
+    if silent or not bridge_of:
+        raise _none(graph, namespace, search.found.values(), silent)
+    return bridge_of
 
 
 def find_bridges(graph: Graph, pattern: str) -> list[Found]:
     """
     Return the bridges in all namespaces that fit to a shell pattern.
 
-    :raises NoBridge: there is none, or one that does not answer.
+    :raises NoBridge: there is none.
+    :raises SilentBridge: one does not answer.
     """
     found = [each for each in _search(graph, None, lambda _: False).found.values()
              if fnmatchcase(namespace_of(each.name), pattern)]
     if not found or not all(each.answered for each in found):
-        raise NoBridge(nobody(pattern, [each.name for each in found if not each.answered]))
+        raise _none(graph, pattern, found, [each.name for each in found if not each.answered])
     return found
+
+
+def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],
+          silent: Sequence[str]) -> DriveCanError:
+    """Say that there is no bridge, or none that answers: one that has left the graph, perhaps."""
+    if silent:
+        return SilentBridge(nobody(pattern, silent))
+    domain = graph.client_node.context.get_domain_id()
+    known = {short(each.name) for each in seen}
+    hung = [f'{each.name}: {each.silence(domain)}, and holds its drives' for each in bridges()
+            if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
+    return SilentBridge('; '.join(hung)) if hung else NoBridge(nobody(pattern))
 
 
 def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
