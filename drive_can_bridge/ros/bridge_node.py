@@ -39,7 +39,7 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import (
-    check_dynamic, configuration_from_overrides, declared_parameters)
+    check_dynamic, configuration_from_file, configuration_from_overrides, declared_parameters)
 from drive_can_bridge.configuration.parameter_file import unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
@@ -350,7 +350,7 @@ class BridgeNode(LifecycleNode):
                                                          adapters=adapters)
         except ConfigurationError as error:
             lines = [f'drive_can validate {shlex.quote(file)} names the lines'
-                     for file in self._files[:1]]
+                     for file in filter(_is_wrong, self._files)][:1]
             raise ConfigurationError([*problems, *error.problems, *lines]) from None
         if problems:
             raise ConfigurationError(problems)
@@ -460,6 +460,17 @@ def _gone(drive: DriveNode) -> bool:
     if drive.answer_all():
         drive.destroy()
         return True
+    return False
+
+
+def _is_wrong(file: str) -> bool:
+    """Tell whether a parameter file has problems of its own, beside those of a command line."""
+    try:
+        configuration_from_file(file, adapters=adapters)
+    except ConfigurationError:
+        return True
+    except OSError:     # it has gone, and its lines with it
+        pass
     return False
 
 

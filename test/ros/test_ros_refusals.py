@@ -88,6 +88,15 @@ def test_bus_that_can_never_work(run: Run, tmp_path: Path, bus: dict[str, object
     assert all(word in text for word in words)
 
 
+def test_a_file_is_to_be_validated_where_it_is_wrong_itself(run: Run, tmp_path: Path) -> None:
+    wrong = '-p', 'buses.main.bitrate:=123456'
+    code, told = run(*with_file(written(tmp_path)), *wrong)
+    assert (code, len(told)) == (1, 1)
+    code, told = run(*with_file(written(tmp_path, interface='slkan')), *wrong)
+    assert (code, len(told)) == (1, 2)
+    assert f'drive_can validate {tmp_path}/bridge.yaml ' in told[-1]
+
+
 def test_key_that_stands_twice(run: Run, tmp_path: Path) -> None:
     """The values that rcl hands over do not show it."""
     file = written(tmp_path)
