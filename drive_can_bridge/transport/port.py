@@ -50,8 +50,9 @@ _LENGTH_MAX = 8
 _CLOSE_TIMEOUT = 0.1
 # An adapter that sends rubbish and nothing else for that many lines is opened anew.
 _MALFORMED_MAX = 1000
-# Bytes of an unfinished line of a serial adapter that are kept.
+# Bytes of an unfinished line of a serial adapter that are kept; robotell has packets instead.
 _LINE_MAX = 4096
+_UNFINISHED = '_buffer', '_rxbuffer'
 # Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
 _KERNEL_ERRORS = ('socketcan', 'socketcand')
 # Where python-can keeps the serial port of an interface. What is in ``serialPortOrig`` has text
@@ -214,9 +215,11 @@ class Port(EndPoint):
 
     def _limit_line(self) -> None:
         """Keep a line that never ends from filling the memory."""
-        line = getattr(self._bus, '_buffer', b'')
-        if len(line) > _LINE_MAX:
-            self._malformed()
+        for kept in _UNFINISHED:
+            line = getattr(self._bus, kept, None)
+            if isinstance(line, bytearray) and len(line) > _LINE_MAX:
+                line.clear()
+                self._malformed()
 
     def _forget_line(self) -> None:
         """Drop the line that python-can keeps when it cannot decode it."""

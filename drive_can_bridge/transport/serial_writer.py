@@ -14,6 +14,10 @@ import select
 from typing import Any
 
 REFUSED = '\a'
+#: of lines that are data frames: where their length stands, one digit in front of the data
+_LENGTH_AT = {'t': 4, 'T': 9, 'x': 9}
+#: characters of the time stamp that may follow: none, ms, µs
+_STAMPS = (0, 4, 8)
 #: frames refused in a row, and s that this has to last, until nothing leaves any more
 REFUSED_MAX = 4
 REFUSED_TIME = 0.05
@@ -134,6 +138,22 @@ class _WatchedPort:
             port.write(getattr(self, 'LINE_TERMINATOR', b''))
 
 
+def check_line(line: str) -> None:
+    """
+    Look whether a line of an SLCAN adapter is whole, as far as its length tells.
+
+    python-can takes as many data as the line says, wherever they begin. Where a serial port has
+    lost bytes, other digits stand there: a frame that nobody has sent.
+
+    :raises ValueError: it lacks something, or has too much.
+    """
+    place = _LENGTH_AT.get(line[0])
+    if place is not None:
+        rest = len(line.rstrip('\r')) - place - 1
+        if rest - 2 * int(line[place:place + 1]) not in _STAMPS:
+            raise ValueError(f'{line!r}: bytes are missing')
+
+
 class _WatchedSlcan(_WatchedPort):
     """The same for SLCAN, whose lines python-can throws away where they are no frame."""
 
@@ -145,6 +165,7 @@ class _WatchedSlcan(_WatchedPort):
         line: str | None = super()._read(timeout)  # type: ignore[misc]
         if line:
             self.drive_can_answers.take(line, self.drive_can_now())
+            check_line(line)
         return line
 
 

@@ -439,6 +439,39 @@ def test_adapter_that_refuses_some_is_not_lost() -> None:
     assert answered(*10 * ['\a', '\a', '\a', 'z\r'], seconds=1.0) == (30, False)
 
 
+WHOLE = [(b'T103FFFF084A38012C00370000', '103FFFF0#4A38012C00370000'),
+         (b't0C984037000C00000000', '0C9#4037000C00000000'),
+         (b't7F1400110022', '7F1#00110022'),
+         (b't7F14001100221234', '7F1#00110022'),            # with the time in ms
+         (b't7F1400110022000123AB', '7F1#00110022'),        # in µs
+         (b't0C90', '0C9#')]
+#: without one of their bytes, and with a part of the next line
+TORN = [b'T103FFFF04A38012C00370000', b't0C94037000C00000000', b't7F14A01000000000000',
+        b't0C94370B0020t0C94370F1120', b't', b'T103FFFF0']
+
+
+@pytest.mark.real
+def test_line_that_has_lost_bytes_is_no_frame(adapter: Adapter) -> None:
+    # what follows in place of the length made a shorter frame of it, with other data
+    os.write(adapter.terminal.master, b'\r'.join(
+        [*TORN, *(line for line, _ in WHOLE), b'']))
+    found, deadline = [], time.monotonic() + 10.0
+    while len(found) < len(WHOLE):
+        assert time.monotonic() < deadline
+        frame = adapter.port.receive(0.01)
+        found += [] if frame is None else [str(frame)]
+    assert found == [frame for _, frame in WHOLE]
+    assert adapter.port.rejected_frames == len(TORN)
+
+
+@pytest.mark.parametrize('kept', ['_buffer', '_rxbuffer'], ids=['slcan', 'robotell'])
+def test_garbage_without_an_end_does_not_fill_the_memory(bus: FakeBus, kept: str) -> None:
+    port, garbage = Port(bus, REAL), bytearray(4097)
+    setattr(bus, kept, garbage)
+    assert port.receive(0.0) is None
+    assert (len(garbage), port.rejected_frames) == (0, 1)
+
+
 def test_absent_adapter(tmp_path: Path) -> None:
     with pytest.raises(BusUnavailable, match='nothing is not there: check its plug'):
         open_port(slcan(str(tmp_path / 'nothing')), REAL)
