@@ -235,6 +235,7 @@ class Link:
                 self.taken = False
                 port.error_witness = self.error_witness
                 frame = port.receive(RECEIVE_TIMEOUT)
+                received_at = self._now() - port.age
                 self._loss = self._blocked = self._no_room_since = None
                 # after a loss nobody knows whether anybody is there before somebody was heard
                 self._heard = not opened
@@ -244,6 +245,8 @@ class Link:
                 reported = ''
                 self._listener.bus_opened()
                 self._tell_tried()
+                # it came before anything was asked: it must not pass for the answer
+                port.age = self._now() - received_at
                 self._read(port, frame)
             except BusUnavailable as error:
                 if self._ended():

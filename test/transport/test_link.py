@@ -270,6 +270,22 @@ def test_frame_that_is_there_before_the_bus_counts_as_open(make: Callable[..., B
     wait_for(lambda: bench.listener.frames == [ANSWER])
 
 
+def test_such_a_frame_is_older_than_what_is_asked_when_it_opens(
+        make: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
+    class ReadyPort(FakePort):
+        def __init__(self) -> None:
+            super().__init__()
+            self.age = 0.01
+            self.coming.append(ANSWER)
+    ages: list[float] = []
+    monkeypatch.setattr(Listener, 'bus_opened', lambda listener: (
+        listener.told.append('opened'), pause(0.02)))
+    monkeypatch.setattr(Listener, 'frame_received', lambda listener, frame, age: ages.append(age))
+    make(ReadyPort)
+    wait_for(lambda: ages)
+    assert ages[0] == pytest.approx(0.03)
+
+
 def test_loss_seen_by_a_sender(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.port.failure = BusUnavailable('absent')
