@@ -8,6 +8,7 @@ read. Both are replaced as soon as the port is there, because python-can's const
 """
 
 from collections.abc import Callable
+import errno
 import math
 import os
 import select
@@ -69,22 +70,22 @@ class SerialWriter:
 
     Nothing old piles up: a terminal with more than 256 bytes waiting does not count as writable.
 
+    :param port: of pyserial.
     :param now: the steady time.
     :ivar timeout: s.
     """
 
-    def __init__(self, descriptor: int, now: Callable[[], float], timeout: float = 0.0) -> None:
-        self._descriptor = descriptor
+    def __init__(self, port: Any, now: Callable[[], float], timeout: float = 0.0) -> None:
+        self._port = port
         self._now = now
         self.timeout = timeout
 
     @classmethod
     def take_over(cls, port: Any, now: Callable[[], float]) -> 'SerialWriter | None':
         """Write for this port from now on; None: it is not one of a POSIX system."""
-        descriptor = getattr(port, 'fd', None)
-        if not isinstance(descriptor, int):
+        if not isinstance(getattr(port, 'fd', None), int):
             return None
-        writer = cls(descriptor, now, OPEN_TIMEOUT)
+        writer = cls(port, now, OPEN_TIMEOUT)
         port.write = writer.write
         port.flush = writer.flush
         return writer
@@ -94,6 +95,7 @@ class SerialWriter:
         Write everything.
 
         :raises TimeoutError: there is no room for it.
+        :raises OSError: the port was closed meanwhile, or its device has gone.
         """
         rest = memoryview(data)
         deadline = self._now() + self.timeout
@@ -109,6 +111,14 @@ class SerialWriter:
 
     def flush(self) -> None:
         """Do not wait for the adapter."""
+
+    @property
+    def _descriptor(self) -> int:
+        # asked for each time: when the port is closed, the next thing opened gets the number
+        descriptor: int | None = self._port.fd
+        if descriptor is None:
+            raise OSError(errno.EBADF, 'the port was closed')
+        return descriptor
 
 
 class _WatchedPort:

@@ -472,6 +472,23 @@ def test_garbage_without_an_end_does_not_fill_the_memory(bus: FakeBus, kept: str
     assert (len(garbage), port.rejected_frames) == (0, 1)
 
 
+def test_a_port_that_was_closed_writes_to_no_other(adapter: Adapter) -> None:
+    # the reader closes it while a sender is about to write; the next thing opened has its number
+    number = adapter.port._serial.fd
+    other, far_end = os.pipe()
+    adapter.port._serial.close()
+    try:
+        os.dup2(far_end, number)
+        with pytest.raises(BusUnavailable):
+            adapter.port.send(STOP, 0.1)
+        os.set_blocking(other, False)
+        with pytest.raises(BlockingIOError):
+            os.read(other, 100)
+    finally:
+        for each in (number, other, far_end):
+            os.close(each)
+
+
 def test_absent_adapter(tmp_path: Path) -> None:
     with pytest.raises(BusUnavailable, match='nothing is not there: check its plug'):
         open_port(slcan(str(tmp_path / 'nothing')), REAL)
