@@ -106,9 +106,11 @@ class NodeParameters:
         return current
 
     def declare(self, configuration: BridgeConfiguration) -> None:
-        """Declare every key of a configuration that is not declared yet."""
+        """Declare every key of a configuration, or tell what it says now, with new profiles."""
         for name, value, description, dynamic in declared_parameters(configuration):
             if self._node.has_parameter(name):
+                if not dynamic:
+                    self.announce(name, value)
                 continue
             if dynamic:
                 self._dynamic.append(name)
@@ -116,6 +118,11 @@ class NodeParameters:
                 name, value, ParameterDescriptor(
                     description=description, read_only=not dynamic, dynamic_typing=True),
                 ignore_override=True)
+
+    def pass_on(self) -> None:
+        """Pass on what may have been changed when there was nobody to take it."""
+        for name in self._dynamic:
+            self._changed(name, self._node.get_parameter(name).value)
 
     def _prepare(self, names: Sequence[str]) -> None:
         """Have a value that is being asked for: looking at the graph is not cheap."""
@@ -368,6 +375,7 @@ class BridgeNode(LifecycleNode):
             self, self.log, configuration, self._spinner, self._control_thread,
             self._parameter_thread, self._stamps, self._steady, open_bus=self._open_bus,
             announce=self._node_parameters.announce, dismiss=self._dismiss, fatal=self._fatal)
+        self._node_parameters.pass_on()     # since they are declared
         try:
             self._runtime.open()
         except BaseException:

@@ -3,6 +3,7 @@
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client, wait_until
@@ -51,6 +52,24 @@ def test_the_digest_of_the_profile(bridge: StartBridge, client: Client, tmp_path
         for path in (profiles_directory() / 'datamodel_example.yaml', profile)]
     [(done, reason)] = client.set(BRIDGE, drives__conveyor__profile_sha256='0')
     assert not done and 'read-only' in reason
+
+
+def test_an_edited_profile_is_told_with_the_next_configuration(
+        bridge: StartBridge, client: Client, tmp_path: Path) -> None:
+    """A backup is restored by what the bridge says of the profile: of the one that it goes by."""
+    profile = tmp_path / 'mine.yaml'
+    text = (profiles_directory() / 'datamodel_example.yaml').read_text(encoding='utf-8')
+    profile.write_text(text, encoding='utf-8')
+    bridge(parameters(conveyor={**CONVEYOR, 'profile': str(profile)}))
+    told = 'drives.conveyor.profile_sha256', 'drives.conveyor.restore'
+    before = client.get(BRIDGE, *told)
+    profile.write_text(text + 'restore: {after: {jog_speed: 5}}\n', encoding='utf-8')
+    assert client.get(BRIDGE, *told) == before
+    for label in ('deactivate', 'cleanup', 'configure'):
+        assert client.transition(label=label)
+    assert client.get(BRIDGE, *told) == [
+        hashlib.sha256(profile.read_bytes()).hexdigest(),
+        '{"before": [], "after": [["jog_speed", 50, 65535]]}']
 
 
 @pytest.mark.parametrize('name, value', [
@@ -154,6 +173,23 @@ def test_dynamic_ones_take_effect(bridge: StartBridge, client: Client) -> None:
         BRIDGE, drives__conveyor__rearm='neutral',
         drives__conveyor__command_timeout=-1)[0] is False
     assert session.setpoints.rearm_immediate
+
+
+def test_one_that_is_set_while_the_bridge_configures_itself_takes_effect(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    from drive_can_bridge.ros import bridge_node
+
+    class Runtime(bridge_node.BridgeRuntime):
+        """Somebody is quick: parameters are declared, and the drives are being made."""
+
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            assert client.set(BRIDGE, drives__conveyor__command_timeout=4,
+                              drives__conveyor__rearm='immediate') == [(True, '')] * 2
+    monkeypatch.setattr(bridge_node, 'BridgeRuntime', Runtime)
+    one = bridge()
+    setpoints = one.node.drives['conveyor'].session.setpoints
+    assert (setpoints.timeout, setpoints.rearm_immediate) == (4.0, True)
 
 
 def test_changes_are_announced(shared_bridge: StartBridge, client: Client) -> None:
