@@ -40,6 +40,9 @@ class RequestServer(Protocol):
     def cancel(self) -> None:
         """Forget all of them; nobody is told."""
 
+    def known(self, request: Request) -> Outcomes:
+        """Return what became of the first names of one that was forgotten."""
+
 
 class Conversation(Protocol):
     """What users can have, by where it stands with their drive; the session itself."""
@@ -139,12 +142,16 @@ class DriveServices:
         return self._server.waiting
 
     def fail_all(self, reason: Sentence) -> None:
-        """Forget the requests for parameters that are under way, and answer them."""
+        """
+        Forget the requests for parameters that are under way, and answer them.
+
+        What was written is not taken back by that: whoever asked has to know of it.
+        """
         self._server.cancel()
         requests = self._open.copy()
         self._open.clear()
         for request in requests:
-            self._refuse(request, reason)
+            self._refuse(request, reason, self._server.known(request))
 
     def _request(self, request: Request, now: float) -> None:
         refusal = self._session.request_refusal(now) or self._absence
@@ -163,9 +170,9 @@ class DriveServices:
         self._complete(request, outcomes)
         self._session.request_answered(request, outcomes)
 
-    def _refuse(self, request: Request, reason: Sentence) -> None:
-        """Answer a request with the same failure for every name."""
-        self._complete(request, (Failure(reason),) * len(request))
+    def _refuse(self, request: Request, reason: Sentence, known: Outcomes = ()) -> None:
+        """Answer a request with the same failure for every name behind those that are known."""
+        self._complete(request, (*known, *(Failure(reason),) * (len(request) - len(known))))
 
     def _complete(self, request: Request, outcomes: Outcomes) -> None:
         session, event = self._session, RequestCompleted(request, outcomes)

@@ -127,6 +127,8 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         self.channel = channel
         self.retry = retry
         self.placement = placement
+        #: of writes that are being served: what became of their first names
+        self._known: dict[Request, list[Outcome]] = {}
 
     @property
     def waiting(self) -> int:
@@ -142,6 +144,10 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
     def cancel(self) -> None:
         """Forget all of them; nobody is told."""
         self.channel.cancel(Priority.USERS)
+
+    def known(self, request: Request) -> Outcomes:
+        """Return what became of the first names of one that was forgotten, and forget that."""
+        return tuple(self._known.pop(request, ()))
 
     # -- what a family knows ----------------------------------------------------------------------
 
@@ -212,7 +218,7 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
             misfit = self.misfit(items)
             together = () if misfit else (yield from write(items))
             return together or (Failure(misfit),) * len(items)
-        outcomes: list[Outcome] = []
+        outcomes = self._known[request] = []
         gone: Failure | None = None
         for parameter, raw in items:
             outcome = self.aside(parameter, write=True) or gone
@@ -222,4 +228,4 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
                         'no_answer_offline', 'not_sent'):
                     gone = outcome
             outcomes.append(outcome)
-        return tuple(outcomes)
+        return self.known(request)

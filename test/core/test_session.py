@@ -45,6 +45,9 @@ class Idle(Session):
         def cancel(self) -> None:
             self._session.done.append(('cancel',))
 
+        def known(self, request: Request) -> tuple[Any, ...]:
+            return ()
+
     def prepare_stop(self, now: float) -> bool:
         return False
 

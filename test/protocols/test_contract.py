@@ -767,6 +767,28 @@ def test_requests_end_with_the_bus_or_with_activity(partner: Partner) -> None:
         assert outcomes(partner) == [[reason, reason], [reason]]
 
 
+@pytest.mark.parametrize('reason', ['bus down', 'bridge inactive'])
+def test_what_was_written_before_a_request_ends_is_told(partner: Partner, reason: str) -> None:
+    """Whoever is told that nothing was written would leave a drive with half of its settings."""
+    answers = partner.answers
+    # the drive has heard of the second one, but its answer is lost
+    partner.answers = lambda sent: [  # type: ignore[method-assign]
+        answer for answer in answers(sent) if partner.registers[41] != 9]
+    partner.writes((GAIN, 8), (DAMPING, 9), (RAMP, 7))
+    for _ in range(1000):
+        if partner.registers[41] == 9:
+            break
+        partner.live(0.0005)
+    assert (partner.registers[40], partner.registers[41]) == (8, 9)
+    ok = partner.talk.session.statistics.requests_ok
+    if reason == 'bus down':
+        partner.talk.bus_down(partner.now)
+    else:
+        partner.deliver(partner.talk.deactivate(partner.now))
+    assert outcomes(partner) == [['written', reason, reason]]
+    assert partner.talk.session.statistics.requests_ok == ok + 1
+
+
 def test_what_users_may_not_write(partner: Partner) -> None:
     refusal = partner.talk.session.services.write_refusal
     assert refusal(partner.own(SPEED)) == says('sent_cyclically', name='speed_setpoint')
