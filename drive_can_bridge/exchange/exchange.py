@@ -261,9 +261,7 @@ class BusExchange:
             self._last_pass = self._meant_at = now
             self.active = True
             for member in self._members:
-                member.anew_at = math.inf
-                member.tell(member.listener.discard_commands, '')
-                member.take(member.session.activate, now)
+                member.begin(member.session.activate, now)
         self._wake.ring()
 
     def serve(self) -> None:

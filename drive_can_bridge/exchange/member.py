@@ -214,13 +214,17 @@ class Member:
         except Exception:   # noqa: BLE001  diagnostics have it
             pass
 
+    def begin(self, step: Callable[[float], None], now: float) -> None:
+        """Have the session begin: what was wrong before is over, and commands that wait are."""
+        self.anew_at, self._defect_told = math.inf, ''
+        self.tell(self.listener.discard_commands, '')
+        self.take(step, now)
+
     def begin_anew(self, now: float) -> None:
         """Look for the drive again, as soon as its stop has run its course."""
         session = self.session
         if session.stopped:
-            self.anew_at, self._defect_told = math.inf, ''
-            self.tell(self.listener.discard_commands, '')
-            self.take(session.begin_anew, now)
+            self.begin(session.begin_anew, now)
         elif now >= self._give_up_at:
             self.take(session.give_up, now)
 

@@ -34,8 +34,9 @@ from drive_can_bridge.ros.middleware import command_quality, GONE, overriding
 
 #: ns by which a command may take longer than the quickest of its topic
 LATENESS_MAX = 250_000_000
-#: messages that are taken at once where everything is kept
-DEPTH_UNBOUNDED = 1000
+#: messages that are taken at once where everything is kept, and that are thrown away at once: more
+#: than any middleware keeps (Fast DDS: 5000), since what is left would pass for fresh
+DEPTH_UNBOUNDED, KEPT_MAX = 1000, 100_000
 #: bytes of a message that are looked at: a JointState of a thousand joints with long names
 LENGTH_MAX = 1 << 20
 #: bytes in front of every message: how the rest is encoded
@@ -82,8 +83,9 @@ class CommandTopic:
         self._type: Any = subscription.msg_type
         # more than can wait came meanwhile: that is for the next time
         quality = subscription.qos_profile
-        self._depth = (quality.depth if quality.history is HistoryPolicy.KEEP_LAST
-                       else DEPTH_UNBOUNDED) or 1
+        bounded = quality.history is HistoryPolicy.KEEP_LAST
+        self._depth = (quality.depth if bounded else DEPTH_UNBOUNDED) or 1
+        self._waiting_max = self._depth if bounded else KEPT_MAX
         self._use, self._old = use, old
         self._stamp = stamp
         self._late = late
@@ -119,12 +121,12 @@ class CommandTopic:
 
     def discard(self) -> int:
         """Throw away what waits, but for what it may stop; return how many commands that were."""
-        for count in range(self._depth):
+        for count in range(self._waiting_max):
             taken = self.handle.take_message(self._type, True)
             if taken is None:
                 return count
             self._take_old(taken[0])
-        return self._depth
+        return self._waiting_max
 
     def _take_old(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):

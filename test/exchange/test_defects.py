@@ -275,3 +275,23 @@ def test_online_again_is_told() -> None:
     world.bench.notes[0].events.clear()
     world.live(3.0)
     assert StationFound() in world.bench.notes[0].events
+
+
+def test_the_same_defect_is_told_again_after_an_activation(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World('29 bit')
+    monkeypatch.setattr('time.sleep', lambda _: world.live(0.002))
+    monkeypatch.setattr(world.exchange, '_pass_to_stop', lambda: None)
+    session, notes = world.bench.sessions[0], world.bench.notes[0]
+    for _ in range(2):
+        notes.events.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(session, 'receive_frame', raising(1, session.receive_frame))
+            world.live(0.1)
+        assert [type(event) for event in notes.events].count(DriveFailed) == 1
+        world.exchange.deactivate()     # before it is looked for again
+        world.took()
+        world.exchange.activate()
+        world.took()
+        world.live(1.0)
+        assert session.online

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from rclpy.qos import QoSProfile
+from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
@@ -158,6 +158,21 @@ def test_a_middleware_without_time_stamps() -> None:
         taken.subscription.put(serialize_message(Bool(data=True)), 0, 0)
     taken.topic.take(1.0)
     assert taken.used == [True] * 3
+
+
+def test_where_everything_is_kept_everything_is_thrown_away() -> None:
+    """What would be left is stale, and its time stamps do not tell: it came in time."""
+    taken = Taken(Float64)
+    taken.subscription.qos_profile = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+    topic = CommandTopic(
+        taken.subscription, use=lambda message, _: taken.used.append(message),  # type: ignore
+        old=taken.old.append, late=taken.late.append, unreadable=taken.unreadable.append,
+        stamp=clock().stamp)
+    for value in range(2500):
+        taken.subscription.put(serialize_message(Float64(data=float(value))))
+    assert topic.discard() == 2500
+    topic.take(1.0)
+    assert not taken.used and len(taken.old) == 2500
 
 
 def test_a_flood_is_taken_in_bounds() -> None:
