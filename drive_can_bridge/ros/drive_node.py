@@ -236,8 +236,8 @@ class DriveNode(DriveListener):
             if self.session.active:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
-            elif not self._may_run:
-                self._tell_stopped()
+            elif event.reason.code == 'deactivated' and not self._may_run:
+                self._tell_stopped()    # else it was lost before the end of its stop
         elif isinstance(event, DriveFailed):
             self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
             self._online.publish(Bool(data=False))

@@ -10,9 +10,11 @@ import pytest
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from waiting import clock, pause
+import world
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.drive_services import DriveServices
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.diagnostics import GRACE
 
@@ -110,6 +112,35 @@ def test_a_drive_that_says_enabled_to_the_end_is_not_called_stopped(
     client.wait_logged('lift: told to stop, and answers, but its last status word does not say '
                        'so: enabled', WARN)
     assert 'lift: stopped' not in client.logged(0)
+
+
+@pytest.mark.parametrize('content', [parameters(conveyor=CONVEYOR), LIFTS])
+def test_a_bus_that_is_lost_during_the_stop_leaves_nobody_called_stopped(
+        bridge: StartBridge, client: Client, content: Any) -> None:
+    one = bridge(content)
+    (name, drive), = one.node.drives.items()
+    one.online()
+    if drive.session.control is not None:
+        assert client.call(f'/{name}/enable', SetBool, SetBool.Request(data=True)).success
+    for value in (0.0, 100.0):
+        client.publish(f'/{name}/command/speed_setpoint', Float64(data=value))
+    wait_until(lambda: float(one.played[name].value('actual_speed')) > 10.0)
+    assert world.current is not None
+    wire = world.current.wires.of(one.channel())
+
+    def unplug(_: Frame) -> None:
+        """Between the first stop cycle and its answer."""
+        if not one.node.exchanges['main'].active and not wire.down:
+            wire.lose()
+    wire.watchers.append(unplug)
+    client.listen()
+    one.node.stop()
+    danger = sentences.may_still_be_running(sentences.bus_lost_before_stop())
+    client.wait_logged(f'{name}: {danger}', WARN)
+    assert not [line for line in client.logged(0) if line.startswith((
+        f'{name}: stopped', f'{name}: told to stop, and answers'))]
+    one.close()
+    one.errors.clear()      # of the simulation, whose bus it is, too
 
 
 def test_stopping_twice_is_harmless(bridge: StartBridge, client: Client) -> None:
