@@ -344,6 +344,10 @@ class BusExchange:
 
     # -- users, any thread ------------------------------------------------------------------------
 
+    def stands_still(self, now: float) -> bool:
+        """Tell whether nobody has looked after its drives for so long that nothing is known."""
+        return now - self._last_pass >= LOST_TIME
+
     @contextmanager
     def entered(self) -> Iterator[bool]:
         """Have the lock, for who serves other buses, too; False: this one hangs."""

@@ -8,9 +8,9 @@ rate of its own the newest sample of each is taken together, under the stamp of 
 thread of an exchange, which is awake in any case (``exchange.PeriodicTask``).
 
 It always names the same joints: the hardware interface copies a message while it reads the one
-before, and fails when the number of names has changed. A joint whose drive is not online has NaN
-in every quantity: nobody is told a position that nobody has measured. When the last one goes, that
-is published once.
+before, and fails when the number of names has changed. A joint whose drive is not online, or whose
+bus hangs, has NaN in every quantity: nobody is told a position that nobody has measured. When the
+last one goes, that is published once.
 
 Commands have a subscription for each bus, because each bus has a thread that takes commands just
 before its cycles; what concerns the drives of other buses is left to theirs.
@@ -55,10 +55,11 @@ class _Joint:
     :ivar unknown: a sample of which nothing is known.
     """
 
-    __slots__ = ('_places', 'name', 'samples', 'session', 'unknown', 'width')
+    __slots__ = ('_places', 'exchange', 'name', 'samples', 'session', 'unknown', 'width')
 
     def __init__(self, drive: DriveNode, joint: JointConfiguration) -> None:
         self.session = drive.session
+        self.exchange = drive.exchange
         self.samples = drive.samples
         self.name = joint.name
         parameters = {parameter.name: (slot, parameter) for slot, parameter
@@ -131,7 +132,8 @@ class JointStates:
         oldest, stamp = math.inf, NO_STAMP
         for joint in self._joints:
             last = joint.samples.last
-            if last is None or not joint.session.online:
+            if (last is None or not joint.session.online
+                    or joint.exchange.stands_still(now)):   # another bus, which hangs
                 raws += joint.unknown
                 continue
             sample, received_at, stamped = last

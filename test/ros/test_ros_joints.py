@@ -84,6 +84,23 @@ def test_a_drive_that_is_gone_has_nan_and_keeps_its_place(bridge: StartBridge,
         assert {len(getattr(message, kind)) for message in topic.messages} == {3}
 
 
+def test_a_bus_that_hangs_has_no_actual_values(bridge: StartBridge, client: Client) -> None:
+    """What it measured is of before, and nobody can say any more that its drives are there."""
+    one = bridge(two(diagnostics_period=3600.0))
+    topic = client.topic(STATES, JointState)
+    one.online()
+    one.played['north'].set_value('motor_current', 2.5)
+    topic.wait(lambda m: same(m.effort, [math.nan, 2.5, math.nan]))
+    with late(one.node.exchanges['side']):
+        pause(2.0)
+        message = topic.messages[-1]
+        assert same(message.effort, [math.nan] * 3)
+        assert math.isfinite(message.position[0])
+        age = clock().stamp() * 1e-9 - message.header.stamp.sec - 1e-9 * message.header.stamp.nanosec
+        assert age < 0.1
+    topic.wait(lambda m: same(m.effort, [math.nan, 2.5, math.nan]))
+
+
 def unknown(message: JointState) -> bool:
     return all(map(math.isnan, (*message.position, *message.velocity, *message.effort)))
 
