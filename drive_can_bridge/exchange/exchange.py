@@ -388,6 +388,14 @@ class BusExchange:
             session.reconfigure(**changes)
             member.due = session.next_timer()
 
+    def contain(self, session: Session, error: Exception) -> None:
+        """
+        Stop a drive because of a defect in what belongs to it, whoever met it.
+
+        To be called in the course of a call of a listener: with the bus lock held.
+        """
+        self._member(session).unheard(error)
+
     def _member(self, session: Session) -> Member:
         return next(member for member in self._members if member.session is session)
 

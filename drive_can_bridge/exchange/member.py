@@ -121,7 +121,7 @@ class Member:
         try:
             call(*arguments)
         except Exception as error:  # noqa: BLE001  likewise
-            self._unheard(error)
+            self.unheard(error)
 
     def take_commands(self, now: float) -> None:
         """Let the listener hand in the commands that wait."""
@@ -169,7 +169,7 @@ class Member:
             except Exception as error:  # noqa: BLE001  the other events are told all the same
                 failure = failure or error
         if failure is not None:
-            self._unheard(failure)
+            self.unheard(failure)
 
     # -- defects ----------------------------------------------------------------------------------
 
@@ -186,7 +186,7 @@ class Member:
         for partner in self.partners:
             partner._fail(partner_failed(self.session.configuration.name, text))
 
-    def _unheard(self, error: Exception) -> None:
+    def unheard(self, error: Exception) -> None:
         """Record that the listener has raised: a stop that takes its course goes on."""
         if self.session.active:
             self.contain(error)

@@ -188,6 +188,13 @@ class DriveNode(DriveListener):
         if self.joint_commands is not None:
             self.joint_commands.take(now)
 
+    def take_joint(self, quantity: str, value: float, now: float) -> None:
+        """Take its part of the commands for all joints; another drive may have its turn."""
+        try:
+            self.commands.take_quantity(quantity, value, now)
+        except Exception as error:  # noqa: BLE001  which costs no other drive
+            self.exchange.contain(self.session, error)
+
     def discard_commands(self, why: str) -> None:
         """Throw waiting commands away."""
         self.commands.discard(why)

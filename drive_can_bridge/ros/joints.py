@@ -29,7 +29,6 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, JointConfiguration
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import PeriodicTask
-from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.log import Log
@@ -180,7 +179,7 @@ class Joints:
         known = {drive.drive.joint.name for drive in ordered if drive.drive.joint is not None}
         for bus in configuration.buses:
             here = [drive for drive in ordered if drive.drive.bus == bus]
-            joints = {drive.drive.joint.name: drive.commands for drive in here
+            joints = {drive.drive.joint.name: drive for drive in here
                       if drive.drive.joint is not None}
             if not joints:
                 continue
@@ -225,13 +224,13 @@ class _Taker:
     """
     Takes messages for the joints of one bus.
 
-    :param joints: who takes what concerns a joint, by its name.
+    :param joints: the drives of the bus by the names of their joints.
     :param known: the names of all joints of the bridge.
     :param warn: takes what is wrong with a message.
     :param inform: takes what nobody has to do anything about.
     """
 
-    def __init__(self, joints: Mapping[str, CommandIntake], known: Collection[str],
+    def __init__(self, joints: Mapping[str, DriveNode], known: Collection[str],
                  warn: Warn, inform: Callable[[str], None]) -> None:
         self._joints = joints
         self._known = known
@@ -248,13 +247,13 @@ class _Taker:
         wrong = self._problem(names, columns)
         if wrong is not None:
             for name in self._joints.keys() & set(names):
-                self._joints[name].count_refused()
+                self._joints[name].commands.count_refused()
             kind, text = wrong
             self._warn(f'joint commands: {kind}', f'joint_commands refused: {text}')
             return
         if names != self._names:
             self._names = names
-            self._parts = [(entry, self._joints[name].take_quantity)
+            self._parts = [(entry, self._joints[name].take_joint)
                            for entry, name in enumerate(names) if name in self._joints]
             for name in names:
                 if name not in self._known:
@@ -269,12 +268,12 @@ class _Taker:
         if self._problem(names, columns) is None:
             for entry, name in enumerate(names):
                 if name in self._joints:
-                    self._joints[name].take_old(message, entry)
+                    self._joints[name].commands.take_old(message, entry)
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a message that is thrown away, for all that it might have moved."""
-        for intake in self._joints.values():
-            intake.count_refused()
+        for drive in self._joints.values():
+            drive.commands.count_refused()
         self._warn(topic, text)
 
     def _problem(self, names: list[str],

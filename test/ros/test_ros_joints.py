@@ -208,6 +208,30 @@ def test_commands_for_all_of_them(bridge: StartBridge, client: Client) -> None:
     assert speeds(one)['north'] == 1000
 
 
+def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Client,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whichever drive of a bus has its turn takes the message, for all of them."""
+    one = bridge(two())
+    one.online()
+    client.listen()
+    names = ['ej', 'wj', 'sj']
+    client.publish(COMMANDS, JointState(name=names, velocity=[0.0] * 3))
+    wait_until(lambda: all(one.node.drives[name].session.setpoints.items[0].armed
+                           for name in ('east', 'west', 'south')))
+
+    def fail(*_: Any) -> None:
+        raise KeyError('a defect')
+    monkeypatch.setattr(one.node.drives['east'].session.services, 'command', fail)
+    for value in (10, 20, 30):
+        client.publish(COMMANDS, JointState(name=names, velocity=[value * RPM] * 3))
+        wait_until(lambda value=value: speeds(one)['south'] == 10 * value)
+    assert speeds(one) == {'west': 600, 'north': 0, 'east': 0, 'south': 300, 'plain': 0}
+    assert [name for name, drive in one.node.drives.items() if drive.times_lost] == ['east']
+    client.wait_logged('east: offline: ')
+    monkeypatch.undo()
+    one.online()
+
+
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
         bridge: StartBridge, client: Client) -> None:
     one = bridge(two())
