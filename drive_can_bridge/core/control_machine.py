@@ -296,6 +296,10 @@ class ControlMachine:
             self._choose()
             self._watch_disabled(now)
 
+    def rules_changed(self) -> None:
+        """Record that the rules know something else of what is wanted: by no status word."""
+        self._choose()
+
     def member_found(self, name: str) -> None:
         """Record that a member is online."""
         self._reports.find(name)

@@ -380,6 +380,9 @@ class Session(ABC):
     def exchange_ended(self) -> None:  # noqa: B027  optional
         """Forget what belongs to an exchange that has ended, answered or not."""
 
+    def commands_expired(self, now: float) -> None:  # noqa: B027  optional
+        """Record that setpoints went neutral because no fresh command keeps them."""
+
     def lost(self, now: float, *, was_online: bool) -> None:  # noqa: B027  optional
         """Record that the drive is lost."""
 

@@ -149,7 +149,7 @@ class CyclicExchange(Generic[TelegramT]):
         session, answers, timer = self._session, self._answers, self.timer
         if now < timer.due:
             answers.handle_timer(now)
-            if session.interlock.expire(now) and session.setpoints.changed:
+            if self._expire(now) and session.setpoints.changed:
                 # a drive has that long for its answer
                 timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
             return
@@ -161,7 +161,7 @@ class CyclicExchange(Generic[TelegramT]):
             self.settle(answers, now)
         if timer.due == math.inf:   # what was missed has ended the cycles
             return
-        session.interlock.expire(now)
+        self._expire(now)
         control, cycle = session.control, self._cycle
         if (session.setpoints.changed or cycle is None
                 or control is not None and control.word != cycle.word):
@@ -170,6 +170,13 @@ class CyclicExchange(Generic[TelegramT]):
         self._frames_out = 0
         self.again, self._whole = not self._whole, True
         self._teller.send_cycle(cycle.telegram, now)
+
+    def _expire(self, now: float) -> bool:
+        """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
+        expired = self._session.interlock.expire(now)
+        if expired:
+            self._session.commands_expired(now)
+        return expired
 
     def settle(self, answers: Answers, now: float) -> None:
         """End the exchange with one drive, for the next begins; those of a stop are close."""

@@ -54,17 +54,27 @@ class Handover:
             return
         acknowledged = bool(status & states.BIT_12)
         self._see_to_acknowledge(acknowledged, now)
-        if self._rising:
-            if not setpoint.armed:      # bit 8 would fall alone
-                rules.mode_bits, self._rising = self._before, False
+        if not setpoint.armed:
+            self.disarmed()
         elif rules.mode_bits & states.NEW_SETPOINT:
-            if acknowledged or not setpoint.armed:
+            if acknowledged and not self._rising:
                 rules.mode_bits = 0
-        elif setpoint.armed and self._new and not acknowledged:
+        elif self._new and not acknowledged:
             self._before = rules.mode_bits
             rules.mode_bits, self._rising = states.NEW_SETPOINT | states.AT_ONCE, True
-        if not setpoint.armed and self._handed is not None:
-            rules.mode_bits, self._handed, self._rising = states.HALT, None, False
+        rules.halted = rules.mode_bits == states.HALT
+
+    def disarmed(self) -> None:
+        """Halt what is on its way, if nobody means its target any more."""
+        rules = self._rules
+        if self._setpoint.armed:
+            return
+        if self._rising:        # bit 8 would fall alone
+            rules.mode_bits, self._rising = self._before, False
+        elif rules.mode_bits & states.NEW_SETPOINT:
+            rules.mode_bits = 0
+        if self._handed is not None:
+            rules.mode_bits, self._handed = states.HALT, None
         rules.halted = rules.mode_bits == states.HALT
 
     def _see_to_acknowledge(self, acknowledged: bool, now: float) -> None:

@@ -51,7 +51,7 @@ from drive_can_bridge.protocols.cia402.procedures import (
     cells, MAP, SdoAccess, StopProcedure, write_until_answered)
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
-from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
+from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import (
     ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
@@ -508,6 +508,15 @@ class Cia402Session(Session):
         if control.pending and control.word != exchange.word:   # one step of several
             exchange.timer.no_later(max(now, exchange.timer.began_at
                                         + exchange.timer.stop_spacing))
+
+    def commands_expired(self, now: float) -> None:
+        if self._handover is None:
+            return
+        self._handover.disarmed()       # the next status may be a period away, and its word two
+        self._machine.rules_changed()
+        timer = self.exchange.timer
+        if self._machine.word != self.exchange.word:
+            timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
 
     def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
         if refusal or action is not ControlAction.ENABLE or not self._machine.fault:

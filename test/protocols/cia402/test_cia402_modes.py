@@ -181,6 +181,24 @@ class TestHandover:
         assert drive.targets == [2000, 1505]
         assert axis.drive.told[-3:] == [0x010F, 0x3F, 0x0F]
 
+    @pytest.mark.parametrize('back', [False, True])
+    def test_halted_when_commands_cease_however_long_the_period_is(self, back: bool) -> None:
+        """Also one on its way back to where it was latched: its setpoint does not change."""
+        axis = Axis('pp', period=0.5, command_timeout=0.7)
+        drive = axis.drive = PositionDrive(5, OBJECTS)
+        axis.start()
+        axis.live(3.0)
+        assert axis.asks(ControlAction.ENABLE, 3.0) == [('enable', True, 'operation enabled')]
+        axis.commands(1000.0)
+        for target in [2000.0] * 9 + [1000.0] * 9 * back:
+            axis.commands(target)
+            axis.live(0.25)
+        last = axis.now - 0.25
+        assert drive.targets == [2000, 1000] if back else [2000]
+        axis.live(2.0)
+        halted = next(at for at, text in axis.log if text.startswith('205#0F01'))
+        assert 0.7 <= halted - last <= 0.76
+
     def test_nothing_is_handed_over_that_nobody_commanded(self) -> None:
         axis, drive = meet()
         axis.live(1.0)
