@@ -121,8 +121,10 @@ class BringUp:
             yield from self._interpolation_time()
             yield from self._choose_mode()
             yield from self._watch_bridge()
+            yield from self._beats()
             yield from self._start()
             yield from self._find_axes()
+            yield from self._beats()    # nobody looked meanwhile
         except _End as end:
             return end.outcome
         return Outcome(Found.READY, status=status)
@@ -246,9 +248,9 @@ class BringUp:
             node.heartbeat_timeout = 0.0
             self.tell(sentences.no_heartbeat_producer())
 
-    def _start(self) -> Procedure:
-        """Have the node take PDOs, or wait until somebody else does."""
-        if self._node.ceased:       # without them it would be online again, and not watched
+    def _beats(self) -> Procedure:
+        """Wait for heartbeats that have ceased: it would be online again, and not watched."""
+        if self._node.ceased:
             self._session.report.advice = sentences.no_heartbeat(self._node.heartbeat_timeout)
             while self._node.ceased:
                 yield Ask(pause=LOOK_PERIOD)

@@ -164,6 +164,9 @@ class Cia402Session(Session):
     # -- life cycle -------------------------------------------------------------------------------
 
     def begin(self, now: float) -> None:
+        self._begin(now, START_SPACING)
+
+    def _begin(self, now: float, spacing: float) -> None:
         self.exchange.stop()
         self._channel.cancel(Priority.OWN)
         self._course.stop()
@@ -171,7 +174,7 @@ class Cia402Session(Session):
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
-        self._course.start(self._life(now, START_SPACING), now)
+        self._course.start(self._life(now, spacing), now)
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
@@ -287,10 +290,14 @@ class Cia402Session(Session):
         self._forget_state()
         self._set.clear()
 
-    def _close(self, reason: Sentence, now: float) -> None:
-        """Handle a node that takes no PDOs: it is set up from the beginning."""
+    def _close(self, reason: Sentence, now: float, spacing: float) -> None:
+        """
+        Handle a node that takes no PDOs: it is set up from the beginning.
+
+        :param spacing: s since the last NMT at least.
+        """
         self.lose(reason, now)
-        self.start_over(now)
+        self._begin(now, spacing)
         self.report.advice = reason
 
     # -- PDOs, sending ----------------------------------------------------------------------------
@@ -401,11 +408,11 @@ class Cia402Session(Session):
             self.services.fail_all(sentences.no_answer_because(reason))
             self._channel.clear()
             self._stop.forget()
-            self._close(reason, now)
+            self._close(reason, now, START_SPACING)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
                 not self.exchange.leaving
                 and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
-            self._close(sentences.node_state(state.text), now)
+            self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.heard(now, hurry=True)
 

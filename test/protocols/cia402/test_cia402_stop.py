@@ -284,6 +284,46 @@ class TestLosses:
         assert axis.session.online
 
 
+    @pytest.mark.parametrize('period', [0.01, 0.1, 0.5])
+    def test_one_that_does_not_become_operational_is_sent_nmt_once_a_second(
+            self, period: float) -> None:
+        axis = Axis('pv', period=period)
+        takes = axis.drive.takes
+
+        def never(sent: Frame) -> list[Frame]:
+            answers = takes(sent)
+            axis.drive.operational = False
+            return answers
+        axis.drive.takes = never    # type: ignore[method-assign]
+        axis.start()
+        axis.live(5.0)
+        started = [at for at, text in axis.log if text == '000#0105']
+        assert len(started) in (5, 6)
+        assert axis.session.state is DriveState.OFFLINE
+
+    def test_one_whose_heartbeats_cease_while_it_is_asked_where_it_is(self) -> None:
+        axis = Axis('csp', {(0x1017, 0): b'\x64\0'}, heartbeat_producer=0.0,
+                    parameter_timeout=0.2)
+        takes, asked = axis.drive.takes, []
+
+        def slow(sent: Frame) -> list[Frame]:
+            if str(sent).startswith('605#40646000') and len(asked) < 2:
+                asked.append(sent)
+                axis.drive.objects[0x1017, 0] = b'\0\0'
+                return []
+            return takes(sent)
+        axis.drive.takes = slow     # type: ignore[method-assign]
+        axis.live(0.3)
+        axis.start()
+        axis.live(3.0)
+        assert len(asked) == 2
+        assert axis.session.state is DriveState.OFFLINE
+        assert axis.session.offline_advice == says('no_heartbeat', timeout=0.35)
+        axis.drive.objects[0x1017, 0] = b'\x64\0'
+        axis.live(0.3)
+        assert axis.session.state is DriveState.DISABLED
+
+
 def test_nothing_is_sent_where_there_is_nothing_to_be_stopped() -> None:
     talk = Conversation(servo())
     talk.bus_up(10.0)
