@@ -254,6 +254,9 @@ class BringUp:
             self._session.report.advice = sentences.no_heartbeat(self._node.heartbeat_timeout)
             while self._node.ceased:
                 yield Ask(pause=LOOK_PERIOD)
+
+    def _start(self) -> Procedure:
+        """Have the node take PDOs, or wait until somebody else does."""
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
             yield Ask(pause=START_PAUSE)
@@ -351,11 +354,12 @@ class BringUp:
         if not slots:
             return None
         limit = min(round(1000 * WATCH_INTERVALS * interval), 0xFFFF)
+        before, self.watch = self.watch, slots[0]   # also where the end comes before the answer
         refusal = yield from self._put(CONSUMER, slots[0], node << 16 | limit, 4)
         if refusal:
+            self.watch = before
             self.tell(refusal)
             return None
-        self.watch = slots[0]
         return self.watch
 
     def _read_watch(self, interval: float) -> Generator[Ask, Reply, 'int | None']:

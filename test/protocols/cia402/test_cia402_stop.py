@@ -96,6 +96,21 @@ class TestTheEnd:
         assert sent.count('77F#05') >= 4
         assert '77F#05' not in sent[sent.index(WATCH_OFF):]
 
+    def test_it_watches_nobody_also_where_the_end_comes_before_it_has_said_so(self) -> None:
+        axis = Axis()
+        drive, takes = axis.drive, axis.drive.takes
+
+        def unanswered(sent: Frame) -> list[Frame]:
+            answers = takes(sent)
+            return [] if drive.number(0x1016, 1) else answers
+        drive.takes = unanswered    # type: ignore[method-assign]
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.deliver(axis.talk.activate(axis.now))
+        assert axis.take()[-1] == '605#2316100158027F00'
+        drive.takes = takes         # type: ignore[method-assign]
+        assert WATCH_OFF in end(axis)
+        assert drive.number(0x1016, 1) == 0
+
     @staticmethod
     def back(**options: object) -> Axis:
         """Be enabled, silent for a while, and not set up again."""
