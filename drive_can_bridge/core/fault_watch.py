@@ -8,6 +8,7 @@ like that of a user.
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 from typing import Protocol
 
 from drive_can_bridge.core import sentences
@@ -84,12 +85,14 @@ class FaultWatch:
         self._wanted = False    # the number is to be read; what is under way is of a fault before
         self._request: ReadRequest | None = None
         self._ended: list[ControlCompleted] = []    # by the fault: they tell its number
+        self._now = self._tell_at = -math.inf       # of the last sample; they wait no longer
 
     def look(self, events: list[Event]) -> None:
         """
         Look at what has happened; there may be more to be told, and to be sent, then.
 
-        What a fault has ended is answered as soon as its number is known, or cannot be read.
+        What a fault has ended is answered as soon as its number is known, or cannot be read; or
+        after ``control_timeout``: the read waits for those of users, which may be many.
         """
         for event in tuple(events):
             if isinstance(event, ProcessDataReceived):
@@ -98,8 +101,10 @@ class FaultWatch:
                 self._gone()
             elif isinstance(event, ControlCompleted) and event.message.code in _ENDED:
                 events.remove(event)
+                if not self._ended:
+                    self._tell_at = self._now + self._session.configuration.control_timeout
                 self._ended.append(event)
-        if self._ended and not self._is_told_soon:
+        if self._ended and (not self._is_told_soon or self._now >= self._tell_at):
             obeyed = self._session.interlock.obeyed
             fault = '' if obeyed is None else obeyed.fault_text
             events += [replace(each, message=sentences.CODES[each.message.code](
@@ -132,6 +137,7 @@ class FaultWatch:
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:
         """Look at a sample; None stands for what the drive refused."""
+        self._now = now
         if self._session.control is not None:
             shows = self._session.shows_fault
         else:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from builders import (
-    ACTUAL, CONTROL, CURRENT, drive, frame, parameter, RO, SPEED, STATUS, TABLE)
+    ACTUAL, CONTROL, CURRENT, drive, frame, GAIN, parameter, RO, SPEED, STATUS, TABLE)
 import pytest
 from saying import says
 from test_contract import Partner, PARTNERS
@@ -150,6 +150,22 @@ def test_a_number_that_cannot_be_read(name: str) -> None:
     assert partner.talk.control_outcomes() == [('enable', False, says(
         'reset_first', fault=says('number_unread')))]
     assert partner.talk.session.state is DriveState.FAULT
+
+
+@pytest.mark.parametrize('name', sorted({*NAMES} - {'canopen_pkw'}))
+def test_an_enable_that_it_ended_does_not_wait_for_the_reads_of_users(name: str) -> None:
+    partner = meet(name, parameter_timeout=0.1, parameter_retries=2, control_timeout=0.5)
+    del partner.registers[40]
+    services = partner.talk.session.services
+    for _ in range(20):     # nobody answers: 6 s at least
+        services.submit(ReadRequest((GAIN,)), partner.now)
+    services.submit(ControlRequest(ControlAction.ENABLE), partner.now)
+    partner.registers[217], partner.registers[211] = 7, 8
+    partner.live(3.0)
+    (_, success, message), = partner.talk.control_outcomes()
+    assert (success, message.code) == (False, 'fault_while_enabling')   # type: ignore
+    partner.live(30.0)
+    assert text(partner) == '7 overcurrent'
 
 
 @pytest.mark.parametrize('name', NAMES)
