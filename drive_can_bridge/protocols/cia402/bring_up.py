@@ -179,6 +179,7 @@ class BringUp:
         :return: the last one.
         """
         looks, word, refusal = 0, -1, NOTHING
+        until = self._channel.now + self._drive.control_timeout
         while True:
             if reply.data is None:
                 raise _differs(sentences.object_refused(
@@ -189,7 +190,7 @@ class BringUp:
             if not reacting and state not in _RUNNING:
                 break
             found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
-            if looks * LOOK_PERIOD >= self._drive.control_timeout:
+            if self._channel.now >= until:
                 runs = found if reacting else sentences.found_running(state.value)
                 raise _End(Outcome(Found.RUNS, sentences.together((runs, refusal))))
             if not looks and found != self._found:

@@ -210,6 +210,19 @@ class TestFoundEnabled:
         assert doubts(axis) == [says('may_still_be_running', why=says(
             'found_running', state='operation enabled'))]
 
+    @pytest.mark.parametrize('delay', [0.0002, 0.08])
+    def test_it_is_named_at_the_time_out_however_slowly_it_answers(self, delay: float) -> None:
+        axis = self.meet(control_timeout=1.0)
+        axis.DELAY = delay      # type: ignore[misc]
+        axis.drive.ramp = 10000
+        axis.deliver(axis.talk.bus_up(axis.now))
+        began = axis.now
+        axis.deliver(axis.talk.activate(axis.now))
+        axis.live(began + 0.9 - axis.now)
+        assert doubts(axis) == []
+        axis.live(began + 1.3 - axis.now)
+        assert len(doubts(axis)) == 1
+
     def test_nor_one_that_refuses_the_word_until_it_takes_it(self) -> None:
         axis = self.meet(control_timeout=0.5)
         axis.drive.fixed = {(0x6040, 0): 0x08000022}
