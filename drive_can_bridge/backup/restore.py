@@ -439,6 +439,10 @@ class Restorer:
             if len(left) == len(pending):
                 break
             pending = left
+            # what was acknowledged and not taken is not written, until it is at the next attempt
+            for change in pending:
+                if change.name in self._result.written:
+                    self._result.written.remove(change.name)
         self._attempted = True
 
     def _write_all(self, changes: Sequence[Change]) -> None:

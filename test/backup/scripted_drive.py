@@ -32,6 +32,7 @@ class Fate(Enum):
     MUTE = 'it is obeyed, and nothing is answered from then on'
     DEAF = 'neither it nor anything else is heard from then on'
     REFUSED = 'it is refused'
+    IGNORED = 'it is acknowledged, and not taken'
     AWAY = 'power is cut before it, for 5 s'
     CUT = 'it is obeyed, then power is cut for 5 s'
     BUS = 'the bus is lost before it'
@@ -140,7 +141,7 @@ class ScriptedDrive(Drive):
         self.events.append(('write', name, int(value)))
         refused = fate is Fate.REFUSED or not (
             self._stores or name == 'mode' or self.in_mode)
-        if not refused:
+        if not refused and fate is not Fate.IGNORED:
             self.registers[name] = int(value)
         if fate is Fate.KILLED_AFTER:
             raise Killed

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A restore that something comes between: at every write, in virtual time."""
 
+from dataclasses import replace
 import errno
 from itertools import product
 import signal
@@ -9,7 +10,8 @@ import pytest
 from scripted_drive import (
     Fate, FILE, Killed, MODE, OTHER, restored, SAVE, ScriptedDrive, SETTINGS, STORE)
 
-from drive_can_bridge.backup.restore import PATIENCE
+from drive_can_bridge.backup.restore import PATIENCE, RestoreResult
+from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.process.signals import postponed
 
 #: mode, three settings, mode
@@ -76,7 +78,8 @@ def test_a_drive_that_is_enabled_by_now_is_told_nothing() -> None:
     assert (result.enabled, result.stopped, drive.writes) == (True, [*SETTINGS], 0)
 
 
-FATES = [fate for fate in Fate if fate not in (Fate.KILLED_BEFORE, Fate.KILLED_AFTER)]
+FATES = [fate for fate in Fate
+         if fate not in (Fate.IGNORED, Fate.KILLED_BEFORE, Fate.KILLED_AFTER)]
 STORIES = [{number: fate} for number in WRITES for fate in FATES]
 STORIES += [{one: first, two: second} for one in WRITES for two in range(one + 1, 9)
             for first, second in product(FATES, repeat=2)]
@@ -136,6 +139,27 @@ def test_a_signal_of_a_terminal_that_has_gone_is_noted() -> None:
         assert not interrupted
         signal.raise_signal(signal.SIGHUP)
         assert interrupted.exit_code == 128 + signal.SIGHUP
+
+
+class TestNotTaken:
+    """What a drive acknowledges and does not take is written again after the others."""
+
+    def restored(self, fate: Fate) -> RestoreResult:
+        """Restore a drive that has no mode; ``fate``: of the first write of the second round."""
+        drive = ScriptedDrive({1: Fate.IGNORED, 2: Fate.IGNORED, 4: fate}, stores=True)
+        drive.facts = replace(drive.facts, restore=RestoreTable((), ()))
+        return restored(drive)
+
+    @pytest.mark.parametrize('fate', [Fate.DEAF, Fate.MUTE, Fate.AWAY, Fate.CUT])
+    def test_a_drive_that_goes_away_meanwhile_does_not_have_it(self, fate: Fate) -> None:
+        result = self.restored(fate)
+        assert not result.complete
+        assert [each.name for each in result.wrong] == ['first', 'second']
+        assert result.written == ['third']
+
+    def test_a_signal_meanwhile_leaves_it_to_be_written(self) -> None:
+        result = self.restored(Fate.SIGNAL)
+        assert (result.written, result.stopped) == (['third', 'first'], ['second'])
 
 
 class TestStoring:
