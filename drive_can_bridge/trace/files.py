@@ -27,6 +27,7 @@ from pathlib import Path
 import re
 import sys
 from typing import Any, TextIO, TypeVar
+import zlib
 
 import can
 
@@ -259,8 +260,9 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
             if suffix in _CANDUMP:
                 yield from _candump_records(stream, complain)
             else:
-                yield from _text_records(_TEXT_READERS[suffix], stream, complain)
-        except (EOFError, gzip.BadGzipFile) as error:
+                lines = _from_vector(stream) if suffix == '.asc' else stream
+                yield from _text_records(_TEXT_READERS[suffix], lines, complain)
+        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
             complain(f'the rest cannot be unpacked: {error}')
 
 
@@ -309,6 +311,7 @@ class _Lines:
         self._lines = lines
         self.taken: list[str] = []
         self.exhausted = False
+        self.failure: Exception | None = None   # of the file, not of a line
 
     def __iter__(self) -> '_Lines':
         return self
@@ -318,6 +321,9 @@ class _Lines:
             line = next(self._lines)
         except StopIteration:
             self.exhausted = True
+            raise
+        except Exception as error:
+            self.failure = error
             raise
         if len(self.taken) < _HEADER_MAX:
             self.taken.append(line)
@@ -344,7 +350,34 @@ class _Heard(logging.Handler):
         self._complain(record.getMessage())
 
 
-def _text_records(reader: Any, stream: TextIO, complain: Complain) -> Iterator[Record]:
+#: of a header by Vector: each time is told from the line before; and a line with its time
+_FROM_THE_LAST = re.compile(r'\s*base\s+(?:hex|dec)\s+timestamps\s+relative', re.IGNORECASE)
+_TIMED = re.compile(r'\s*([0-9]+\.[0-9]+)(?=\s)')
+
+
+def _from_vector(stream: Iterable[str]) -> Iterator[str]:
+    """Give python-can's reader what it needs: times from the beginning, an end of the header."""
+    lines = iter(stream)
+    relative, elapsed = False, 0.0
+    for line in lines:
+        relative = relative or _FROM_THE_LAST.match(line) is not None
+        timed = _TIMED.match(line)
+        if timed is not None:
+            yield 'no internal events logged\n'     # takes the next line for that, whatever it is
+            lines = itertools.chain((line,), lines)
+            break
+        yield line
+    if not relative:
+        yield from lines
+    for line in lines:
+        timed = _TIMED.match(line)
+        if timed is not None:
+            elapsed += float(timed[1])
+            line = f'{elapsed:.6f}{line[timed.end():]}'
+        yield line
+
+
+def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
     """
     Read by a reader of python-can, which ends at the first line that it does not understand.
 
@@ -369,6 +402,8 @@ def _text_records(reader: Any, stream: TextIO, complain: Complain) -> Iterator[R
                     yield record
                 return
             except Exception as error:  # noqa: BLE001  readers raise whatever a line makes them
+                if lines.failure is not None:
+                    raise lines.failure from None
                 complain(f'{type(error).__name__}: {error}')
                 if lines.exhausted:
                     return

@@ -1,8 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Reading and writing traces: candump's texts, python-can's formats, what is damaged."""
 
+from collections.abc import Callable
 from datetime import datetime
-from errno import ENOSPC
+from errno import EIO, ENOSPC
 import gzip
 import io
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record, RecordKind
+from drive_can_bridge.trace import files
 from drive_can_bridge.trace.files import (
     Channels, check_writable, format_record, labels, parse_line, read_records, TraceWriter,
     UnknownFormat, WRITABLE)
@@ -181,6 +183,75 @@ def test_a_packed_text(tmp_path: Path) -> None:
     complaints: list[str] = []
     list(read_records(path, complaints.append))
     assert len(complaints) == 1
+
+
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.csv', '.trc'])
+@pytest.mark.parametrize('damage', [
+    lambda data: data[:-10],
+    lambda data: data[:len(data) // 2],
+    lambda data: data[:len(data) // 2] + bytes(64) + data[len(data) // 2 + 64:],
+    lambda data: b'no gzip',
+], ids=['no end', 'half', 'other bytes', 'something else'])
+def test_a_packed_text_that_is_damaged_ends_there(
+        suffix: str, damage: Callable[[bytes], bytes], tmp_path: Path) -> None:
+    path = tmp_path / f'trace{suffix}'
+    writer = TraceWriter(path, ['can0'])
+    for number in range(200):
+        for record in TRACE:
+            writer.write(record._replace(time=TRACE[0].time + 0.001 * number))
+    writer.close()
+    packed = tmp_path / f'trace{suffix}.gz'
+    packed.write_bytes(damage(gzip.compress(path.read_bytes())))
+    complaints: list[str] = []
+
+    def complain(text: str) -> None:
+        complaints.append(text)
+        assert len(complaints) <= len(TRACE) * 200     # lines of rubbish are told, too
+    assert len(list(read_records(packed, complain))) <= len(TRACE) * 200
+    assert complaints[-1].startswith('the rest cannot be unpacked')
+
+
+def test_a_text_that_cannot_be_read_on_is_an_error(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken(io.StringIO):
+        def __next__(self) -> str:
+            raise OSError(EIO, 'Input/output error')
+    path = tmp_path / 'trace.asc'
+    path.touch()
+    monkeypatch.setattr(files, '_open_text', lambda path, packed: Broken())
+    complaints: list[str] = []
+
+    def complain(text: str) -> None:
+        complaints.append(text)
+        assert not complaints
+    with pytest.raises(OSError, match='Input/output error'):
+        list(read_records(path, complain))
+
+
+@pytest.mark.parametrize('told', ['absolute', 'relative', 'Relative'])
+def test_times_of_vector_that_are_told_from_the_last_line(told: str, tmp_path: Path) -> None:
+    times = [0.0, 0.01, 0.001, 0.0005, 0.019] if told != 'absolute' else [
+        0.0, 0.01, 0.011, 0.0115, 0.0305]
+    path = tmp_path / 'trace.asc'
+    path.write_text(
+        f'date Wed Nov 22 10:20:30.123 am 2023\nbase hex  timestamps {told}\n'
+        'internal events logged\n// version 9.0.0\n'
+        f'   {times[0]:.6f} Start of measurement\n'
+        f'   {times[1]:.6f} 1  7F1             Rx   d 2 01 02\n'
+        f'   {times[2]:.6f} 1  xyz             Rx   d x 01 02\n'
+        f'   {times[3]:.6f} 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n'
+        f'   {times[4]:.6f} 1  7F1             Rx   d 2 01 02\n')
+    complaints: list[str] = []
+    found = [record.time for record in read_records(path, complaints.append)]
+    assert found == pytest.approx([0.01, 0.0305])
+    assert len(complaints) == 1
+
+
+def test_the_first_frame_of_vector_may_follow_the_base(tmp_path: Path) -> None:
+    path = tmp_path / 'trace.asc'
+    path.write_text('base dec  timestamps absolute\n   0.5 1  2033  Rx   d 2 10 20\n')
+    record, = read_records(path, print)
+    assert (record.identifier, record.data) == (0x7F1, bytes([10, 20]))
 
 
 def test_a_byte_order_mark_costs_nothing(tmp_path: Path) -> None:
