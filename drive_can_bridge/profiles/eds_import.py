@@ -30,6 +30,8 @@ _SPELLINGS = {key.lower(): key for key in (
     'LowLimit', 'HighLimit', 'SubNumber', 'CompactSubObj', 'StorageLocation', 'NrOfEntries',
     'Factor', 'Description', 'Unit')}
 _HEADING = re.compile(r'\s*\[([^\[\]]*)\]\s*(?:;.*)?')
+#: of CompactSubObj: each element has a section of its own
+_ZERO = re.compile('0+|0x0+', re.IGNORECASE)
 _OBJECT = re.compile(r'([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?')
 #: the communication area: identifiers, mappings, the node's own settings
 _COMMUNICATION = range(0x1000, 0x2000)
@@ -87,9 +89,11 @@ class Section:
         return self.values.get(key.lower(), '')
 
     def text(self) -> str:
-        """Return the section as a file of its own would have it."""
-        return f'[{self.name}]\n' + ''.join(
-            f'{_SPELLINGS.get(key, key)}={value}\n' for key, value in self.values.items())
+        """Return the section as a file of its own would have it, and the library needs it."""
+        name = re.sub('sub', 'sub', self.name, flags=re.IGNORECASE)
+        return f'[{name}]\n' + ''.join(
+            f'{_SPELLINGS.get(key, key)}={value}\n' for key, value in self.values.items()
+            if key != 'compactsubobj' or not _ZERO.fullmatch(value))
 
     def lost(self, reason: str) -> LeftOut:
         """Say why it is not in the profile."""
@@ -209,12 +213,11 @@ class _ObjectReader:
         if not 0 <= count <= 0xFE:
             raise Unusable(f'CompactSubObj {count} is out of range')
         entry = self._understood(index, head)
-        names = self._sections.get(f'{index}name')
-        # with names the library calls the others after the first one
-        named = self._understood(index, head, *[names] if names is not None else ())
-        for number in range(1, count + 1):
-            self._take(head, (named if number in named.subindices else entry)[number],
-                       parent=entry.name)
+        # the library wants a name for each of the first ones, and calls others after the first
+        names = self._sections.get(f'{index}name', Section('', 0))
+        for number, variable in [(each, entry[each]) for each in range(1, count + 1)]:
+            variable.name = names.get(str(number)) or variable.name
+            self._take(head, variable, parent=entry.name)
 
     def _understood(self, index: str, *sections: Section) -> Any:
         """Let the library read an object."""

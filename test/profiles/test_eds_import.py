@@ -200,6 +200,30 @@ def test_what_is_odd_costs_nothing(tmp_path: Path, old: str, new: str, note: str
     assert note in made.notes[0] and len(made.notes) == 2
 
 
+@pytest.mark.parametrize(('entries', 'names'), [
+    ('NrOfEntries=1\n2=Winding', ['temperatures', 'temperatures_winding']),
+    ('NrOfEntries=2\n1=Motor\n2=Winding', ['temperatures_motor', 'temperatures_winding']),
+    ('1=Motor', ['temperatures_motor', 'temperatures_2']),
+    ('NrOfEntries=0', ['temperatures', 'temperatures_2']),
+])
+def test_elements_of_which_some_have_names(tmp_path: Path, entries: str,
+                                           names: list[str]) -> None:
+    # the numbers are those of the elements; NrOfEntries counts the names
+    made = bring(tmp_path, 'NrOfEntries=1\n1=Motor', entries)
+    assert [name for name in made.parameters if name.startswith('temperatures')] == names
+    assert len(made.parameters) == 9
+
+
+@pytest.mark.parametrize(('old', 'new'), [
+    ('ObjectType=0x9\n', 'ObjectType=0x9\nCompactSubObj=0\n'),
+    ('ObjectType=0x9\n', 'ObjectType=0x8\nCompactSubObj=0x00\n'),
+    ('[1018Sub1]', '[1018SUB1]'),
+    ('[1018Sub1]', '[1018sub01]'),
+])
+def test_an_array_with_sections_of_its_own(tmp_path: Path, old: str, new: str) -> None:
+    assert bring(tmp_path, old, new).parameters == bring(tmp_path).parameters
+
+
 def test_an_object_that_stands_twice(tmp_path: Path) -> None:
     made = bring_in(tmp_path, EDS + '[2001]\nParameterName=Other\nDataType=6\nAccessType=rw\n',
                     'small.eds')
