@@ -128,7 +128,8 @@ def differences(first: Side, second: Side) -> list[Difference]:
 
 def _same(one: Setting, other: Setting, parameter: Parameter | None) -> bool:
     if one.raw is None or other.raw is None or parameter is None:
-        return type(one.value) is type(other.value) and math.isclose(
+        # a whole number stands for a double, as it does in every file
+        return isinstance(one.value, bool) is isinstance(other.value, bool) and math.isclose(
             one.value, other.value, rel_tol=_RELATIVE_TOLERANCE)
     return one.raw == other.raw
 
