@@ -367,6 +367,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[Any]:
         room.leave()
 
 
+@pytest.fixture(autouse=True, scope='session')
+def _no_priority() -> Iterator[None]:
+    """Leave this process where it is: a bridge that is run in it asks to be before all others."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, 'setpriority', lambda *_: None)
+        yield
+
+
 @pytest.fixture(autouse=True, scope='module')
 def _collected() -> None:
     """Let garbage collection leave out what modules before have left, too."""

@@ -32,8 +32,7 @@ Run = Callable[..., tuple[int, list[str]]]
 @pytest.fixture(name='run')
 def _run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
          threads: None) -> Run:
-    # a bridge asks for a higher priority, which is none of this process's business
-    monkeypatch.setattr(os, 'setpriority', lambda *_: None)
+    # a bridge asks for punctual threads, which is none of this process's business
     monkeypatch.setattr(sys, 'setswitchinterval', lambda _: None)
 
     def run(*arguments: str) -> tuple[int, list[str]]:
