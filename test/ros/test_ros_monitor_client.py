@@ -11,9 +11,10 @@ from rcl_interfaces.srv import ListParameters
 from waiting import clock
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Snapshot
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Snapshot, Status, Stop
+from drive_can_bridge.ros.client import calls
 from drive_can_bridge.ros.monitor import client as monitor_client
-from drive_can_bridge.ros.monitor.client import MonitorClient
+from drive_can_bridge.ros.monitor.client import MonitorClient, Operations
 
 
 class Looking:
@@ -57,6 +58,41 @@ def test_where_a_drive_is_and_what_it_has(looking: Looking, client: Client,
     assert lift.online
     assert ('INFO', 'online') in [(line.level, line.text.rpartition(': ')[2])
                                   for line in looking.look().log]
+
+
+def test_hundreds_of_drives_are_got_to_know_a_few_at_a_time(
+        looking: Looking, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+
+    def noted(kind: type) -> type:
+        class Noted(kind):  # type: ignore[misc, valid-type]
+            def __init__(self, node: Any, of: Any, name: str, *more: Any) -> None:
+                made.append(name)
+                super().__init__(node, of, name, *more)
+        return Noted
+    monkeypatch.setattr(monitor_client, 'Inbox', noted(monitor_client.Inbox))
+    monkeypatch.setattr(monitor_client, 'Service', noted(monitor_client.Service))
+    monkeypatch.setattr(calls, 'Service', noted(calls.Service))
+    drives = [f'drive_{number}' for number in range(150)]
+    looking.model.diagnosed([Status(f'many: drive {drive}', 0, '', {
+        'state': 'online', 'exchanges': '1', 'missed_exchanges': '0'}) for drive in drives], 0.0, clock().now())
+    stops = {f'/{drive}': (Stop.QUICK_STOP,) for drive in drives}
+    operations = Operations(looking.source.node)
+    looks = 0
+    # each of these takes DDS a while, during which nobody sees or stops anything
+    while not all(f'/{drive}/{name}' in made for drive in drives
+                  for name in ('online', 'response', 'list_parameters', 'quick_stop')):
+        looking.source.focus('/drive_140')
+        before = len(made)
+        looking.look()
+        assert len(made) - before <= 80
+        before = len(made)
+        operations.poll(stops, clock().now())
+        assert len(made) - before <= 16
+        looks += 1
+        if looks == 1:      # what is looked at comes first
+            assert {'/drive_140/response', '/drive_140/list_parameters'} <= set(made)
+        assert looks < 50
 
 
 def test_a_bridge_that_tells_seldom_is_not_silent(bridge: StartBridge, client: Client) -> None:
