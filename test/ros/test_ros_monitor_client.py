@@ -74,8 +74,9 @@ def test_hundreds_of_drives_are_got_to_know_a_few_at_a_time(
     monkeypatch.setattr(monitor_client, 'Service', noted(monitor_client.Service))
     monkeypatch.setattr(calls, 'Service', noted(calls.Service))
     drives = [f'drive_{number}' for number in range(150)]
-    looking.model.diagnosed([Status(f'many: drive {drive}', 0, '', {
-        'state': 'online', 'exchanges': '1', 'missed_exchanges': '0'}) for drive in drives], 0.0, clock().now())
+    facts = {'state': 'online', 'exchanges': '1', 'missed_exchanges': '0'}
+    looking.model.diagnosed([Status(f'many: drive {drive}', 0, '', facts) for drive in drives],
+                            0.0, clock().now())
     stops = {f'/{drive}': (Stop.QUICK_STOP,) for drive in drives}
     operations = Operations(looking.source.node)
     looks = 0
