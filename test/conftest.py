@@ -306,9 +306,11 @@ def _unit(nodeid: str) -> str:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is real; let begin what takes longest, in the usual order without xdist."""
+    """Mark what is real, and let it come first; with xdist, let begin what takes longest."""
     for item in items:
         real.mark(item)
+    # a bench that others share lives to the end of their module, with a clock of its own
+    items.sort(key=lambda item: item.get_closest_marker('real') is None)
     if hasattr(config, 'workerinput'):
         items.sort(key=_place)
 
