@@ -228,7 +228,7 @@ def test_one_that_hangs_and_has_left_the_graph_is_named(
     try:
         code, lines, errors = run(*words)
         assert (code, lines) == (failed, [])
-        assert f'/cell/bridge: this bridge of this host (process {os.getpid()})' in errors
+        assert '/cell/bridge' in errors and f'process {os.getpid()}' in errors
         assert '/cell/other' not in errors
         assert run('read', '--namespace', 'hall')[0] == 1
         hung.withdraw()

@@ -2,6 +2,7 @@
 """The parameters of the bridge's own node."""
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +68,9 @@ def test_an_edited_profile_is_told_with_the_next_configuration(
     assert client.get(BRIDGE, *told) == before
     for label in ('deactivate', 'cleanup', 'configure'):
         assert client.transition(label=label)
-    assert client.get(BRIDGE, *told) == [
-        hashlib.sha256(profile.read_bytes()).hexdigest(),
-        '{"before": [], "after": [["jog_speed", 50, 65535]]}']
+    digest, restore = client.get(BRIDGE, *told)
+    assert digest == hashlib.sha256(profile.read_bytes()).hexdigest()
+    assert json.loads(restore) == {'before': [], 'after': [['jog_speed', 50, 65535]]}
 
 
 @pytest.mark.parametrize('name, value', [
