@@ -197,7 +197,7 @@ def test_lines_of_both_keep_nobody_waiting_and_their_order_where_they_go_the_sam
 
 CLOSED = """
 import os, sys
-from drive_can_bridge.process.beginning import begin, keep_output
+from drive_can_bridge.process.beginning import begin
 begin()
 print('output')
 print('error', file=sys.stderr)

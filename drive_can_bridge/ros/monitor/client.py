@@ -195,22 +195,25 @@ class MonitorClient:
         _keep(self._online, model.drives, self._subscribe_online, Inbox.close)
         wanted = (self._plan.choose(model.rates(), self._focus, now) if self._watched
                   else frozenset())
-        _keep(self._samples, sorted(wanted, key=lambda drive: drive not in self._focus),
-              self._subscribe_samples, _close_all)
+        _keep(self._samples, self._by_interest(wanted), self._subscribe_samples, _close_all)
         model.sampled(self._samples, now)
         doubtful = set(model.doubtful(now)) - self._bridges_asked
         self._asked &= {*model.drives, *model.bridges} - doubtful - model.take_anew()
         for bridge in model.bridges:
             if bridge not in self._asked:
                 self._ask_places(bridge)
-        for drive in sorted((drive for drive in model.drives if drive not in self._asked),
-                            key=lambda drive: drive not in self._focus)[:_ASKED_AT_ONCE]:
+        unasked = [drive for drive in model.drives if drive not in self._asked]
+        for drive in self._by_interest(unasked)[:_ASKED_AT_ONCE]:
             self._ask_names(drive)
         if now >= self._graph_at:
             self._graph_at = now + _GRAPH_PERIOD
             self._notice()
             if self._focus:
                 self._find_bits()
+
+    def _by_interest(self, drives: Iterable[str]) -> list[str]:
+        """Return drives, those that somebody looks at first."""
+        return sorted(drives, key=lambda drive: drive not in self._focus)
 
     def _subscribe_online(self, drive: str) -> Inbox:
         def take(message: Bool) -> None:
