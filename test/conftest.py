@@ -15,19 +15,22 @@ a while. The locks end with the process.
 *Shipped profiles* are read and checked once in a process, which takes as long as a whole story of
 a drive; not so in the tests of that, ``configuration/`` and ``profiles/``.
 
-*Profiles.* Whatever is random looks for a short time, unless DRIVE_CAN_TEST_PROFILE is ``long``.
-How long one example takes says how busy the machine is, and is no failure.
+*Profiles.* Whatever is random looks for a short time, and what tries one rule in many places tries
+some of them (``extent.py``), unless DRIVE_CAN_TEST_PROFILE is ``long``, as in CI. How long one
+example takes says how busy the machine is, and is no failure.
 
 *In parallel*, with pytest-xdist (``--dist loadscope``, as ``make test`` does): the tests
 of a module stay together, because they may share what is expensive to start; those that consist of
 waiting for something of their own are spread. Long ones come first. What measures time has the
-mark ``alone``: nothing else of the test run happens meanwhile.
+mark ``alone``: nothing else of the test run happens meanwhile. A worker stays on a core of its
+own, but for these.
 
 *The wall clock.* What runs against it has the mark ``real`` (``real.py`` says what that is, and
-which of them ``make test`` tells): these stories are told one after the other, when all others
-have been. One that fails is told again where the machine itself stood still (``told_again.py``).
-Nothing else excuses a stalled machine. ``guard.py`` sees that no other test starts a process or a
-thread, unless it says by a fixture, ``programs`` or ``threads``, that it needs no time limit.
+which of them ``make test`` tells): these stories are told one after the other, by a run of their
+own beside that of all others. One that fails is told again where the machine itself stood still
+(``told_again.py``). Nothing else excuses a stalled machine. ``guard.py`` sees that no other test
+starts a process or a thread, unless it says by a fixture, ``programs`` or ``threads``, that it
+needs no time limit.
 
 *Seed.* All that is random follows DRIVE_CAN_TEST_SEED, by default another one in each run. Behind
 the failures stand the commands that run each of them alone, with the seed.
@@ -51,6 +54,7 @@ import tempfile
 import time
 from typing import Any
 
+from extent import PROFILE, SEED, times
 from hypothesis import core as hypothesis_core, HealthCheck, settings
 from middleware import tell_in_messages
 import pytest
@@ -66,15 +70,12 @@ sys.path.append(str(Path(__file__).with_name('ros')))
 from guard import Guard  # noqa: I100, I202
 import world
 
-PROFILE = 'DRIVE_CAN_TEST_PROFILE'
-SEED = 'DRIVE_CAN_TEST_SEED'
 #: what a test looks at that is run again
 REPEATED = (SEED, PROFILE, 'DRIVE_CAN_SOAK_SECONDS')
 os.environ.setdefault(SEED, str(random.randrange(1_000_000)))   # workers inherit it
 PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile('short', PATIENT, max_examples=25)
-settings.register_profile('long', PATIENT, max_examples=150)
-settings.load_profile(os.environ.get(PROFILE, 'short'))
+settings.register_profile('ours', PATIENT, max_examples=times(10, 150))
+settings.load_profile('ours')
 
 DOMAINS = range(10, 90)
 #: the user's own domain, in which something may be running
@@ -131,6 +132,7 @@ LOOK = 0.5
 READING = ('test/configuration/', 'test/profiles/')
 #: processes for each core that has nothing else to do: most of the time they wait
 WORKERS_PER_CORE = 2
+CORES = os.sched_getaffinity(0)
 
 
 # -- signals and domains --------------------------------------------------------------------------
@@ -173,7 +175,9 @@ def new_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Choose the domain of a test, and whether it reads shipped profiles anew."""
+    """Choose the domain of a test, its cores, and whether it reads shipped profiles anew."""
+    if hasattr(item.config, 'workerinput'):
+        os.sched_setaffinity(0, CORES if _alone(item) else {_own_core(item.config)})
     os.environ['ROS_DOMAIN_ID'] = _domain(item.nodeid.startswith('test/ros/'))
     profiles.read_profile = (READ_PROFILE if item.nodeid.startswith(READING)  # type: ignore
                              else _remembered)
@@ -255,7 +259,7 @@ def pytest_xdist_auto_num_workers() -> int:
     wanted = os.environ.get('PYTEST_XDIST_AUTO_NUM_WORKERS')
     if wanted:
         return int(wanted)
-    cores = len(os.sched_getaffinity(0))
+    cores = len(CORES)
     return max(cores + 1, round(WORKERS_PER_CORE * (cores - _busy_cores())))
 
 
@@ -273,6 +277,11 @@ def _busy_cores() -> float:
         return 0.0
     user, _, system, _, _, *interrupts = spent      # who is nice makes room
     return float(os.cpu_count() or 1) * (user + system + sum(interrupts)) / sum(spent)
+
+
+def _own_core(config: Any) -> int:
+    """Return the core of a worker: threads that hand over to each other lose none of it there."""
+    return sorted(CORES)[int(config.workerinput['workerid'][2:]) % len(CORES)]
 
 
 @pytest.hookimpl(optionalhook=True)

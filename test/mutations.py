@@ -13,6 +13,7 @@ exit code 1: a survivor is a test that is missing, or a place that makes no diff
 import argparse
 import ast
 from collections.abc import Iterator
+import os
 from pathlib import Path
 import random
 import shutil
@@ -20,6 +21,8 @@ import subprocess
 import sys
 import tempfile
 from typing import NamedTuple
+
+from extent import PROFILE
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'drive_can_bridge'
@@ -110,7 +113,8 @@ def red(root: Path, *arguments: str) -> str:
     command = [sys.executable, '-m', 'pytest', '-q', '-x', '-m', WANTED, '-p', 'no:cacheprovider',
                *arguments]
     try:
-        done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=900)
+        done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=900,
+                              env={**os.environ, PROFILE: 'long'})
     except subprocess.TimeoutExpired:
         return 'it took longer than 15 minutes'
     if done.returncode in (0, 5):

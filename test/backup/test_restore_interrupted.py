@@ -6,6 +6,7 @@ import errno
 from itertools import product
 import signal
 
+from extent import some
 import pytest
 from scripted_drive import (
     Fate, FILE, Killed, MODE, OTHER, restored, SAVE, ScriptedDrive, SETTINGS, STORE)
@@ -86,7 +87,7 @@ STORIES += [{one: first, two: second} for one in WRITES for two in range(one + 1
 
 
 def test_whatever_comes_between() -> None:
-    for story in STORIES:
+    for story in some(STORIES, 5):
         drive = ScriptedDrive(story)
         result = restored(drive)
         fates, told = set(story.values()), f'{story}: {result}'

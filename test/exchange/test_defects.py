@@ -8,11 +8,12 @@ session of the first, or in what its listener is told.
 
 from collections.abc import Callable
 import heapq
-from itertools import count
+from itertools import count, product
 from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, WORD
 from exchange_builders import Bench
+from extent import some
 from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
 
@@ -195,9 +196,8 @@ def raising(times: float, then: Callable[..., Any]) -> Callable[..., Any]:
     return step
 
 
-@pytest.mark.parametrize('times', [1, float('inf')])
-@pytest.mark.parametrize('place', [*LISTENER, *STEPS])
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize(('kind', 'place', 'times'), some(product(
+    KINDS, [*LISTENER, *STEPS], [1, float('inf')]), 3))
 def test_a_defect_stops_one_drive_and_disturbs_no_other(
         kind: str, place: str, times: float, monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(kind)
@@ -234,9 +234,8 @@ def test_a_defect_stops_one_drive_and_disturbs_no_other(
     world.run()
 
 
-@pytest.mark.parametrize('mute', [False, True])
-@pytest.mark.parametrize('place', LISTENER)
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize(('kind', 'place', 'mute'), some(product(
+    KINDS, LISTENER, [False, True]), 3))
 def test_a_listener_that_raises_costs_no_stop_frame(
         kind: str, place: str, mute: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """The stop of the end goes out whole, and to its end, whoever hears it."""

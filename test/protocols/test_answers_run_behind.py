@@ -16,6 +16,7 @@ from typing import Any
 from builders import (
     ACTUAL, CONTROL, CURRENT, drive, frame, INT32, parameter, SPEED, STATUS, WORD,
 )
+from extent import some
 from literal_drives import ExtendedDrive, ServoDrive
 import pytest
 
@@ -207,7 +208,7 @@ BEHIND = [(kind, *lag) for kind in KINDS for lag in (*LAGS, *LONG_LAGS)
 @pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
         kind: str, period: float, delay: float) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus(kind, period, delay)
         bus.run()
         bus.live(0.2 * place * period)
@@ -217,7 +218,7 @@ def test_a_drive_that_is_deaf_from_the_stop_on_is_named(
 
 @pytest.mark.parametrize(('kind', 'period', 'delay'), BEHIND)
 def test_a_drive_that_heard_the_stop_is_not(kind: str, period: float, delay: float) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus(kind, period, delay)
         bus.run()
         bus.live(0.2 * place * period)
@@ -353,7 +354,7 @@ ALONE = [kind for kind in KINDS if 'group' not in kind]
 @pytest.mark.parametrize('kind', ALONE)
 def test_what_was_held_until_a_stop_does_not_show_it(
         kind: str, period: float, limit: int, held: float, longer: float) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus(kind, period, 0.002, limit)
         bus.run()
         bus.run_on(0.2 * place * period)
@@ -366,7 +367,7 @@ def test_what_was_held_until_a_stop_does_not_show_it(
 
 @pytest.mark.parametrize(('held', 'longer'), [(0.25, 0.15), (0.65, 0.3), (1.5, 0.8), (1.5, 1.2)])
 def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: float) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus('29 bit, setpoint only', 0.1, 0.002, 30)
         bus.run()
         bus.run_on(0.02 * place)
@@ -385,7 +386,7 @@ def test_what_was_held_until_a_quick_stop_does_not_show_it(held: float, longer: 
 @pytest.mark.parametrize('kind', ALONE)
 def test_what_was_lost_until_a_stop_is_no_doubt(
         kind: str, period: float, limit: int, lost: int) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus(kind, period, 0.002, limit)
         bus.run()
         bus.run_on(0.2 * place * period)
@@ -399,7 +400,7 @@ def test_what_was_lost_until_a_stop_is_no_doubt(
     (0.4, 3, 1), (0.4, 30, 12), (0.2, 30, 12), (0.1, 30, 20), (0.02, 100, 80)])
 def test_what_was_lost_until_a_quick_stop_is_no_doubt(
         period: float, limit: int, lost: int) -> None:
-    for place in range(5):
+    for place in some(range(5), 5):
         bus = Bus('29 bit, setpoint only', period, 0.002, limit)
         bus.run()
         bus.run_on(0.2 * place * period)

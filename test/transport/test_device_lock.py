@@ -10,6 +10,7 @@ import sys
 import tty
 
 from clocks import REAL
+from extent import some
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -79,7 +80,7 @@ def bus(path: str, interface: str = 'slcan') -> BusConfiguration:
 
 
 @pytest.mark.usefixtures('programs')
-@pytest.mark.parametrize('interface', ['slcan', 'robotell', 'seeedstudio', 'serial'])
+@pytest.mark.parametrize('interface', some(['slcan', 'robotell', 'seeedstudio', 'serial'], 3))
 def test_the_device_of_another_process_is_not_written_to(device: Device, interface: str) -> None:
     process = subprocess.Popen([sys.executable, '-c', HOLDER, interface, device.path],
                                stdin=subprocess.PIPE, stdout=subprocess.PIPE)

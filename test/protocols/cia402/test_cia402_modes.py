@@ -4,6 +4,7 @@
 from dataclasses import replace
 from typing import Any
 
+from extent import some
 from literal_drives import ServoDrive
 import pytest
 from saying import says
@@ -301,7 +302,7 @@ class TestHoming:
         assert message.fields.get('fault', '') == told     # type: ignore[attr-defined]
         assert drive.number(0x6060) == number
 
-    @pytest.mark.parametrize('phase', range(0, 40, 5))
+    @pytest.mark.parametrize('phase', some(range(0, 40, 5), 4))
     @pytest.mark.parametrize('step', ['changing to mode 6', 'going back to the mode'])
     def test_so_it_does_while_the_mode_changes(
             self, step: str, phase: int, mode: str, number: int) -> None:
