@@ -47,6 +47,7 @@ class RequestServer(Protocol):
 class Conversation(Protocol):
     """What users can have, by where it stands with their drive; the session itself."""
 
+    activated: bool
     active: bool
     serving: bool
     bus_available: bool
@@ -104,7 +105,7 @@ class DriveServices:
         session = self._session
         try:
             outcome = session.setpoints.command(
-                index, value, now, active=session.active)
+                index, value, now, active=session.activated)
         except ValueError:
             session.statistics.commands_refused += 1
             raise

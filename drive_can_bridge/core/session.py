@@ -114,6 +114,7 @@ class Session(ABC):
     :ivar report: events, and what is missing while the drive is offline.
     :ivar remedy: says what to do about a drive whose state is ``mapping differs``.
     :ivar stage: what is being done for the drive.
+    :ivar activated: the bridge is active; ``active``: and does not leave the drive alone.
     :ivar online: the drive exchanges process data.
     :ivar ever_online: it did so at least once since activation.
     :ivar defect: what went wrong in the program, in words, while the drive is left alone for that.
@@ -156,7 +157,8 @@ class Session(ABC):
             timeout=drive.parameter_timeout, attempts=drive.parameter_retries + 1,
             offline=lambda: self.state is DriveState.OFFLINE)
         self.stage = Stage.IDLE
-        self.active = self.serving = self.bus_available = self.online = self.ever_online = False
+        self.activated = self.active = self.serving = self.bus_available = False
+        self.online = self.ever_online = False
         self.defect = NOTHING
         self.enabled_by = drive.name
         self.partners: Sequence[Session] = ()
@@ -178,7 +180,7 @@ class Session(ABC):
 
     def activate(self, now: float) -> None:
         """Begin to exchange (as soon as the bus is there)."""
-        self.active = True
+        self.activated = self.active = True
         self.defect = NOTHING
         self.ever_online = False
         self.sent.clear()
@@ -198,6 +200,7 @@ class Session(ABC):
 
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+        self.activated = False
         self._begin_end(sentences.bridge_inactive(), now)
 
     def fail(self, reason: Sentence, now: float) -> None:

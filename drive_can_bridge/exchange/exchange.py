@@ -261,6 +261,7 @@ class BusExchange:
             self._last_pass = self._meant_at = now
             self.active = True
             for member in self._members:
+                member.tell(member.listener.discard_commands, '')
                 member.begin(member.session.activate, now)
         self._wake.ring()
 

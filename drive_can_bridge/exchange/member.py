@@ -124,9 +124,13 @@ class Member:
             self.unheard(error)
 
     def take_commands(self, now: float) -> None:
-        """Let the listener hand in the commands that wait."""
-        if not self.session.defect:
-            self.tell(self.listener.take_commands, now)
+        """
+        Let the listener hand in the commands that wait.
+
+        Behind a defect, too: a limit is taken all the same, and what waits for all joints of the
+        bus is of other drives as well.
+        """
+        self.tell(self.listener.take_commands, now)
 
     def pump(self) -> None:
         """Send what the session wants sent, and tell its listener what happened."""
@@ -215,15 +219,15 @@ class Member:
             pass
 
     def begin(self, step: Callable[[float], None], now: float) -> None:
-        """Have the session begin: what was wrong before is over, and commands that wait are."""
+        """Have the session begin: what was wrong before is over."""
         self.anew_at, self._defect_told = math.inf, ''
-        self.tell(self.listener.discard_commands, '')
         self.take(step, now)
 
     def begin_anew(self, now: float) -> None:
         """Look for the drive again, as soon as its stop has run its course."""
         session = self.session
         if session.stopped:
+            self.take_commands(now)     # of a drive that is lost: they move nothing
             self.begin(session.begin_anew, now)
         elif now >= self._give_up_at:
             self.take(session.give_up, now)

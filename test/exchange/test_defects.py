@@ -7,11 +7,12 @@ session of the first, or in what its listener is told.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 import heapq
 from itertools import count, product
 from typing import Any
 
-from builders import ACTUAL, CONTROL, CURRENT, drive, frame, SPEED, STATUS, WORD
+from builders import ACTUAL, CONTROL, CURRENT, drive, frame, LIMIT, SPEED, STATUS, WORD
 from exchange_builders import Bench
 from extent import some
 from literal_drives import ExtendedDrive, PkwNode, StandardDrive
@@ -21,10 +22,13 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveFailed, DriveState, Noted, StationFound
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.parameters import Parameter
 
 #: s: of the drives, and until an answer
 PERIOD, DELAY = 0.05, 0.001
 WORDS = dict.fromkeys((50, 51, 52), 0)
+#: 100 % is 03E8h
+TORQUE = replace(LIMIT, neutral=100.0, limit=True)
 
 
 class Inverter:
@@ -51,25 +55,26 @@ class Status(dict[int, int]):
             number)
 
 
-def _registers(*, word: bool) -> dict[int, int]:
-    maps = zip(range(122, 130), (50, 52 * word, 0, 0, 209, 210, 211, 0))
+def _registers(second: int = 0) -> dict[int, int]:
+    maps = zip(range(122, 130), (50, second, 0, 0, 209, 210, 211, 0))
     return Status({**WORDS, **dict(maps), 209: 1000, 210: 250, 211: 1})
 
 
-def _extended(word: bool) -> tuple[list[DriveConfiguration], list[Any]]:
-    request = (SPEED, WORD) if word else (SPEED,)
-    return [drive(name=name, station=station, request=request, period=PERIOD,
-                  control=CONTROL if word else None)
+def _extended(*second: Parameter) -> tuple[list[DriveConfiguration], list[Any]]:
+    return [drive(name=name, station=station, request=(SPEED, *second), period=PERIOD,
+                  control=CONTROL if WORD in second else None)
             for name, station in (('first', 1), ('second', 2))], [
-        ExtendedDrive(_registers(word=word)) for _ in range(2)]
+        ExtendedDrive(_registers(*(parameter.number or 0 for parameter in second)))
+        for _ in range(2)]
 
 
 def _single(protocol: str, make: Callable[[int, dict[int, int]], Any], *,
-            control: bool = True) -> tuple[list[DriveConfiguration], list[Any]]:
-    return [drive(protocol, name=name, station=station, request=(SPEED,), period=PERIOD,
+            control: bool = True, second: tuple[Parameter, ...] = (),
+            ) -> tuple[list[DriveConfiguration], list[Any]]:
+    return [drive(protocol, name=name, station=station, request=(SPEED, *second), period=PERIOD,
                   response=(ACTUAL, CURRENT, STATUS), control=CONTROL if control else None)
             for name, station in (('first', 1), ('second', 2))], [
-        make(station, _registers(word=False)) for station in (1, 2)]
+        make(station, _registers()) for station in (1, 2)]
 
 
 def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
@@ -80,9 +85,10 @@ def _cannord(broadcast: str) -> tuple[list[DriveConfiguration], list[Any]]:
         for station in (1, 2)]
 
 
-KINDS: dict[str, Callable[[], tuple[list[DriveConfiguration], list[Any]]]] = {
-    '29 bit': lambda: _extended(False),
-    '29 bit, word in its slot': lambda: _extended(True),
+Kind = Callable[[], tuple[list[DriveConfiguration], list[Any]]]
+KINDS: dict[str, Kind] = {
+    '29 bit': _extended,
+    '29 bit, word in its slot': lambda: _extended(WORD),
     '11 bit': lambda: _single('datamodel_standard', lambda _, cells: StandardDrive(cells)),
     '11 bit, without control': lambda: _single(
         'datamodel_standard', lambda _, cells: StandardDrive(cells), control=False),
@@ -90,13 +96,19 @@ KINDS: dict[str, Callable[[], tuple[list[DriveConfiguration], list[Any]]]] = {
     'CANnord group': lambda: _cannord('group'),
     'PKW': lambda: _single('canopen_pkw', PkwNode),
 }
+WITH_LIMIT: dict[str, Kind] = {
+    '29 bit': lambda: _extended(TORQUE),
+    '11 bit': lambda: _single('datamodel_standard', lambda _, cells: StandardDrive(cells),
+                              second=(TORQUE,)),
+    'PKW': lambda: _single('canopen_pkw', PkwNode, second=(TORQUE,)),
+}
 
 
 class World:
     """A bus with two drives that run."""
 
-    def __init__(self, kind: str) -> None:
-        configurations, self.devices = KINDS[kind]()
+    def __init__(self, kind: str, kinds: dict[str, Kind] = KINDS) -> None:
+        configurations, self.devices = kinds[kind]()
         self.group = 'group' in kind
         self.bench = Bench(*configurations)
         self.coming: list[tuple[float, int, Frame]] = []
@@ -294,3 +306,54 @@ def test_the_same_defect_is_told_again_after_an_activation(
         world.took()
         world.live(1.0)
         assert session.online
+
+
+@pytest.mark.parametrize('pause', [0.1, 0.999])    # s of the second in which it is left alone
+@pytest.mark.parametrize('kind', WITH_LIMIT)
+def test_a_limit_that_comes_behind_a_defect_is_obeyed(kind: str, pause: float) -> None:
+    """It is taken in every state of an active bridge, and a drive that is lost is one."""
+    world = World(kind, WITH_LIMIT)
+    bench, torque = world.bench, world.devices[0].registers
+    assert torque[51] == 0x03E8
+    bench.notes[0].failing = True
+    world.live(PERIOD)
+    bench.notes[0].failing = False
+    failed_at = bench.exchange._members[0].anew_at - 1.0
+    world.live(failed_at + pause - bench.now)
+    assert bench.sessions[0].defect
+    bench.notes[0].commands += [(0, 0.0), (1, 30.0)]
+    world.live(2.0)
+    assert bench.sessions[0].online
+    assert torque[51] == 0x012C
+    # what else waited is of a drive that was lost: nothing is resumed, nor armed
+    assert [item.armed for item in bench.sessions[0].setpoints.items] == [False, True]
+    assert not bench.notes[0].commands
+
+
+def test_a_limit_that_comes_at_the_end_behind_a_defect_is_of_no_activation(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World('29 bit', WITH_LIMIT)
+    bench = world.bench
+    monkeypatch.setattr('time.sleep', lambda _: world.live(0.002))
+    monkeypatch.setattr(world.exchange, '_pass_to_stop', lambda: None)
+    bench.notes[0].failing = True
+    world.live(PERIOD)
+    bench.notes[0].failing = False
+    world.exchange.deactivate()
+    bench.notes[0].take_commands(bench.now)
+    bench.notes[0].commands.append((1, 30.0))
+    bench.notes[0].take_commands(bench.now)
+    assert bench.sessions[0].setpoints.items[1].raw == 0x03E8
+
+
+def test_what_waits_for_others_is_not_thrown_away_when_a_drive_begins_anew() -> None:
+    """A message for all joints of a bus waits where any of its drives would take it."""
+    world = World('29 bit')
+    first = world.bench.notes[0]
+    first.failing = True
+    world.live(PERIOD)
+    first.failing = False
+    discarded = first.discarded
+    world.live(2.0)
+    assert first.session.online
+    assert first.discarded == discarded

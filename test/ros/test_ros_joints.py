@@ -11,6 +11,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from waiting import clock, pause
 
+from drive_can_bridge.exchange.member import Member
+
 STATES, COMMANDS = '/drive_can_bridge/joint_states', '/drive_can_bridge/joint_commands'
 RPM = 2 * math.pi / 60
 BUS = {'interface': 'virtual', 'bitrate': 1_000_000, 'reconnect_period': 0.1}
@@ -230,6 +232,37 @@ def test_a_defect_of_one_drive_costs_no_other(bridge: StartBridge, client: Clien
     client.wait_logged('east: offline: ')
     monkeypatch.undo()
     one.online()
+
+
+def test_a_drive_that_begins_anew_behind_a_defect_costs_no_other_its_command(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(two())
+    one.online()
+    names = ['ej', 'sj']
+    client.publish(COMMANDS, JointState(name=names, velocity=[0.0, 0.0]))
+    wait_until(lambda: one.node.drives['south'].session.setpoints.items[0].armed)
+    publisher = client.node.create_publisher(JointState, COMMANDS, 1)
+    wait_until(lambda: publisher.get_subscription_count() == 2)
+    again = []
+    begin_anew = Member.begin_anew
+
+    def command_and_begin(member: Member, now: float) -> None:
+        if not again:
+            publisher.publish(JointState(name=names, velocity=[20 * RPM, 20 * RPM]))
+        again.append(member.session)
+        begin_anew(member, now)
+    monkeypatch.setattr(Member, 'begin_anew', command_and_begin)
+
+    def fail(*_: Any) -> None:
+        monkeypatch.delattr(east.session.services, 'command')
+        raise KeyError('a defect')
+    east = one.node.drives['east']
+    monkeypatch.setattr(east.session.services, 'command', fail, raising=False)
+    client.publish(COMMANDS, JointState(name=names, velocity=[10 * RPM, 10 * RPM]))
+    wait_until(lambda: again == [east.session])
+    wait_until(lambda: speeds(one)['south'] == 200)
+    one.online()
+    assert speeds(one)['east'] == 0
 
 
 def test_commands_that_wait_for_a_late_exchange_are_thrown_away_and_counted(
