@@ -213,6 +213,7 @@ class DriveReporter:
         state, level, command_age = DriveState.OFFLINE, DiagnosticStatus.ERROR, math.nan
         message, more = sentences.bus_hangs(drive.exchange.bus.name), dict[str, str]()
         with drive.exchange.entered() as entered:
+            drive.looked_at(entered)
             if entered:
                 state = session.state
                 level, message = self._judge(state, rejected, now)

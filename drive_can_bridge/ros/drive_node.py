@@ -90,6 +90,7 @@ class DriveNode(DriveListener):
         self.lost_for: Sentence = NOTHING
         self.rejected_text: Sentence = NOTHING
         self._may_run = False   # and nothing has been heard of it since
+        self._told_online = self._told_from_outside = False
         self.foreign_text: Sentence = NOTHING
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
         # time and qualities are the bridge's, whose parameters everybody sees
@@ -125,7 +126,7 @@ class DriveNode(DriveListener):
         self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
         self._request = RequestTopic(self.node, session.sent, stamps)
         self._online = publisher(self.node, Bool, '~/online', latched_quality())
-        self._online.publish(Bool(data=False))
+        self._tell_online(False)
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
 
@@ -232,12 +233,12 @@ class DriveNode(DriveListener):
                 completed(event.outcomes if isinstance(event, RequestCompleted) else event)
         elif isinstance(event, StationFound):
             self._may_run = False
-            self._online.publish(Bool(data=True))
+            self._tell_online(True)
             self._log.reset()
             self._log.info('online')
             self._spinner.later(self._identity.read)
         elif isinstance(event, StationLost):
-            self._online.publish(Bool(data=False))
+            self._tell_online(False)
             self.samples.forget()
             self.lost_at, self.lost_for = self._stamp(), event.reason
             if self.session.active:
@@ -247,7 +248,7 @@ class DriveNode(DriveListener):
                 self._tell_stopped()    # else it was lost before the end of its stop
         elif isinstance(event, DriveFailed):
             self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
-            self._online.publish(Bool(data=False))
+            self._tell_online(False)
             self.samples.forget()
             self.times_lost += 1
         elif isinstance(event, SetpointsExpired):
@@ -275,6 +276,30 @@ class DriveNode(DriveListener):
                 self._log.warning(event.text, urgent=event.danger)
             else:
                 self._log.info(event.text)
+
+    def _tell_online(self, online: bool) -> None:
+        self._told_online = online
+        self._online.publish(Bool(data=online))
+
+    def looked_at(self, entered: bool) -> None:
+        """
+        Take a look at its bus from outside: a drive is not online while that hangs.
+
+        The threads of the bus cannot tell so. They may be back by the time that it is told here,
+        and then nobody knows who came last: so the next look has the last word.
+
+        :param entered: whoever looks has the lock of the bus; False: has waited for it in vain.
+        """
+        try:
+            if not entered:
+                self._told_from_outside = True
+                if self._told_online:
+                    self._tell_online(False)
+            elif self._told_from_outside:
+                self._told_from_outside = False
+                self._tell_online(self.session.online and not self.session.defect)
+        except GONE as error:
+            self._cannot_publish(error)
 
     def _tell_stopped(self) -> None:
         """Say how the drive is left: it was told to stop, and has answered."""
