@@ -167,6 +167,8 @@ class BridgedDrive(Drive):
             answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
                 parameters=[message_of(name, parameter, value)]))
         except NoAnswer as trouble:
+            if not trouble.asked:
+                raise
             return WriteOutcome.under_way(name, parameter, trouble)
         result, = answer.results
         return WriteOutcome(name, result.successful, parameter, result.reason)

@@ -36,11 +36,12 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.sentences import write_not_confirmed
 from drive_can_bridge.process.signals import finish_first
 
 
 #: of a write under way when the conversation ended, and of those that were to follow
-NOT_CONFIRMED = 'not confirmed: it may have been written'
+NOT_CONFIRMED = write_not_confirmed()
 ENDED_BEFORE = 'ended before'
 
 

@@ -1118,6 +1118,11 @@ def nobody_answered() -> str:
 
 
 @sentence
+def write_not_confirmed() -> str:
+    return 'not confirmed: it may have been written'
+
+
+@sentence
 def answer_not_delivered(service: str) -> str:
     return (f'an answer of {service} could not be delivered: its caller takes none (another QoS, '
             f'or DDS has not found all of it)')

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from bridges import Bridge, CONVEYOR, HASTY, LIFT, parameters, StartBridge
+from builders import RAMP
 from clients import Client, wait_until
 from graph_builders import answer, hang, offer
 from lifecycle_msgs.srv import ChangeState
@@ -260,11 +261,30 @@ def test_an_answer_that_is_lost_is_asked_for_again(
         here.call('/forgetful', 'list_parameters', ListParameters.Request())
         assert asked['list_parameters'] == 2
         # what changes something is not done twice
-        with pytest.raises(search.NoAnswer, match='does not answer for 1 s'):
+        with pytest.raises(search.NoAnswer, match='does not answer for 1 s') as caught:
             here.call('/forgetful', 'set_parameters', SetParameters.Request(), 1.0)
+        assert caught.value.asked
         assert asked['set_parameters'] == 1
+        with pytest.raises(search.NoAnswer) as caught:
+            here.call('/nobody', 'set_parameters', SetParameters.Request(), 1.0)
+        assert not caught.value.asked
     finally:
         here.close()
+
+
+@pytest.mark.parametrize('asked', [True, False])
+def test_a_write_that_nobody_answers_is_in_doubt_once_it_was_sent(asked: bool) -> None:
+    trouble = search.NoAnswer('/lift has gone', asked=asked)
+
+    def call(*_: Any) -> None:
+        raise trouble
+    graph: Any = SimpleNamespace(call=call)
+    facts: Any = SimpleNamespace(name='lift')
+    drive = BridgedDrive(graph, '/lift', facts, {RAMP.name: RAMP}, {}, 1.0, str)
+    told: list[Any] = []
+    with pytest.raises(search.NoAnswer):
+        drive.write({RAMP.name: 1.5}, told=told.append)
+    assert [outcome.reason.code for outcome in told] == ['write_not_confirmed'] * asked
 
 
 def test_what_may_be_a_bridge_and_answers_nothing_is_named(

@@ -15,7 +15,8 @@ from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_takes,
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, together,
+    write_not_confirmed,
 )
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
@@ -36,8 +37,10 @@ def asking(client: Client) -> Iterator[Operations]:
 class Shy:
     """A drive's parameter services: who is not known yet gets no answer, as with DDS."""
 
-    def __init__(self, client: Client, known_after: int) -> None:
+    def __init__(self, client: Client, known_after: int, *, ends: bool = False) -> None:
+        self.ends = ends    # with what it is asked to write
         self.known_after = known_after
+        self.mute = False
         self.greetings = self.writes = 0
         self._node = client.node
         self._services = [
@@ -48,7 +51,7 @@ class Shy:
         for service in self._services:
             send = service.send_response
             service.send_response = lambda *answer, send=send: (
-                self.greetings >= self.known_after and send(*answer))
+                self.greetings >= self.known_after and not self.mute and send(*answer))
 
     def _greeted(self, _: Any, response: Any) -> Any:
         self.greetings += 1
@@ -56,6 +59,7 @@ class Shy:
 
     def _written(self, _: Any, response: Any) -> Any:
         self.writes += 1
+        self.mute = self.ends
         response.results = [SetParametersResult(successful=True)]
         return response
 
@@ -91,10 +95,24 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
             assert operations.poll({}, now())
             later += PARAMETER_TIMEOUT
             assert not operations.poll({}, now())
-            assert 'nobody answered' in told[3].text
+            assert told[3] == Outcome(False, nobody_answered())
             assert shy.writes == 3
     finally:
         shy.close()
+
+
+def test_a_write_that_was_sent_and_not_answered_may_have_been_done(client: Client) -> None:
+    shy, told = Shy(client, known_after=1, ends=True), list[Outcome]()
+    try:
+        with asking(client) as operations:
+            now = time.monotonic()
+            operations.write('/lift', 'ramp_time', 1.5, told.append, now)
+            wait_until(lambda: operations.poll({}, now) and shy.writes, what='a write')
+            assert not operations.poll({}, now + PARAMETER_TIMEOUT)
+    finally:
+        shy.close()
+    assert told == [Outcome(False, together([write_not_confirmed(), nobody_answered()]))]
+    assert shy.writes == 1
 
 
 def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:

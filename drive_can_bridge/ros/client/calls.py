@@ -17,6 +17,7 @@ second; the middleware's own queue of depth one throws the others away at next t
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 import math
 import os
 import sys
@@ -63,6 +64,8 @@ _FRESH = 2.0
 
 #: takes the response, or None: nobody answered in time
 Done = Callable[[Any], None]
+#: is told instead where it was not even asked: nothing has come of it
+Unasked = Callable[[], None]
 
 
 class ClientNode:
@@ -140,6 +143,7 @@ class _Call:
 
     request: Any
     done: Done
+    unasked: Unasked
     deadline: float
     again_at: float
     seen_at: float
@@ -182,15 +186,16 @@ class Service:
         """Something waits until somebody offers it."""
         return bool(self._unsent)
 
-    def send(self, request: Any, done: Done, now: float,
-             patience: float = OFFER_TIMEOUT) -> None:
+    def send(self, request: Any, done: Done, now: float, patience: float = OFFER_TIMEOUT,
+             unasked: Unasked | None = None) -> None:
         """
         Ask, as soon as somebody offers it.
 
         :param done: takes the response, or None: nobody answered in time.
         :param patience: s that it may take until it is offered.
+        :param unasked: is told where nobody was asked in time; None: ``done`` is.
         """
-        call = _Call(request, done, now + patience, math.inf, now)
+        call = _Call(request, done, unasked or partial(done, None), now + patience, math.inf, now)
         if self.ready:
             self._send(call, now)
         else:
@@ -215,7 +220,7 @@ class Service:
             elif now < call.deadline:
                 self._unsent.append(call)
             else:
-                call.done(None)
+                call.unasked()
         while self._waiting:
             with self._handle:
                 header, response = self._handle.take_response(self._type.Response)
@@ -266,16 +271,18 @@ class NodeCalls:
         return any(host.busy for host in self._hosts.values())
 
     def ask(self, host: str, service: str, request: Any, done: Done, now: float,
-            patience: float = FIND_TIMEOUT) -> None:
+            patience: float = FIND_TIMEOUT, unasked: Unasked | None = None) -> None:
         """
         Ask a node, as soon as it offers the service and knows us.
 
         :param service: one of :data:`SERVICES`.
         :param patience: s that it may take, once it knows us, until it is offered.
+        :param unasked: is told where it was not asked in time; None: ``done`` is.
         """
         if host not in self._hosts:
             self._hosts[host] = _Host(self._node, host, self._timeout)
-        self._hosts[host].ask(service, request, done, now, patience)
+        self._hosts[host].ask(service, request, done, now, patience,
+                              unasked or partial(done, None))
 
     def offered(self, host: str, service: str) -> bool:
         """Tell whether a service that was asked for is offered."""
@@ -300,6 +307,7 @@ class _Question(NamedTuple):
     service: Service
     request: Any
     done: Done
+    unasked: Unasked
     patience: float
 
 
@@ -322,7 +330,8 @@ class _Host:
     def busy(self) -> bool:
         return bool(self._waiting) or any(each.busy for each in self._services.values())
 
-    def ask(self, service: str, request: Any, done: Done, now: float, patience: float) -> None:
+    def ask(self, service: str, request: Any, done: Done, now: float, patience: float,
+            unasked: Unasked) -> None:
         self.asked_at = now
         if service not in self._services:
             self._get_to_know(service)
@@ -330,7 +339,7 @@ class _Host:
             self._greet_at, self._pause = now, FIRST_PATIENCE
         self._waiting.append(_Question(
             now + min(self._timeout, FIND_TIMEOUT), self._services[service], request, done,
-            min(patience, self._timeout)))
+            unasked, min(patience, self._timeout)))
         self._send(now)
 
     def offered(self, service: str) -> bool:
@@ -387,11 +396,12 @@ class _Host:
         waiting, self._waiting = self._waiting, []
         for each in waiting:
             if now - self._heard_at <= _FRESH:
-                each.service.send(each.request, self._told(now, each.done), now, each.patience)
+                each.service.send(each.request, self._told(now, each.done), now, each.patience,
+                                  each.unasked)
             elif now < each.deadline:
                 self._waiting.append(each)
             else:
-                each.done(None)
+                each.unasked()
 
 
 def _made_with(service: str) -> Iterable[str]:

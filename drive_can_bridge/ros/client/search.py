@@ -36,7 +36,15 @@ _CALL_TIMEOUT = 120.0
 
 
 class NoAnswer(DriveCanError):
-    """A node does not answer, or has gone."""
+    """
+    A node does not answer, or has gone.
+
+    :ivar asked: it was sent the question, and may have done what it was asked.
+    """
+
+    def __init__(self, text: str, *, asked: bool) -> None:
+        super().__init__(text)
+        self.asked = asked
 
 
 class Graph:
@@ -89,8 +97,13 @@ class Graph:
         self._check()
         if timeout not in self._calls:
             self._calls[timeout] = NodeCalls(self.client_node, timeout)
-        calls, answers = self._calls[timeout], list[Any]()
-        calls.ask(node, service, request, answers.append, self._clock.now())
+        calls, answers, asked = self._calls[timeout], list[Any](), True
+
+        def unasked() -> None:
+            nonlocal asked
+            asked = False
+            answers.append(None)
+        calls.ask(node, service, request, answers.append, self._clock.now(), unasked=unasked)
 
         def look(now: float) -> bool:
             calls.look(now)
@@ -100,9 +113,9 @@ class Graph:
             self._heard.add(node)
             return answers[0]
         if calls.offered(node, service):
-            raise NoAnswer(f'{node} does not answer for {timeout:g} s')
+            raise NoAnswer(f'{node} does not answer for {timeout:g} s', asked=asked)
         raise NoAnswer(f'{node} has gone' if node in self._heard
-                       else f'{node} does not offer {service}')
+                       else f'{node} does not offer {service}', asked=asked)
 
     def newest_status(self, name: str, *, age: float, patience: float) -> dict[str, str]:
         """

@@ -22,7 +22,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes,
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, together,
+    write_not_confirmed,
 )
 from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.model import Model
@@ -51,7 +52,8 @@ _STOPS: dict[Stop, tuple[str, Any, Callable[[], Any], float, float]] = {
     Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False), CONTROL_TIMEOUT,
                    math.inf),
 }
-_SILENCE = Outcome(False, nobody_answered())
+_UNASKED = Outcome(False, nobody_answered())
+_UNCONFIRMED = Outcome(False, together([write_not_confirmed(), nobody_answered()]))
 
 
 def stamp_of(message: Any) -> float:
@@ -380,9 +382,10 @@ class Operations:
         def take(response: SetParameters.Response | None) -> None:
             results = [] if response is None else response.results
             done(Outcome(results[0].successful, printable(results[0].reason)) if results
-                 else _SILENCE)
+                 else _UNCONFIRMED)
         self._ask(drive, 'set_parameters',
-                  SetParameters.Request(parameters=[parameter_message(name, value)]), take, now)
+                  SetParameters.Request(parameters=[parameter_message(name, value)]), take, now,
+                  lambda: done(_UNASKED))
 
     def read(self, drive: str, names: Sequence[str],
              done: Callable[[Sequence[Value | None]], None], now: float) -> None:
@@ -391,11 +394,11 @@ class Operations:
             answers = [] if response is None else [drive_value(v) for v in response.values]
             done((answers + [None] * len(names))[:len(names)])
         self._ask(drive, 'get_parameters',
-                  GetParameters.Request(names=list(names)), take, now)
+                  GetParameters.Request(names=list(names)), take, now, lambda: take(None))
 
     def _ask(self, drive: str, service: str, request: Any, take: Callable[[Any], None],
-             now: float) -> None:
+             now: float, unasked: Callable[[], None]) -> None:
         if is_ros_name(drive):
-            self._calls.ask(drive, service, request, take, now)
+            self._calls.ask(drive, service, request, take, now, unasked=unasked)
         else:
-            take(None)
+            unasked()
