@@ -73,8 +73,8 @@ def _assignments(words: Sequence[str]) -> dict[str, str]:
 
 
 def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
-    checked = {(drive, name): _checked(drive, name, text)
-               for drive in drives.values() for name, text in wanted.items()}
+    checked = {(drive, name): each for drive in drives.values()
+               for name, each in _all_checked(drive, wanted).items()}
     if any(reason for _, reason in checked.values()):   # nobody wants half of a command
         _show(args, drives, wanted, [
             (drive, WriteOutcome(name, False, drive.find(name), reason or _OTHER_REFUSED))
@@ -95,6 +95,15 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
             (drive, WriteOutcome(name, False, drive.find(name), ENDED_BEFORE))
             for drive, name in checked if (drive, name) not in known)])
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
+
+
+def _all_checked(drive: Drive, wanted: dict[str, str]) -> dict[str, tuple[Value, str]]:
+    """Return the values, and what is wrong with each by itself, or beside the others."""
+    each = {name: _checked(drive, name, text) for name, text in wanted.items()}
+    contradicted = drive.contradicted({
+        name: value for name, (value, reason) in each.items() if not reason})
+    return {name: (value, reason or contradicted.get(name, ''))
+            for name, (value, reason) in each.items()}
 
 
 def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:

@@ -31,7 +31,7 @@ from enum import Enum
 from typing import Protocol
 
 from drive_can_bridge.core.complaints import hint
-from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
@@ -203,6 +203,20 @@ class Drive(ABC):
             return str(error)
         return ''
 
+    def contradicted(self, values: Mapping[str, Value]) -> dict[str, str]:
+        """
+        Say which values cannot be written together, and why: two for one parameter.
+
+        What :meth:`check` speaks against is left out.
+        """
+        items = {}
+        for name, value in values.items() if len(values) > 1 else ():
+            parameter = self.find(name)
+            if parameter is not None and not self.check(name, value):
+                items[name] = parameter, self._directory.raw_from_user(parameter, value)
+        return {name: reason for name, reason in zip(items, contradictions(list(items.values())))
+                if reason}
+
     def read(self, *names: str,
              told: Callable[[ReadOutcome], object] | None = None) -> dict[str, ReadOutcome]:
         """
@@ -246,10 +260,11 @@ class Drive(ABC):
             ``told`` knows it.
         """
         found = {}
+        contradicted = self.contradicted(values)
         for name, value in values.items():
             with finish_first():
                 parameter = self.find(name)
-                refusal = self.check(name, value)
+                refusal = contradicted.get(name) or self.check(name, value)
                 if refusal or parameter is None:
                     outcome = WriteOutcome(name, False, parameter, refusal)
                 else:

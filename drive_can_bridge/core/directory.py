@@ -6,13 +6,13 @@ A raw name (``p30``) of a parameter that the profile lists obeys the listed one'
 storage, limits. Only its value is raw: the unsigned integer on the wire.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, ValueKind
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.text import nearest, printable
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
@@ -108,6 +108,27 @@ class ParameterDirectory:
                 raise ValueRefused(sentences.raw_refused(
                     value, twin.name, error.sentence)) from None
         return word
+
+
+def contradictions(items: Sequence[tuple[Parameter, int]]) -> list[Sentence]:
+    """
+    Say of each parameter that is to be set which other one gives it another value; '' of none.
+
+    Of two values that are written one after the other the first would be told to be written, and
+    be overwritten.
+
+    :param items: found by name, with raw integers.
+    """
+    wanted: dict[object, dict[int, Parameter]] = {}     # by place: who wants which word there
+    asked = []
+    for parameter, raw in items:
+        addressed = parameter.number is not None or parameter.index is not None
+        words = wanted.setdefault(_place(parameter) if addressed else parameter, {})
+        word = parameter.word_from_raw(raw)
+        words.setdefault(word, parameter)
+        asked.append((words, word))
+    return [next((sentences.contradicted(other.name) for another, other in words.items()
+                  if another != word), NOTHING) for words, word in asked]
 
 
 def _place(parameter: Parameter) -> tuple[int | None, int, int | None]:

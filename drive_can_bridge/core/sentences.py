@@ -1100,6 +1100,11 @@ def never_written(number: int) -> str:
 
 
 @sentence
+def contradicted(other: str) -> str:
+    return f'{other} is the same parameter, and is given another value'
+
+
+@sentence
 def one_half(of: str, writable: bool) -> str:
     return f'one half of {of}: set that' if writable else f'read-only: one half of {of}'
 

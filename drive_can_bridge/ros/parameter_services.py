@@ -21,7 +21,7 @@ from rcl_interfaces.srv import (
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameter_events
 
-from drive_can_bridge.core.directory import NAME_SHOWN, ParameterDirectory
+from drive_can_bridge.core.directory import contradictions, NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
@@ -198,15 +198,20 @@ class ParameterServices:
             return response
         results: list[SetParametersResult] = [
             SetParametersResult() for _ in request.parameters]
-        items: list[tuple[int, Parameter, int]] = []
-        refused = []
+        found: list[tuple[int, Parameter, int]] = []
+        reasons: dict[int, str] = {}
         for place, message in enumerate(request.parameters):
             try:
-                items.append((place, *self._checked(message, hint=place < TOLD_MAX)))
+                found.append((place, *self._checked(message, hint=place < TOLD_MAX)))
             except ValueRefused as error:
-                results[place] = SetParametersResult(reason=str(error))
-                refused.append((message.name, str(error)))
-        self._tell('set', refused)
+                reasons[place] = str(error)
+        reasons.update((place, reason) for (place, _, _), reason in zip(
+            found, contradictions([(parameter, raw) for _, parameter, raw in found])) if reason)
+        items = [each for each in found if each[0] not in reasons]
+        for place, reason in reasons.items():
+            results[place] = SetParametersResult(reason=reason)
+        self._tell('set', [(request.parameters[place].name, reasons[place])
+                           for place in sorted(reasons)])
         if items:
             outcomes = await self._submit(WriteRequest(
                 tuple((parameter, raw) for _, parameter, raw in items),
@@ -238,11 +243,10 @@ class ParameterServices:
             try:
                 items.append(self._checked(message))
             except ValueRefused as error:
-                name = printable(message.name, NAME_SHOWN)
-                reason = nothing_written(f'{name}: {error}')
-                self._failed(f'set {name}', reason, 1)
-                response.result = SetParametersResult(reason=reason)
-                return response
+                return self._nothing_set(response, message.name, str(error))
+        for message, contradicted in zip(request.parameters, contradictions(items)):
+            if contradicted:
+                return self._nothing_set(response, message.name, contradicted)
         if not items:
             response.result = SetParametersResult(successful=True)
             return response
@@ -261,6 +265,14 @@ class ParameterServices:
         text = reasons[0] if len(set(reasons)) == 1 else '; '.join(failed)
         response.result = SetParametersResult(
             successful=all(result.successful for result in results), reason=text)
+        return response
+
+    def _nothing_set(self, response: Any, name: str, reason: str) -> Any:
+        """Refuse all of a call for one of its names."""
+        shown = printable(name, NAME_SHOWN)
+        reason = nothing_written(f'{shown}: {reason}')
+        self._failed(f'set {shown}', reason, 1)
+        response.result = SetParametersResult(reason=reason)
         return response
 
     def _checked(self, message: ParameterMessage, *, hint: bool = True) -> tuple[Parameter, int]:

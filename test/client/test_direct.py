@@ -112,6 +112,14 @@ def test_what_cannot_be_written_says_why(drives: Drives, world: World, name: str
     assert [each for each in world.seen()[before:] if each.identifier < 0x700] == []
 
 
+def test_of_two_values_for_one_parameter_none_is_written(drives: Drives, world: World) -> None:
+    before = world.drives['conveyor'].value('ramp_time')
+    outcomes = drives['conveyor'].write({'ramp_time': 2.5, 'p30': 200, 'jog_speed': 3.0})
+    assert {name: outcome.ok for name, outcome in outcomes.items()} == {
+        'ramp_time': False, 'p30': False, 'jog_speed': True}
+    assert world.drives['conveyor'].value('ramp_time') == before
+
+
 def test_maps_are_written_directly(drives: Drives, world: World) -> None:
     conveyor = drives['conveyor']
     assert conveyor.role('p122') is Role.MAP

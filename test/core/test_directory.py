@@ -10,7 +10,7 @@ from builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.directory import ParameterDirectory
+from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.families import FAMILIES
@@ -154,3 +154,25 @@ def test_raw_names_whose_width_the_drive_tells() -> None:
     assert names.raw_from_user(short, -5) == 0xFFFB
     with pytest.raises(ValueRefused, match='not representable in 16 bits'):
         names.raw_from_user(short, 0x10000)
+
+
+def test_two_values_for_one_parameter_contradict_each_other() -> None:
+    names = directory()
+
+    def contradicted(**raws: int) -> list[object]:
+        return contradictions([
+            (parameter, raw) for name, raw in raws.items()
+            if (parameter := names.find(name)) is not None])
+    assert contradicted(ramp_time=200, p31=200, p30=100) == [
+        says('contradicted', other='p30'), '', says('contradicted', other='ramp_time')]
+    assert contradicted(ramp_time=200, p30=200) == ['', '']
+    # one word has it all, however its sign is said
+    assert contradicted(speed_setpoint=-1, p50=0xFFFF) == ['', '']
+    assert contradictions([(RAMP, 1), (RAMP, 1), (RAMP, 2)]) == [
+        says('contradicted', other='ramp_time')] * 3
+    assert contradictions([]) == []
+
+
+def test_what_only_process_data_carry_is_one_parameter_each() -> None:
+    first, second = (parameter(name, None) for name in ('first', 'second'))
+    assert contradictions([(first, 1), (second, 2)]) == ['', '']

@@ -56,3 +56,21 @@ def test_set_refusals(bridge: StartBridge, client: Client) -> None:
     client.wait_logged('conveyor: set maximum_speed: 3000.1 is out of range: 0 to 3000 rpm')
     status = client.diagnostics(DRIVE)
     assert status['parameter_requests_failed'] == '15'
+
+
+def test_of_two_values_for_one_parameter_none_is_set(bridge: StartBridge,
+                                                     client: Client) -> None:
+    one = bridge()
+    one.online()
+    before = one.played['conveyor'].value('ramp_time')
+    refused = [(False, sentences.contradicted('p30')), (False, sentences.contradicted('ramp_time'))]
+    with one.record() as recorder:
+        assert client.set('/conveyor', ramp_time=before + 1.0, p30=150) == refused
+        assert client.set_atomically('/conveyor', ramp_time=before + 1.0, p30=150) == (
+            False, sentences.nothing_written(f'ramp_time: {sentences.contradicted("p30")}'))
+        assert not acyclic(recorder)
+    results = client.set('/conveyor', ramp_time=before + 1.0, jog_speed=3.0, p30=150)
+    assert results == [refused[0], (True, ''), refused[1]]
+    assert one.played['conveyor'].value('jog_speed') == 3.0
+    assert one.played['conveyor'].value('ramp_time') == before
+    assert client.set('/conveyor', ramp_time=1.5, p30=150) == [(True, '')] * 2
