@@ -12,7 +12,7 @@ this file where something has to be ready before the drives: register the event 
 instead of those below. With ``activate:=false`` the bridge waits in state inactive, with its buses
 open and its drives in the graph, for ``ros2 lifecycle set /drive_can_bridge activate``.
 
-A configuration that is refused ends the launch; the bridge has said why.
+A configuration that is refused, or fails, ends the launch; the bridge has said why.
 """
 
 from launch import LaunchDescription
@@ -69,8 +69,9 @@ def generate_launch_description() -> LaunchDescription:
             target_lifecycle_node=bridge, start_state='configuring', goal_state='inactive',
             entities=[transition(Transition.TRANSITION_ACTIVATE,
                                  condition=IfCondition(LaunchConfiguration('activate')))])),
-        RegisterEventHandler(OnStateTransition(
-            target_lifecycle_node=bridge, start_state='configuring', goal_state='unconfigured',
-            entities=[Shutdown(reason='the bridge cannot be configured, see above')])),
+        *(RegisterEventHandler(OnStateTransition(
+            target_lifecycle_node=bridge, start_state='configuring', goal_state=refused,
+            entities=[Shutdown(reason='the bridge cannot be configured, see above')]))
+          for refused in ('unconfigured', 'errorprocessing')),     # the latter: an exception
         bridge,
     ])

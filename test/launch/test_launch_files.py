@@ -241,4 +241,6 @@ def test_managed_means_configure_then_activate(tmp_path: Path, activate: str) ->
     assert asked(reached('configuring', 'inactive')) == (
         ['TRANSITION_ACTIVATE'] if activate == 'true' else [])
     assert asked(reached('configuring', 'unconfigured')) == ['Shutdown']
+    assert asked(reached('configuring', 'errorprocessing')) == ['Shutdown']     # a defect
+    assert asked(reached('errorprocessing', 'unconfigured')) == []
     assert asked(reached('deactivating', 'inactive')) == []  # whoever stops it means it

@@ -10,7 +10,7 @@ from typing import Any
 from bridges import Bridge, CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client, ERROR, to_messages, wait_until
 from leaks import drive_nodes, threads
-from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.msg import Transition, TransitionEvent
 import pytest
 from rcl_interfaces.srv import GetParameters, SetParameters
 from std_msgs.msg import Bool, Float64
@@ -141,12 +141,16 @@ def test_a_failing_part_leaves_nothing_behind(bridge: StartBridge, client: Clien
     from drive_can_bridge.ros import drive_node
     one = waiting(bridge, parameters(conveyor=CONVEYOR, lift=LIFT))
     before = threads()
+    states = client.topic('/drive_can_bridge/transition_event', TransitionEvent)
 
     def fail(*_: Any, **__: Any) -> None:
         raise RuntimeError('no more services')
     monkeypatch.setattr(drive_node, 'control_services', fail)
     assert not client.transition(CONFIGURE)
     client.wait_logged('configure failed: RuntimeError: no more services', ERROR)
+    # by which managed.launch.py knows it
+    wait_until(lambda: [message.goal_state.label for message in states.messages] == [
+        'configuring', 'errorprocessing', 'unconfigured'])
     assert client.state() == 'unconfigured'
     wait_until(lambda: not {'/conveyor', '/lift'} & set(client.nodes()))
     assert sorted(threads()) == sorted(before)
