@@ -63,7 +63,7 @@ def test_of_two_values_for_one_parameter_none_is_set(bridge: StartBridge,
     one = bridge()
     one.online()
     before = one.played['conveyor'].value('ramp_time')
-    refused = [(False, sentences.contradicted('p30')), (False, sentences.contradicted('ramp_time'))]
+    refused = [(False, sentences.contradicted(other)) for other in ('p30', 'ramp_time')]
     with one.record() as recorder:
         assert client.set('/conveyor', ramp_time=before + 1.0, p30=150) == refused
         assert client.set_atomically('/conveyor', ramp_time=before + 1.0, p30=150) == (
