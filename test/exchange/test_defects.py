@@ -23,6 +23,7 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveFailed, DriveState, Noted, StationFound
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.exchange.member import Member
 
 #: s: of the drives, and until an answer
 PERIOD, DELAY = 0.05, 0.001
@@ -357,3 +358,21 @@ def test_what_waits_for_others_is_not_thrown_away_when_a_drive_begins_anew() -> 
     world.live(2.0)
     assert first.session.online
     assert first.discarded == discarded
+
+
+def test_what_comes_just_before_a_drive_begins_anew_is_of_a_drive_that_is_lost(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World('29 bit')
+    first, begin_anew, waiting = world.bench.notes[0], Member.begin_anew, []
+
+    def command_and_begin(member: Member, now: float) -> None:
+        first.commands.append((0, 0.0))
+        begin_anew(member, now)
+        waiting.extend(first.commands)
+    monkeypatch.setattr(Member, 'begin_anew', command_and_begin)
+    first.failing = True
+    world.live(PERIOD)
+    first.failing = False
+    world.live(2.0)
+    assert first.session.state is DriveState.NOT_ARMED
+    assert not waiting
