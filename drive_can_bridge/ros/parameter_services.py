@@ -198,20 +198,15 @@ class ParameterServices:
             return response
         results: list[SetParametersResult] = [
             SetParametersResult() for _ in request.parameters]
-        found: list[tuple[int, Parameter, int]] = []
-        reasons: dict[int, str] = {}
+        items: list[tuple[int, Parameter, int]] = []
+        refused = []
         for place, message in enumerate(request.parameters):
             try:
-                found.append((place, *self._checked(message, hint=place < TOLD_MAX)))
+                items.append((place, *self._checked(message, hint=place < TOLD_MAX)))
             except ValueRefused as error:
-                reasons[place] = str(error)
-        reasons.update((place, reason) for (place, _, _), reason in zip(
-            found, contradictions([(parameter, raw) for _, parameter, raw in found])) if reason)
-        items = [each for each in found if each[0] not in reasons]
-        for place, reason in reasons.items():
-            results[place] = SetParametersResult(reason=reason)
-        self._tell('set', [(request.parameters[place].name, reasons[place])
-                           for place in sorted(reasons)])
+                results[place] = SetParametersResult(reason=str(error))
+                refused.append((message.name, str(error)))
+        self._tell('set', refused)
         if items:
             outcomes = await self._submit(WriteRequest(
                 tuple((parameter, raw) for _, parameter, raw in items),
