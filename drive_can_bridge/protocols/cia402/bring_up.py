@@ -5,10 +5,13 @@ What is done with a drive before its first PDO, as one sequence.
 .. code-block:: text
 
     6041h ─enabled─► 6040h until it is not ─► heartbeats ─► NMT pre-operational ─► PDOs, SYNC
-        ─► 60C2h, 6502h, 6060h ─► NMT start ─► where axes are that stay there ─► PDOs flow
+        ─► 60C2h, 6502h, 6060h ─► NMT start ─► where axes are that stay there ─► 6041h as above
+        ─► PDOs flow
 
-Whatever nobody answers ends it; it begins anew then. What differs from the configuration, and
-cannot be made to fit, is told in words, and the drive is not cycled.
+All that may take minutes, and others may have enabled the drive meanwhile: so it is asked for its
+state once more before the first PDO, and disabled. Whatever nobody answers ends it; it begins anew
+then. What differs from the configuration, and cannot be made to fit, is told in words, and the
+drive is not cycled.
 """
 
 from collections.abc import Callable, Generator, Iterable
@@ -63,7 +66,7 @@ class Outcome:
     The end of the sequence.
 
     :param text: what differs, or how it runs on.
-    :param status: the status word that it began with, where it is ready.
+    :param status: the last status word, where it is ready.
     :param remedy: says what to do about what differs.
     """
 
@@ -113,7 +116,7 @@ class BringUp:
         if _silent(reply):
             return Outcome(Found.ABSENT)
         try:
-            status = yield from self._stand_still(reply)
+            yield from self._stand_still(reply)
             yield from self._learn()
             yield from self._heartbeat()
             if self._options.mapping != 'assume':
@@ -124,10 +127,19 @@ class BringUp:
             yield from self._beats()
             yield from self._start()
             yield from self._find_axes()
-            yield from self._beats()    # nobody looked meanwhile
+            status = yield from self._once_more()
         except _End as end:
             return end.outcome
         return Outcome(Found.READY, status=status)
+
+    def _once_more(self) -> Generator[Ask, Reply, int]:
+        """Look again at what nobody looked at meanwhile; return the status word."""
+        while True:
+            yield from self._beats()
+            status = yield from self._stand_still(
+                (yield from self._transfer(Ask(states.STATUS_WORD))))
+            if not self._node.ceased:
+                return status
 
     # -- one object -------------------------------------------------------------------------------
 

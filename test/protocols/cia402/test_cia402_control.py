@@ -253,11 +253,10 @@ class TestQuickStop:
 
     def test_nothing_else_goes_out_until_a_status_behind_it_was_seen(self) -> None:
         axis = Axis().enabled()
-        axis.asks(QUICK_STOP, 0.0095)
         axis.mute = True
-        axis.live(0.01)
+        axis.asks(QUICK_STOP, 0.0105)
+        assert axis.words()[-1] == '0200'
         axis.deliver(axis.talk.asks(DISABLE, axis.now))
-        axis.take()
         axis.live(0.025)
         assert axis.words() == ['0200']
 

@@ -417,6 +417,24 @@ class TestNoNmt:
         axis.live(0.5)
         assert axis.session.online
 
+    @pytest.mark.parametrize('waits', [1.0, 180.0])
+    def test_one_that_somebody_enables_meanwhile_is_disabled_by_sdo(self, waits: float) -> None:
+        axis = meet(nmt_start=False, disable_word='disable_operation')
+        axis.live(waits)
+        axis.drive.becomes(axis.drive.ENABLED)
+        axis.drive.told.clear()
+        axis.drive.ramp = 10
+        axis.take()
+        axis.drive.operational = True
+        axis.live(0.5)
+        assert axis.drive.told == [0x07]
+        assert not any(text.startswith('205#') for text in axis.take())
+        assert says('found_enabled', state='operation enabled') in notes(axis)
+        axis.drive.becomes(axis.drive.ON)
+        axis.live(0.3)
+        assert axis.session.online
+        assert axis.drive.told == [0x07, 0x06]
+
 
 class TestHeldAxes:
 
