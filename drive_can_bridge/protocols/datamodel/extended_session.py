@@ -310,7 +310,8 @@ class ExtendedSession(Session):
     def send_cycle(self, request: Frame, now: float) -> None:
         self._exchange.put(request)
         self._exchange.expect_answer(now)
-        self._channel.hold(now + 0.5 * self.configuration.period)
+        # of one that is silent for as long as that nobody knows that it still has a request
+        self._channel.hold(now + min(0.5 * self.configuration.period, self.retry.timeout))
 
     def last_cycle_left(self, now: float) -> None:
         if self.stage is Stage.STOPPING:

@@ -226,7 +226,7 @@ def test_difference_is_believed_although_the_rest_is_not_answered() -> None:
 
 
 def test_answer_to_the_cycle_before_a_lost_map_is_no_surprise() -> None:
-    talk = online(period=1.0)
+    talk = online(period=1.0, parameter_timeout=0.5)
     assert talk.until(11.0)[0] == (11.0, NEUTRAL)
     assert talk.until(11.5) == [(11.5, ASK_REQUEST_MAP)]  # half a period without an answer
     talk.hears(OTHER_REQUEST_MAP, 11.6)

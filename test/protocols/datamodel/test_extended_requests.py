@@ -376,6 +376,14 @@ def test_or_for_half_a_period() -> None:
     assert talk.until(10.03 + TICK) == [(10.03, ASK_GAIN)]
 
 
+def test_nor_longer_than_for_an_answer_however_long_the_period_is() -> None:
+    talk = quiet(parameter_timeout=0.25)
+    assert talk.until(20.0 + TICK) == [(20.0, NEUTRAL)]
+    talk.submits(read(GAIN), 20.1)
+    assert talk.until(20.25 - TICK) == []
+    assert talk.until(20.25 + TICK) == [(20.25, ASK_GAIN)]
+
+
 def test_cycles_do_not_wait_for_acyclic_answers() -> None:
     talk = online(mapping='assume')
     talk.submits(read(GAIN), 10.003)
