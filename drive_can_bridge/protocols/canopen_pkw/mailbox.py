@@ -30,7 +30,10 @@ no notice of one that has the function byte of the request that it was busy with
 Other writes cannot be written again to be sure, and some device may acknowledge one long after it
 has answered others, function 00h among them. So as long as that may happen, the next one to the
 same address gets the other toggle, behind function 00h where it is that of the last request. Where
-both toggles are taken, an answer that may be a late one is not believed.
+both toggles are taken, an answer that may be a late one is not believed. It may come for a while,
+and until the device has answered something newer: one that queues requests, and stands still for
+seconds, gets on with what it was sent. An answer proves nothing newer than the oldest request that
+it fits: of a queue of reads of one register, every other one looks the same.
 """
 
 from collections import deque
@@ -57,6 +60,8 @@ from drive_can_bridge.protocols.transactor import Transactor
 SYNCHRONISATION_TIMEOUT = 0.1
 #: so many writes whose answers may still come are remembered
 OPEN_MAX = 16
+#: so many requests that were not answered are remembered: those of a minute of silence
+ASKED_MAX = 256
 #: s until the bus is asked again to take a write that waits for nobody
 REFUSED_PAUSE = 0.01
 
@@ -159,8 +164,10 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._request: Message | None = None
         #: writes in order, the one under way included, whose answers may still come
         self._open: deque[Message] = deque(maxlen=OPEN_MAX)
+        #: requests in order, of which a device that answers in order has answered no newer one
+        self._asked: deque[Message] = deque(maxlen=ASKED_MAX)
         #: writes that were given up and are not to be done twice, until a late answer may come
-        self._given_up: deque[tuple[float, Message]] = deque(maxlen=OPEN_MAX)
+        self._given_up: deque[tuple[float, Message]] = deque(maxlen=ASKED_MAX)
         self._late_until = -math.inf    # the answer to the request under way may come, at last
         self._until = math.inf          # an answer counts; the deadline may be a moment before
         self._abandoned = False
@@ -190,6 +197,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             return
         self._request = pkw.idle_request()
         self.deadline = self._until = now + min(self.retry.timeout, SYNCHRONISATION_TIMEOUT)
+        self._asked.append(self._request)
         self._send(self._request, self._left)
 
     def abandon(self, until: float) -> None:
@@ -242,8 +250,6 @@ class MailboxTransactor(Transactor[Step, Reply]):
             return False
         sent = request.code != Function.NONE
         if sent or self._abandoned or isinstance(step, Write):
-            if sent and isinstance(step, Write) and not step.blind:
-                self._given_up.append((self._late_until, request))
             self.forget()
             return Silence(sent)
         self._send_step(step, now)
@@ -251,6 +257,10 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def forget(self) -> None:
         """Expect nothing any more; what the device's last function byte is, is unknown."""
+        request, step = self._request, self.step
+        if request is not None and request.code != Function.NONE and self._refused_at is None and (
+                isinstance(step, Write) and not step.blind):
+            self._given_up.append((self._late_until, request))
         self.finish()
         self._synchronised = False
 
@@ -269,19 +279,30 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def _take_late(self, answer: Message, now: float) -> float | None:
         """Take an answer; return until when it might be that to a write that was given up."""
-        for place, (until, request) in enumerate(self._given_up):
-            if now < until and pkw.answers(answer, request):
-                del self._given_up[place]
-                return until
-        return None
+        found = next((each for each in self._still_late(now) if pkw.answers(answer, each[1])), None)
+        if found is not None:
+            self._given_up.remove(found)
+        older = list(dropwhile(lambda each: not _fits(answer, each), self._asked))
+        if older:
+            self._asked = deque(older[1:], maxlen=ASKED_MAX)
+        return None if found is None else found[0]
+
+    def _still_late(self, now: float) -> list[tuple[float, Message]]:
+        """Return the writes that were given up, and until when answers to them may come anyhow."""
+        if self._given_up:
+            asked = set(map(id, self._asked))
+            self._given_up = deque(
+                (each for each in self._given_up if now < each[0] or id(each[1]) in asked),
+                maxlen=ASKED_MAX)
+        return list(self._given_up)
 
     def _next_toggle(self, step: Step, now: float) -> bool:
         """Return the toggle of the request for a step: inverted, if no late answer has only it."""
         inverted = not self._toggle
         if isinstance(step, Read) or step.blind:
             return inverted
-        taken = {request.toggle for until, request in self._given_up
-                 if now < until and request.address == step.address}
+        taken = {request.toggle for _, request in self._still_late(now)
+                 if request.address == step.address}
         return self._toggle if taken == {inverted} else inverted
 
     def _left(self, sent: bool, now: float) -> None:
@@ -294,6 +315,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
                 self.deadline = self._until = max(self._until, now + more)
             return
         self._refused_at = now
+        if self._asked and self._asked[-1] is self._request:
+            self._asked.pop()
         if isinstance(self.step, Write) and self.step.blind:
             self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
@@ -331,12 +354,19 @@ class MailboxTransactor(Transactor[Step, Reply]):
             left = partial(self._write_left, step)
         self.deadline = self._until = now + self._patience(step)
         self._late_until = self._until + self.silence + LATE_MAX
+        self._asked.append(self._request)
         self._send(self._request, left)
 
     def _make_request(self, step: Step, toggle: bool) -> Message:
         if isinstance(step, Read):
             return pkw.read_request(step.address, step.count, toggle)
         return pkw.write_request(step.address, step.words, toggle)
+
+
+def _fits(answer: Message, request: Message) -> bool:
+    """Tell whether an answer may be that to a request, function 00h included."""
+    return (answer.code == Function.NONE if request.code == Function.NONE else
+            pkw.answers(answer, request))
 
 
 def _is_blind(step: Step) -> bool:

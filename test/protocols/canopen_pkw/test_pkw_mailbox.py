@@ -449,6 +449,49 @@ def test_write_that_had_to_make_room_has_its_time_to_be_late(box: Box) -> None:
     assert box.begin(SECOND, 2.49) == ['0000000000000000']
 
 
+def test_what_was_cut_short_may_be_answered_late_too(box: Box) -> None:
+    assert box.begin(FIRST, 1.0) == ['8C02002A2C000000']
+    box.box.forget()
+    assert reads(box, 1.01) == 'C70100A500000000'
+    assert box.begin(SECOND, 1.02) == ['0000000000000000']
+    assert box.hears('0000000000000000', 1.03) is True
+    assert box.take() == ['8C0200AA21000000']
+
+
+def reads_in_vain(box: Box, now: float) -> list[str]:
+    """Read register 455, and function 00h before, without an answer; return what was sent."""
+    sent = box.begin(READ, now)
+    if sent == ['0000000000000000']:
+        now += 0.1
+        assert box.box.handle_timer(now) is False
+        sent += box.take()
+    assert box.box.handle_timer(now + 0.5) == Silence(sent=True)
+    return sent
+
+
+def test_a_device_that_queues_requests_has_to_get_on_with_them_first(box: Box) -> None:
+    """It stands still for seconds: each answer is that to the oldest request that it fits."""
+    assert reads_in_vain(box, 1.0) == ['C701002500000000']
+    assert reads_in_vain(box, 1.5) == ['0000000000000000', 'C70100A500000000']
+    assert box.begin(FIRST, 2.1) == ['0000000000000000']
+    assert box.hears('C701002583200000', 2.14) is False
+    assert box.hears('0000000000000000', 2.15) is True      # to that of 1.5
+    assert box.take() == ['8C02002A2C000000']
+    assert box.box.handle_timer(2.65) == Silence(sent=True)
+    assert reads_in_vain(box, 2.65) == ['0000000000000000', 'C70100A500000000']
+    assert box.begin(SECOND, 9.0) == ['0000000000000000']
+    assert box.hears('C70100A583200000', 9.01) is False     # to that of 1.6
+    assert box.hears('0000000000000000', 9.02) is True      # to that of 2.1
+    assert box.take() == ['8C0200AA21000000']
+    assert box.hears('8C02002A00000000', 9.03) is False
+    assert box.hears('0000000000000000', 9.04) is False
+    assert box.hears('C70100A583200000', 9.05) is False
+    assert box.hears('0000000000000000', 9.06) is False
+    assert box.hears('8C0200AA00000000', 9.07) == Answered((0, 0))
+    assert reads(box, 9.08) == 'C701002500000000'
+    assert box.begin(FIRST, 9.09) == ['8C0200AA2C000000']
+
+
 def test_what_stops_a_drive_waits_for_no_toggle(box: Box) -> None:
     assert gives_up(box, Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
     reads(box, 1.51)
