@@ -199,12 +199,12 @@ class TableRules:
             if (word := getattr(table, action.value, None)) is not None}
         self.known = frozenset(self._words)
 
-    def word(self, sending: ControlAction, *, enabling: bool) -> int:
+    def word(self, sending: ControlAction, *, asked: ControlAction | None) -> int:
         """
         Return the word to be sent now.
 
         :param sending: what it is for.
-        :param enabling: ``disable`` is sent on the way to ``enable``.
+        :param asked: what is under way because users want it; None: nothing is.
         """
         return self._words[sending]
 

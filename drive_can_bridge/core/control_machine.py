@@ -130,7 +130,7 @@ class ControlMachine:
         self._unheard = unheard
         self._wording = wording
         self._sending = ControlAction.DISABLE   # by name: two words may have the same bits
-        self.word = self._rules.word(self._sending, enabling=False)
+        self.word = self._rules.word(self._sending, asked=None)
         self._sent = self._again = False        # the current word left; is to leave once more
         self.word_left_at = -math.inf
         self._fault: bool | None = None         # None: not known
@@ -522,8 +522,8 @@ class ControlMachine:
     def _choose(self) -> None:
         """Take the word that serves what is wanted; another one has yet to leave."""
         under_way = self._operation
-        word = self._rules.word(self._sending, enabling=under_way is not None and (
-            under_way.action is ControlAction.ENABLE))
+        word = self._rules.word(
+            self._sending, asked=None if under_way is None else under_way.action)
         if word != self.word:
             self.word = word
             self._sent = False

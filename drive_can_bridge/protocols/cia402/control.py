@@ -78,6 +78,8 @@ class DriveRules(TableRules):
     :ivar status: the word that told it; 0: not known.
     :ivar quick_stop_option: 605Ah; None: the drive has none.
     :ivar velocity_zero: 606Ch said so in *quick stop active*.
+    :ivar waited_out: nothing says whether it stands there, and it had its time to. That is enough
+        for what users ask for, and says nothing else.
     :ivar mode_bits: what the mode adds to the enable word once the drive is enabled.
     :ivar homing_bits: what is sent beside 000Fh in mode 6; None: the drive is in its own mode.
     :ivar halted: the drive was told to halt: its position is its own.
@@ -88,7 +90,7 @@ class DriveRules(TableRules):
         self.state: State | None = None
         self.status = 0
         self.quick_stop_option: int | None = None
-        self.velocity_zero = False
+        self.velocity_zero = self.waited_out = False
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
         self.homing_bits: int | None = None
         self.halted = False
@@ -99,21 +101,22 @@ class DriveRules(TableRules):
         self._may_be_enabled = self._quick_stop_unseen = False
         self._last = 0
 
-    def word(self, sending: ControlAction, *, enabling: bool) -> int:
+    def word(self, sending: ControlAction, *, asked: ControlAction | None) -> int:
         if sending is ControlAction.DISABLE:
-            return self._disabling(enabling)
+            return self._disabling(asked)
         if sending is ControlAction.ENABLE:
             return self._enabling()
-        return super().word(sending, enabling=enabling)
+        return super().word(sending, asked=asked)
 
-    def _disabling(self, enabling: bool) -> int:
+    def _disabling(self, asked: ControlAction | None) -> int:
         if self._quick_stop_unseen:
             return states.QUICK_STOP
         if self.state is State.QUICK_STOP_ACTIVE:
-            return states.DISABLE_VOLTAGE if self.stays and self.stands else states.QUICK_STOP
+            ends = self.stays and (self.stands or self.waited_out and asked is not None)
+            return states.DISABLE_VOLTAGE if ends else states.QUICK_STOP
         if self._may_be_enabled or self.state in (None, State.OPERATION_ENABLED):
             return self._disable_word
-        if self._disable_word == states.DISABLE_VOLTAGE and not enabling:
+        if self._disable_word == states.DISABLE_VOLTAGE and asked is not ControlAction.ENABLE:
             return states.DISABLE_VOLTAGE
         return states.SHUTDOWN
 
@@ -144,7 +147,7 @@ class DriveRules(TableRules):
         self.status = raw
         before, self.state = self.state, states.state_of(raw)
         if self.state is not before:
-            self.velocity_zero = False
+            self.velocity_zero = self.waited_out = False
         if not behind:
             return
         if self._last == states.QUICK_STOP:
@@ -154,7 +157,7 @@ class DriveRules(TableRules):
 
     def forget(self) -> None:
         self.state, self.status = None, 0
-        self.velocity_zero = self.halted = False
+        self.velocity_zero = self.waited_out = self.halted = False
         self._quick_stop_unseen = self._last == states.QUICK_STOP
 
     def known_disabled(self) -> None:

@@ -428,9 +428,9 @@ class Cia402Session(Session):
         if self._looking:
             return
         if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
-                not self._rules.stands and self._tells_velocity):
+                not self._rules.stands and not self._rules.waited_out):
             self._looking = True
-            self._channel.run(self._look_at_velocity(), self._looked, now)
+            self._channel.run(self._look_at_velocity(now), self._looked, now)
         elif self.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
         elif state is State.OPERATION_ENABLED and self._mode_shown != self._mode and (
@@ -461,14 +461,23 @@ class Cia402Session(Session):
                 return
             yield Ask(pause=LOOK_PERIOD)
 
-    def _look_at_velocity(self) -> Generator[Ask, Reply, None]:
-        """Read 606Ch until a drive that stays in its quick stop stands."""
-        while self._rules.state is State.QUICK_STOP_ACTIVE and not self._rules.stands:
-            reply = yield Ask(states.VELOCITY)
-            if reply.abort is not None:
-                self._tells_velocity = False
+    def _look_at_velocity(self, since: float) -> Generator[Ask, Reply, None]:
+        """
+        Read 606Ch until a drive that stays in its quick stop stands; without one, wait.
+
+        :param since: when the quick stop was seen.
+        """
+        rules, until = self._rules, since + self.configuration.control_timeout
+        while rules.state is State.QUICK_STOP_ACTIVE and not rules.stands:
+            if self._tells_velocity:
+                reply = yield Ask(states.VELOCITY)
+                self._tells_velocity = reply.abort is None
+                rules.velocity_zero = reply.data is not None and not any(reply.data)
+            elif self._channel.now >= until:
+                rules.waited_out = True
+                self._machine.rules_changed()
+                self.control_changed(self._channel.now)
                 return
-            self._rules.velocity_zero = reply.data is not None and not any(reply.data)
             yield Ask(pause=LOOK_PERIOD)
 
     def _look_at_error(self) -> Generator[Ask, Reply, None]:

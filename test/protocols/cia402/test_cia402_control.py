@@ -295,6 +295,65 @@ class TestQuickStop:
         assert axis.take().count('605#406C600000000000') == 1
 
 
+class TestOneThatHoldsAndDoesNotTellWhetherItStands:
+    """605Ah 6, no 606Ch, and bit 10 never: for users a time stands for it, and for nobody else."""
+
+    @staticmethod
+    def braking(since: float) -> Axis:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}, control_timeout=0.5).enabled()
+        del axis.drive.objects[0x606C, 0]
+        axis.drive.becomes(axis.drive.QUICK_STOP)
+        axis.live(since)
+        assert axis.words()[-1] == '0200'
+        return axis
+
+    @pytest.mark.parametrize('since', [0.6, 5.0])
+    def test_it_is_disabled_and_enabled_behind_control_timeout(self, since: float) -> None:
+        axis = self.braking(since)
+        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
+        assert axis.words() == ['0000', '0600']
+        axis = self.braking(since)
+        assert axis.asks(ENABLE) == [('enable', True, State.OPERATION_ENABLED.value)]
+        assert axis.words() == ['0000', '0600', '0700', '0F00']
+
+    def test_not_before(self) -> None:
+        axis = self.braking(0.2)
+        assert axis.asks(DISABLE, 0.25) == []
+        assert axis.words() == ['0200']
+        axis.live(0.2)
+        assert [success for _, success, _ in axis.talk.control_outcomes()] == [True]
+        assert axis.words() == ['0200', '0000', '0600']
+
+    def test_the_time_counts_from_each_quick_stop(self) -> None:
+        axis = self.braking(5.0)
+        axis.asks(ENABLE)
+        for _ in range(2):
+            axis.asks(QUICK_STOP, 0.3)
+            axis.take()
+            axis.asks(DISABLE, 0.15)
+            assert axis.words() == ['0200']
+            axis.live(0.2)
+            assert axis.words() == ['0200', '0000', '0600']
+            assert axis.asks(ENABLE)[-1] == ('enable', True, State.OPERATION_ENABLED.value)
+
+    def test_a_quick_stop_is_not_answered_as_holding(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}, control_timeout=0.5).enabled()
+        del axis.drive.objects[0x606C, 0]
+        (_, success, why), = axis.asks(QUICK_STOP, 5.0)
+        assert not success
+        assert 'still braking' in why
+        assert axis.words() == ['0200']
+        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
+
+    def test_the_end_of_the_bridge_waits_for_no_time(self) -> None:
+        axis = self.braking(5.0)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(5.0)
+        assert axis.session.stopped
+        assert axis.words() == ['0200']
+        assert any(note.danger for note in axis.talk.events(Noted))
+
+
 class TestOneThatFallsOutBeforeItsEnableIsConfirmed:
     """Nothing but a new request starts it: section 4 of the contract, "by itself"."""
 
