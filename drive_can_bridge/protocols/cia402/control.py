@@ -99,6 +99,7 @@ class DriveRules(TableRules):
         self._enable_word = states.ENABLE | (
             states.RAMP_BITS if options.mode == 'vl' and options.ramp_bits else 0)
         self._may_be_enabled = self._quick_stop_unseen = False
+        self._still_enabled = False     # by the status behind 0002h, which may be one of before
         self._last = 0
 
     def word(self, sending: ControlAction, *, asked: ControlAction | None) -> int:
@@ -137,6 +138,7 @@ class DriveRules(TableRules):
         return not word & (_ENABLE_OPERATION | states.FAULT_RESET) and word != states.QUICK_STOP
 
     def left(self, word: int) -> None:
+        self._still_enabled = self._still_enabled and word == self._last
         self._last = word
         if word & _ENABLE_OPERATION:
             self._may_be_enabled = True
@@ -151,14 +153,17 @@ class DriveRules(TableRules):
         if not behind:
             return
         if self._last == states.QUICK_STOP:
-            self._quick_stop_unseen = False
+            # it may have been sampled, or on its way, before: a second one was not
+            enabled = self.state is State.OPERATION_ENABLED
+            self._quick_stop_unseen = enabled and not self._still_enabled
+            self._still_enabled = enabled
         if not self._last & _ENABLE_OPERATION and self.state is not State.OPERATION_ENABLED:
             self._may_be_enabled = False
 
     def forget(self) -> None:
         self.state, self.status = None, 0
         self.velocity_zero = self.waited_out = self.halted = False
-        self._quick_stop_unseen = self._last == states.QUICK_STOP
+        self._quick_stop_unseen, self._still_enabled = self._last == states.QUICK_STOP, False
 
     def known_disabled(self) -> None:
         """Record that the drive was asked by SDO, and is not enabled."""

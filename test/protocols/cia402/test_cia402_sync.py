@@ -400,6 +400,31 @@ class TestEvent:
         assert '080#' not in sent
         assert axis.session.online
 
+    @pytest.mark.parametrize('word', ['shutdown', 'disable_voltage', 'disable_operation'])
+    def test_what_was_on_its_way_is_no_status_behind_a_quick_stop(self, word: str) -> None:
+        axis = self.meet(disable_word=word)
+        axis.asks(ControlAction.ENABLE)
+        axis.drive.braking = 20
+        axis.mute = True
+        axis.asks(ControlAction.QUICK_STOP, 0.0105)
+        assert axis.words()[-1] == '0200'
+        assert axis.drive.state == axis.drive.QUICK_STOP
+        axis.mute = False
+        axis.says('185#3702E8030000')       # sampled before
+        axis.asks(ControlAction.DISABLE, 0.1)
+        assert axis.words() == ['0200']
+
+    def test_a_drive_that_takes_no_notice_of_a_quick_stop_is_disabled(self) -> None:
+        axis = self.meet()
+        axis.asks(ControlAction.ENABLE)
+        control = axis.drive._control
+        axis.drive._control = lambda word: (    # type: ignore[method-assign]
+            control(word) if word != 0x02 else None)
+        axis.asks(ControlAction.QUICK_STOP, 0.05)
+        assert axis.words()[-1] == '0200'
+        axis.asks(ControlAction.DISABLE, 0.1)
+        assert axis.words() == ['0700', '0600']
+
     def test_what_comes_by_itself_is_a_sample_and_never_unasked(self) -> None:
         axis = self.meet()
         axis.talk.events()
