@@ -279,7 +279,8 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def _take_late(self, answer: Message, now: float) -> float | None:
         """Take an answer; return until when it might be that to a write that was given up."""
-        found = next((each for each in self._still_late(now) if pkw.answers(answer, each[1])), None)
+        found = next(
+            (each for each in self._still_late(now) if pkw.answers(answer, each[1])), None)
         if found is not None:
             self._given_up.remove(found)
         older = list(dropwhile(lambda each: not _fits(answer, each), self._asked))
