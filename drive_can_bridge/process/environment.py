@@ -27,6 +27,21 @@ def prepare(domain_id: int | None) -> None:
         os.environ[DISCOVERY_RANGE] = 'LOCALHOST'
 
 
+def domain_problem() -> str:
+    """
+    Say why there is no such ROS domain; '' where there is one, or rcl says it.
+
+    Fast DDS ends the process itself where it finds no ports, in two lines of its own.
+    """
+    try:
+        domain = int(os.environ.get(DOMAIN_ID, ''), 0)
+    except ValueError:
+        return ''
+    if -1 <= domain <= DOMAIN_ID_MAX:   # rcl takes -1 for none
+        return ''
+    return f'{DOMAIN_ID} is {domain}, allowed are 0 to {DOMAIN_ID_MAX}'
+
+
 def in_words() -> str:
     """Say where the demo can be seen, ``ROS domain 0, on this machine only``."""
     domain = os.environ.get(DOMAIN_ID) or '0'

@@ -9,8 +9,8 @@ Loading rclpy and its messages takes a second. Signals are looked after before t
 everything heavy is imported inside functions here.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 import gc
 import os
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.sentences import ends_before_stop, may_still_be_running
+from drive_can_bridge.process.environment import domain_problem
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
 from drive_can_bridge.process.standard_outputs import StandardOutputs
@@ -39,24 +40,39 @@ def main(args: Sequence[str] | None = None) -> int:
     be_punctual()
     # in a process of our own, signals are looked after to the very end
     clock = SteadyClock()
-    with (SignalWatcher(clock, keep=args is None, refuse=_refuse_to_suspend) as watcher,
-          StandardOutputs(clock) as outputs):
-        watcher.last_steps.append(outputs.flush)
-        _tell_rcutils(outputs)
-        try:
-            code = run(watcher, clock, arguments)
-        except ImportError as error:
-            code = _complain(what_is_missing('drive_can_bridge', error))
-        except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
-            code = _complain('drive_can_bridge: internal error, please report it: '
-                             f'{type(error).__name__}: {error}')
-        code = watcher.exit_code(code)
-        if args is None:
-            sys.stdout.flush()
-            sys.stderr.flush()
-            outputs.flush()
-            leave(code)
-        return code
+    with SignalWatcher(clock, keep=args is None, refuse=_refuse_to_suspend) as watcher:
+        _load_rcl()
+        with StandardOutputs(clock) as outputs:
+            watcher.last_steps.append(outputs.flush)
+            _tell_rcutils(outputs)
+            code = watcher.exit_code(_code_of(lambda: run(watcher, clock, arguments)))
+            if args is None:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                outputs.flush()
+                leave(code)
+            return code
+
+
+def _load_rcl() -> None:
+    """
+    Load rcl while the outputs are as they were.
+
+    Where its middleware is not installed it says so, and ends the process on the spot: what is in
+    a pipe by then is read by nobody. What else may be wrong is told by who needs it.
+    """
+    with suppress(Exception):
+        import rclpy.impl.implementation_singleton  # noqa: F401
+
+
+def _code_of(work: Callable[[], int]) -> int:
+    try:
+        return work()
+    except ImportError as error:
+        return _complain(what_is_missing('drive_can_bridge', error))
+    except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
+        return _complain('drive_can_bridge: internal error, please report it: '
+                         f'{type(error).__name__}: {error}')
 
 
 def _complain(text: str) -> int:
@@ -103,6 +119,9 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
         print(f'drive_can_bridge: {rest[0]}: only ROS arguments are taken '
               f'(drive_can_bridge --ros-args --params-file FILE)', file=sys.stderr)
         return 2
+    why = domain_problem()
+    if why:
+        return _complain(f'drive_can_bridge: {why}')
     set_up_fast_dds()
     try:
         with _quiet_rcl():

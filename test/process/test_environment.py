@@ -34,3 +34,13 @@ def test_what_is_told(clean: pytest.MonkeyPatch, given: dict[str, str], domain: 
         clean.setenv(name, value)
     environment.prepare(domain)
     assert (environment.in_words(), environment.export_command()) == (words, export)
+
+
+@pytest.mark.parametrize(('given', 'refused'), [
+    ('', False), ('0', False), ('232', False), ('233', True), ('0xe9', True), ('999', True), ('-2', True),
+    # no domain for rcl; and what it says itself
+    ('-1', False), ('abc', False)])
+def test_a_domain_whose_ports_do_not_exist(clean: pytest.MonkeyPatch, given: str, *,
+                                           refused: bool) -> None:
+    clean.setenv('ROS_DOMAIN_ID', given)
+    assert bool(environment.domain_problem()) is refused

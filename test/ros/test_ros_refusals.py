@@ -9,6 +9,7 @@ from collections.abc import Callable
 import os
 from pathlib import Path
 import re
+import subprocess
 import sys
 import tempfile
 from typing import Any
@@ -197,6 +198,24 @@ def test_more_than_can_be_held_back_holds_up_nobody(capfd: pytest.CaptureFixture
                 os.write(2, b'x' * 1024)
     assert os.get_blocking(2) is True
     assert len(capfd.readouterr().err) >= 4096
+
+
+def test_a_domain_that_cannot_be(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast DDS would end the process, with words that nobody sees."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', '999')
+    code, (line,) = run('--ros-args', '-r', '__ns:=/refused')
+    assert code == 1
+    assert line.startswith('drive_can_bridge: ') and '999' in line
+
+
+@pytest.mark.usefixtures('programs')
+def test_a_middleware_that_is_not_installed() -> None:
+    """rcl ends the process while it is loaded, and says why; that is not to get lost."""
+    done = subprocess.run(
+        [sys.executable, '-m', 'drive_can_bridge.ros.start', '--ros-args'], check=False,
+        env={**os.environ, 'RMW_IMPLEMENTATION': 'rmw_none'}, capture_output=True, text=True)
+    assert done.returncode > 0
+    assert 'rmw_none' in done.stderr
 
 
 @pytest.mark.parametrize('arguments', [['bridge.yaml'], ['--params-file', 'x.yaml'],

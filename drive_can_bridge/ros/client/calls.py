@@ -33,6 +33,7 @@ from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.process.environment import domain_problem
 
 # What makes messages from their definitions comes with every type support, is used by none, and
 # takes 0.15 s to be imported; its package goes without where it cannot be.
@@ -82,6 +83,9 @@ class ClientNode:
     """
 
     def __init__(self, purpose: str) -> None:
+        why = domain_problem()
+        if why:
+            raise DriveCanError(f'ROS does not start: {why}')
         self.context = Context()
         try:
             # takes no signals, and no log file: a stop has to work where nothing can be written
