@@ -15,6 +15,7 @@ import subprocess
 import sys
 from typing import IO
 
+from drive_can_bridge.process.signals import signals_held
 
 #: what can be run: module with ``main()``
 PROGRAMS = {
@@ -47,7 +48,7 @@ class Child:
         self.told = False
         command = [sys.executable, '-c', _BEGIN, program, *arguments]
         keyboard = None if shared else subprocess.DEVNULL
-        with nullcontext() if log is None else log.open('wb') as errors:
+        with nullcontext() if log is None else log.open('wb') as errors, signals_held():
             self.process = subprocess.Popen(command, stdin=keyboard, stdout=output,
                                             stderr=errors, start_new_session=not shared)
 

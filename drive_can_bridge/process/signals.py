@@ -200,6 +200,20 @@ def finish_first() -> Iterator[None]:
             os.kill(os.getpid(), received[0])   # now by its other handler
 
 
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """
+    Have signals wait in a process that is started in here, until it lets them in.
+
+    Else its interpreter answers one with a traceback, as soon as it is there.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class Interruption:
     """
     Whether somebody wants something to end.

@@ -58,6 +58,15 @@ def test_a_directory_with_the_name_of_the_package_does_not_matter(
     assert (tmp_path / 'out').read_text().startswith('drive_can ')
 
 
+@pytest.mark.usefixtures('programs')
+def test_a_signal_to_a_child_that_has_hardly_begun(tmp_path: Path) -> None:
+    """Until a program takes signals they wait, from its first moment on."""
+    child = Child('the child', 'drive_can', '--version', log=tmp_path / 'log')
+    child.ask_to_end(signal.SIGINT)
+    assert child.wait(20.0)
+    assert (child.code, child.errors()) == (130, 'drive_can: interrupted\n')
+
+
 def test_a_terminal_that_has_gone_is_not_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     other_end, keyboard = os.openpty()
     get, put = termios.tcgetattr, termios.tcsetattr

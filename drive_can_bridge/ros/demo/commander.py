@@ -24,6 +24,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.monitor.snapshot import read_status, Report
+from drive_can_bridge.process.beginning import let_signals_in
 from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.monitor.client import statuses
 from drive_can_bridge.ros.values import TOPIC_TYPES
@@ -93,8 +94,9 @@ class _DriveCommander:
 
 def main() -> int:
     """Command all drives of a parameter file, until the process is ended."""
-    configuration = configuration_from_file(sys.argv[1])
     try:
+        let_signals_in()    # see Child
+        configuration = configuration_from_file(sys.argv[1])
         rclpy.init(args=[])
         _command(configuration)
     except KeyboardInterrupt:   # SIGINT
