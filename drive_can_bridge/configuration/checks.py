@@ -6,7 +6,7 @@ A drive is built even when parts of it are wrong, with defaults in place of the 
 that everything else about it can be checked in the same run.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 import math
 import pathlib
@@ -172,11 +172,16 @@ def _by_family(drives: Iterable[DriveConfiguration],
         yield FAMILIES[protocol], members
 
 
-def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
-    """Look for drives that use identifiers of an earlier one on their bus."""
+def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
+                      buses: Mapping[str, BusConfiguration]) -> None:
+    """
+    Look for drives that use identifiers of an earlier one on their bus.
+
+    Whatever that is called: a bus that is opened twice has two masters for what stands twice.
+    """
     claimed: dict[str, list[tuple[Claim, DriveConfiguration]]] = {}
     for drive in drives:
-        on_bus = claimed.setdefault(drive.bus, [])
+        on_bus = claimed.setdefault(_same_bus(buses.get(drive.bus), drive.bus), [])
         family = FAMILIES[drive.protocol]
         own = [*family.claims(drive), *family.reserved(drive)]
         hit = next(((mine, claim, other) for mine in own for claim, other in on_bus
@@ -188,8 +193,15 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
             tree.wrong(
                 ('drives', drive.name, 'station'),
                 says('collides', station=drive.station, other=other.name,
-                     other_station=other.station, bus=drive.bus, purpose=what))
+                     other_station=other.station, bus=other.bus, purpose=what))
         on_bus.extend((claim, drive) for claim in own)
+
+
+def _same_bus(bus: BusConfiguration | None, name: str) -> str:
+    """Return what is the same for buses that are one for sure; an option may name an adapter."""
+    if bus is None:
+        return name
+    return f'{bus.interface} {bus.channel} {sorted(bus.options.items())}'
 
 
 def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:

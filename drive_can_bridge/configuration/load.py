@@ -246,7 +246,7 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
               if checkers[name].is_sound('bus', 'protocol', 'station')}
     paced = [drive for name, drive in drives.items()
              if checkers[name].is_sound('bus', 'protocol', 'period', *LISTS)]
-    check_identifiers(tree, placed.values())
+    check_identifiers(tree, placed.values(), buses)
     check_joint_names(tree, drives.values())
     for bus in buses.values():
         here = [drive for drive in paced if drive.bus == bus.name]

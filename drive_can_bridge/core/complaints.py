@@ -117,8 +117,7 @@ WORDS = {
         'the adapter for {interface} does not name this key{near}; it is handed over all the '
         'same',
     'channel_of_other_bus':
-        '{channel!r} is also the channel of bus {bus}; identifiers and load are checked for '
-        'each bus alone',
+        '{channel!r} is also the channel of bus {bus}; the load is checked for each bus alone',
     'port_of_other_bus':
         '{channel!r} is the serial port of bus {bus}, too, allowed is a port of its own',
     'name_of_other_channel':

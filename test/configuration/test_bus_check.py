@@ -172,6 +172,22 @@ def test_bus_that_is_opened_twice(tmp_path: Path) -> None:
         at('f.yaml:9: buses.other.channel', 'channel_of_other_bus', channel='demo', bus='main')]
 
 
+@pytest.mark.parametrize(('station', 'more', 'collides'), [
+    (1, '', True), (2, '', False),
+    # another adapter, perhaps
+    (1, ', unique_hardware_id: HW2', False)])
+def test_station_twice_on_a_bus_that_is_opened_twice(tmp_path: Path, station: int, more: str, *,
+                                                     collides: bool) -> None:
+    text = changed(FILE, '    drives:\n', '      other: {interface: virtual, channel: demo, '
+                                           f'bitrate: 250000{more}}}\n    drives:\n')
+    head, lift, tail = text.partition('      lift:\n        bus: ')
+    text = head + lift + tail.replace('main', 'other', 1).replace(
+        'station: 2', f'station: {station}')
+    assert problems(tmp_path, text) == [
+        at('f.yaml:23: drives.lift.station', 'collides', station=1, other='conveyor',
+           other_station=1, bus='main')] * collides
+
+
 @pytest.fixture
 def terminal() -> Iterator[str]:
     near, far = os.openpty()
