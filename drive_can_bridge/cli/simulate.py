@@ -303,8 +303,10 @@ class _Output:
             try:
                 print(line, file=self._stream, flush=True)
             except OSError as error:
-                self._stream = None
+                stream, self._stream = self._stream, None
                 if self._path is not None:
+                    with suppress(OSError):     # what it did not take it would be given again
+                        stream.close()
                     _complain(f'{self._path}: incomplete: {error.strerror}')
                 else:
                     # Python flushes once more at exit, and would complain

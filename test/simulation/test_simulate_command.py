@@ -2,6 +2,7 @@
 """``drive_can simulate``: what it refuses, and as a process with output, signals and input."""
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 import os
 from pathlib import Path
 import re
@@ -15,8 +16,10 @@ from running import Running
 from simulation_builders import RULES
 from waiting import wait_for
 
-from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.cli import main as front_end, simulate
+from drive_can_bridge.clock import SteadyClock
 from drive_can_bridge.core.configuration import BusConfiguration
+from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
 
 PARAMETERS = """
@@ -106,6 +109,17 @@ def test_standard_input(start: Any) -> None:
         command.process.wait(0.3)
     assert command.end(signal.SIGTERM) == 0
     assert len(command.errors.splitlines()) == 1
+
+
+def test_frames_on_a_full_disk(capsys: pytest.CaptureFixture[str]) -> None:
+    """Told once; the drives are played on, and that the log is closed is no failure."""
+    with ExitStack() as stack:
+        show = simulate._frame_log(stack, SteadyClock(), simulate._Output(None), Path('/dev/full'))
+        assert show is not None
+        for _ in range(2):
+            show('main', Frame(0x3FFFF0, bytes(8), True), True)
+    assert capsys.readouterr().err.splitlines() == [
+        'drive_can simulate: /dev/full: incomplete: No space left on device']
 
 
 def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str) -> tuple[
