@@ -44,8 +44,9 @@ INTERNAL: dict[str, set[str]] = {
     'ros.client': {'', 'clock', 'core', 'process', 'ros.recognition'},
     'ros.monitor': {
         '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
-    'ros.demo': {'', 'core', 'configuration', 'simulation', 'monitor', 'ros', 'ros.monitor'},
-    'demo': {''},
+    'ros.demo': {
+        '', 'core', 'configuration', 'process', 'simulation', 'monitor', 'ros', 'ros.monitor'},
+    'demo': {'', 'process'},
     'client.drive': {'', 'core', 'process'},
     'client.bridge': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
     'client': {
