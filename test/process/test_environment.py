@@ -37,7 +37,8 @@ def test_what_is_told(clean: pytest.MonkeyPatch, given: dict[str, str], domain: 
 
 
 @pytest.mark.parametrize(('given', 'refused'), [
-    ('', False), ('0', False), ('232', False), ('233', True), ('0xe9', True), ('999', True), ('-2', True),
+    ('', False), ('0', False), ('232', False), ('233', True), ('0xe9', True), ('999', True),
+    ('-2', True),
     # no domain for rcl; and what it says itself
     ('-1', False), ('abc', False)])
 def test_a_domain_whose_ports_do_not_exist(clean: pytest.MonkeyPatch, given: str, *,

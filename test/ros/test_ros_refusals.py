@@ -210,7 +210,7 @@ def test_a_domain_that_cannot_be(run: Run, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.usefixtures('programs')
 def test_a_middleware_that_is_not_installed() -> None:
-    """rcl ends the process while it is loaded, and says why; that is not to get lost."""
+    """While rcl is loaded it ends the process, and says why; that is not to get lost."""
     done = subprocess.run(
         [sys.executable, '-m', 'drive_can_bridge.ros.start', '--ros-args'], check=False,
         env={**os.environ, 'RMW_IMPLEMENTATION': 'rmw_none'}, capture_output=True, text=True)
