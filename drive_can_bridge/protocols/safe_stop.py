@@ -164,7 +164,8 @@ class SafeStop(Generic[StepT, ReplyT]):
                 session.report.note(Noted(sentences.stopped_again()))
         elif owed or kind.insists:
             session.report.warn(sentences.stop_failed(failed), may_run=owed)
-            if not session.active:      # which ends with it: there is no more to be said
+            # the activation ends with it: there is no more to be said; behind a defect it goes on
+            if not session.active and not session.defect:
                 session.duty.happened(Happened.SAID)
         self._ended()
 

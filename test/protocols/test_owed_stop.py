@@ -15,6 +15,7 @@ from test_contract import Partner, PARTNERS, worries
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
+from drive_can_bridge.core.sentences import internal_error
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 WORDLESS = [name for name, partner in sorted(PARTNERS.items()) if not partner.words]
@@ -219,6 +220,27 @@ def test_an_activation_owes_nothing_of_the_one_before(kind: str) -> None:
     assert partner.talk.session.state is PARTNERS[KINDS[kind][0]].idle or kind in TABLED
     partner.talk.bus_down(partner.now)
     assert worries(partner) == []
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
+    """The activation goes on behind it: the drive is told again, and named again at the end."""
+    partner = running(kind)
+    session = partner.talk.session
+    partner.mute = True
+    session.fail(internal_error('KeyError', 'x'), partner.now)
+    partner.deliver(partner.talk.sent())
+    partner.live(session.longest_stop + 0.5)
+    assert session.stopped
+    assert worries(partner)
+    assert session.owed
+    session.begin_anew(partner.now)
+    partner.deliver(partner.talk.sent())
+    partner.live(2.0)
+    assert session.owed
+    partner.talk.events()
+    ends(partner)
+    assert len(worries(partner)) == 1
 
 
 # -- control --------------------------------------------------------------------------------------
