@@ -126,14 +126,19 @@ class AcyclicOutput:
 
     # -- what is due ------------------------------------------------------------------------------
 
-    def look(self, raws: Sequence[int], now: float, *,
-             hold: Container[int | None] = ()) -> None:
+    def look(self, raws: Sequence[int], now: float, *, hold: Sequence[int | None] = (),
+             unknown: Sequence[int] = ()) -> None:
         """
         Find out what is due, once a period.
 
         :param raws: what is to be written now.
         :param hold: indices of those that are not to be written now.
+        :param unknown: of those whose value nobody knows: not now, but as soon as it is known,
+            even where it is what was written last.
         """
+        for index in unknown:
+            self.failed(index)
+        hold = (*hold, *unknown)
         if hold:
             self._due = [index for index in self._due if index not in hold]
         for index, raw in enumerate(raws):

@@ -6,6 +6,7 @@ The rule itself is tested with :mod:`test_extended_held`; here it is what each f
 the position is known first, and what is sent until then and after a loss. 70 is 7.0 deg.
 """
 
+from dataclasses import replace
 from typing import Any
 
 from builders import (
@@ -73,6 +74,22 @@ def test_standard_is_latched_when_it_is_enabled() -> None:
     assert talk.commands(0, 7.5, 10.103) is CommandOutcome.NOT_ARMED
     assert talk.commands(0, 6.9, 10.103) is CommandOutcome.ARMED
     assert talk.until(10.121) == [(10.12, '3F1#063C004500000000'), (10.121, ASK)]
+
+
+def test_standard_is_told_again_what_was_unknown_for_a_moment() -> None:
+    """Where it is as it was before, nothing changes that would have it written."""
+    setpoint, actual = pair(60, 212)
+    actual = replace(actual, scale=0.2)
+    talk = standard(table=(*TABLE, setpoint, actual), response=(STATUS, actual),
+                    refresh_interval=0.0)
+    talk.hears('7F1#01002300ADDEADDE', 10.002)          # 7.0 deg
+    talk.until(10.02 + TICK)
+    talk.hears('7F1#0100204EADDEADDE', 10.022)          # 4000 deg are more than 16 bits hold
+    assert [text for _, text in talk.until(10.04 + TICK)] == [ASK]
+    talk.hears('7F1#01002300ADDEADDE', 10.042)
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == says('would_jump')
+    assert [text for _, text in talk.until(10.0605)] == ['3F1#063C004600000000']
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == ''
 
 
 def test_standard_after_a_loss() -> None:
@@ -200,13 +217,13 @@ PKW_CONTROL = ControlTable(
     enabled=StatusPattern(0x0080, 0x0080), fault=StatusPattern(0x0004, 0x0004))
 
 
-def pkw(control: ControlTable | None = PKW_CONTROL) -> Conversation:
+def pkw(control: ControlTable | None = PKW_CONTROL, **options: Any) -> Conversation:
     """Return a conversation whose first round, of 455 and 456, was just begun at 10.052 s."""
     setpoint, actual = pair(710, 456)
     talk = Conversation(drive(
         'canopen_pkw', station=5, table=(PKW_STATUS, PKW_WORD, setpoint, actual),
         control=control, request=(setpoint,), response=(PKW_STATUS, actual),
-        parameter_timeout=0.5))
+        parameter_timeout=0.5, **options))
     assert talk.bus_up(9.0) == []
     assert talk.activate(10.0) == ['000#0105']
     assert talk.at(10.05) == ['505#0000000000000000']
@@ -304,3 +321,22 @@ def test_pkw_does_not_enable_what_refuses_its_position() -> None:
     answer = talk.session.services.control_refusal(ControlAction.ENABLE)
     assert answer == says('would_jump', why=says('write_failed', what=says(
         'write_refused', what='position_setpoint')))
+
+
+def test_pkw_is_told_again_what_was_unknown_for_a_moment() -> None:
+    talk, refused = pkw(refresh_interval=0.0), ['C801']
+    answered(talk, talk.hears('485#C70100A641004600', 10.053), 10.054)
+
+    def device(text: str) -> str:
+        if is_read(text) or text[4:8] in refused:       # 0800 0022h: not in the present state
+            return f'485#{text[4:10]}{int(text[10:12], 16) & 0x80 | 0x4E:02X}22000008'
+        words = {'C7010025': '41000000', 'C8010025': '46000000'}.get(
+            f'{text[4:10]}{int(text[10:12], 16) & 0x7F:02X}', text[12:])
+        return f'485#{text[4:12]}{words}'
+
+    assert '2A46000000' not in str(talk.served(10.34, device))
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == says('would_jump')
+    refused.clear()
+    written = [text for _, text in talk.served(10.45, device) if text.startswith('505#C602')]
+    assert [text[12:] for text in written] == ['46000000']
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == ''

@@ -114,8 +114,8 @@ class Writers:
         items = self._setpoints.items
         if not items:
             return
-        self._output.look([setpoint.raw for setpoint in items], now, hold=[
-            *hold, *(index for index, setpoint in enumerate(items) if not setpoint.known)])
+        self._output.look([setpoint.raw for setpoint in items], now, hold=hold, unknown=[
+            index for index, setpoint in enumerate(items) if not setpoint.known])
         if self._output.waiting and self._channel.is_idle(Priority.SETPOINTS):
             self._channel.run(self._write_setpoints(), lambda _: None, now, Priority.SETPOINTS)
 

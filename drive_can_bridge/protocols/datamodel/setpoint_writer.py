@@ -175,10 +175,9 @@ class SetpointWriter:
         repeated = starts and control is not None and not (control.word_due or control.pulsing)
         hold = [slot] if doubt or repeated and not known or self.holds_word(now) else []
         unknown = self._session.setpoints.unknown
-        if unknown:
-            hold += [index for index, parameter in enumerate(self._parameters)
-                     if parameter.name in unknown]
-        output.look(self._raws(), now, hold=hold)
+        output.look(self._raws(), now, hold=hold, unknown=[
+            index for index, parameter in enumerate(self._parameters)
+            if parameter.name in unknown] if unknown else ())
         if control is not None:
             # a word that starts the drive behind setpoints, also when all are only refreshed
             output.order_word(first=stopping or control.pulsing)
