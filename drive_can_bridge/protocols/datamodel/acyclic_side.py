@@ -41,7 +41,7 @@ class AcyclicSide:
 
     :param codec: of the frames.
     :param quarantine: given where the exchange itself goes through the channel.
-    :param doubt: see :class:`.ControlByNumber`.
+    :param doubt: see :class:`.ControlByNumber`; ``known``, too.
     :ivar channel: everything acyclic goes through it, by the ``transactor``.
     :ivar numbers: where the parameters of the drive stand.
     :ivar control_slot: of the control word in ``cyclic_request``, or None.
@@ -55,7 +55,8 @@ class AcyclicSide:
 
     def __init__(self, session: Session, codec: AcyclicCodec, *,
                  quarantine: float | None = None,
-                 doubt: Callable[[], None] = lambda: None) -> None:
+                 doubt: Callable[[], None] = lambda: None,
+                 known: Callable[[float], None] = lambda now: None) -> None:
         drive, options = session.configuration, session.configuration.options
         self.numbers = Numbers(drive)
         self._session = session
@@ -87,7 +88,7 @@ class AcyclicSide:
             refresh=options.refresh_interval if polled else 0.0)
         self.control_writer = None if session.control is None or not (word or status) else (
             ControlByNumber(session, session.control, self.channel, self.transactor, self.numbers,
-                            self.output, word=word, status=status, doubt=doubt))
+                            self.output, word=word, status=status, doubt=doubt, known=known))
         self.parts = () if self.control_writer is None else (self.control_writer,)
         self.stop: SafeStop[Step, Reply] = SafeStop(
             session, self.channel, session.stop_ended, at_end, self._read_status)

@@ -33,7 +33,7 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.polled_exchange import Chunk
+from drive_can_bridge.protocols.polled_exchange import Chunk, TOLERANCE
 from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
@@ -174,6 +174,15 @@ class ParameterTransactor(Transactor[Step, Reply]):
         if self.anonymous:  # a second answer, if there is one, must not meet the next read
             self.free_at = max(self.free_at, now + SPACING)
         return answer
+
+    def is_news(self, now: float, asked_at: float | None = None) -> bool:
+        """
+        Tell whether an answer that is taken now has not waited for a process that stood still.
+
+        :param asked_at: when it was asked for; None: by the last read.
+        """
+        asked_at = self.asked_at if asked_at is None else asked_at
+        return now - asked_at <= self.retry.timeout + TOLERANCE
 
     def time_lost(self, now: float) -> Reply | bool:
         if self.outstanding is None or not self.anonymous:

@@ -43,14 +43,15 @@ class ControlByNumber:
     :param word: parameter of the control word; None: it has one.
     :param status: parameter of the status word; None: it has one, or there is none.
     :param doubt: records that answers to what was asked before show nothing of a word that left.
+    :param known: records that the status was read just now.
     """
 
     def __init__(self, session: Session, control: ControlMachine, channel: Channel[Step, Reply],
                  transactor: ParameterTransactor, numbers: Numbers, output: AcyclicOutput, *,
                  word: Parameter | None, status: Parameter | None,
-                 doubt: Callable[[], None]) -> None:
+                 doubt: Callable[[], None], known: Callable[[float], None]) -> None:
         self._session = session
-        self._doubt = doubt
+        self._doubt, self._known = doubt, known
         self._control = control
         self._channel = channel
         self._transactor = transactor
@@ -87,6 +88,11 @@ class ControlByNumber:
         write = self._transactor.write_now if control.stopping else self._transactor.write_first
         write(self._numbers.write(self._word, word),
               lambda sent, then: self._left(word, sent, then, runs=runs), now)
+
+    def look_soon(self, now: float) -> None:
+        """Read the status now, unless that is under way: a word waits for it."""
+        if now < self._watch.next_timer() < math.inf:
+            self._look(now)
 
     def next_timer(self) -> float:
         """Return when the status is to be looked at, or a word to be written again."""
@@ -126,6 +132,8 @@ class ControlByNumber:
                 continue
             self._session.interlock.status(raw, now)
             self._session.control_changed(now)
+            if raw is not None and self._transactor.is_news(now):
+                self._known(now)
             now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
 
     def _read(self, status: Parameter) -> Procedure:
@@ -185,6 +193,13 @@ class SetpointWriter:
     def holds_word(self, now: float) -> bool:
         """Tell whether the control word waits for setpoints."""
         return self._output.holds_word(again=self._output.word_due(now))
+
+    def wants_status(self, now: float) -> bool:
+        """Tell whether a word that starts the drive is to be repeated, behind its status."""
+        control, slot = self._session.control, self._slot
+        return control is not None and slot is not None and not (
+            control.at_rest or control.stopping or control.pulsing) and (
+                self._output.wants(slot, control.word, now))
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""

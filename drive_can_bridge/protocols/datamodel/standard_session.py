@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_c
 from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
-from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws, TOLERANCE
+from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 
 class StandardSession(Session):
@@ -38,7 +38,8 @@ class StandardSession(Session):
         request = standard.identifier(options.request_id_base, drive.station)
         strict: bool = options.length_policy == 'strict'
         self._side = AcyclicSide(
-            self, standard.AcyclicCodec(request, strict), quarantine=options.quarantine)
+            self, standard.AcyclicCodec(request, strict), quarantine=options.quarantine,
+            known=self._status_known)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot
         self._request_identifier = request
@@ -119,6 +120,9 @@ class StandardSession(Session):
         """Begin a period: look what is to be written, then read."""
         if self.online:
             self._writer.look(now, unanswered=self._exchange.reading)
+            by_number = self._side.control_writer
+            if by_number is not None and self._writer.wants_status(now):
+                by_number.look_soon(now)
         if self._exchange.reading:
             self._exchange.wait(now, self._patience)    # somebody may keep disturbing
             return
@@ -167,13 +171,19 @@ class StandardSession(Session):
             self.duty.happened(Happened.ANSWERED)
         if self.control is None:
             return
-        known, asked_at = self._status_slot is None, self._round.status_asked_at
-        if self._status_slot is not None and asked_at > self.control.word_left_at:
-            # an answer that has waited here for a process that stood still is no news
-            known = now - asked_at <= self.retry.timeout + TOLERANCE
+        asked_at = self._round.status_asked_at
+        if self._status_slot is None:
+            if self._side.control_writer is None:   # which looks at it otherwise
+                self._status_known(now)
+        elif asked_at > self.control.word_left_at:
             self.interlock.status(raws[self._status_slot], now)
             self.control_changed(now)
-        if known and self._side.control_slot is not None:
+            if transactor.is_news(now, asked_at):
+                self._status_known(now)
+
+    def _status_known(self, now: float) -> None:
+        """Write a word that may start the drive: its status was read just now, or it has none."""
+        if self._side.control_slot is not None and self.online and self.stage is Stage.RUNNING:
             self._writer.write_word(now, known=True)
 
     def exchange_missed(self, reason: Sentence, now: float) -> None:

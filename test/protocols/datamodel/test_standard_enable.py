@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The word that enables an 11-bit drive, while nobody knows what state the drive is in."""
 
-from builders import CONTROL, Conversation, drive, LIMIT, SPEED, WORD
+from builders import ACTUAL, CONTROL, Conversation, CURRENT, drive, LIMIT, SPEED, STATUS, WORD
 import pytest
 from saying import says
 from standard_builders import ANSWER, ASK
@@ -14,6 +14,8 @@ from drive_can_bridge.core.parameters import Parameter
 ENABLE = '3F1#0634000100000000'
 #: the same with status 0003h: ready, enabled
 RUNNING = '7F1#E803FA000300ADDE'
+#: of the status alone, which is not in the round
+ASK_STATUS = '3F1#03D3000100000000'
 
 
 def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
@@ -40,10 +42,11 @@ def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
 class Enabled:
     """A drive with an answer to each read, enabled at 10.2 s, with a refresh every 0.5 s."""
 
-    def __init__(self, *setpoints: Parameter, period: float = 0.05) -> None:
+    def __init__(self, *setpoints: Parameter, period: float = 0.05,
+                 response: tuple[Parameter, ...] = (ACTUAL, CURRENT, STATUS)) -> None:
         self.talk = Conversation(drive(
             'datamodel_standard', control=CONTROL, request=(*setpoints, WORD), period=period,
-            refresh_interval=0.5, parameter_timeout=0.1))
+            response=response, refresh_interval=0.5, parameter_timeout=0.1))
         self.line = Timeline(self.talk, self.answer)
         self.enabled = False
         self.talk.bus_up(9.0)
@@ -55,7 +58,9 @@ class Enabled:
         """Do what it is told, and say what it is like now."""
         if text[:10] == ENABLE[:10]:
             self.enabled = text == ENABLE
-        return (0.01, RUNNING if self.enabled else ANSWER) if text == ASK else None
+        if text == ASK_STATUS:
+            return 0.01, '7F1#0300ADDEADDEADDE' if self.enabled else '7F1#0100ADDEADDEADDE'
+        return (0.01, RUNNING if self.enabled else ANSWER) if text[:6] == ASK[:6] else None
 
     def never_again(self) -> None:
         """See that nothing but ``disable`` follows, and that it is told."""
@@ -77,6 +82,28 @@ def test_what_was_off_unseen_is_not_started_by_a_refresh(phase: float) -> None:
     motor.never_again()
 
 
+@pytest.mark.parametrize('phase', [0.001 * step for step in range(0, 560, 28)])
+def test_what_was_off_unseen_is_not_started_by_a_refresh_beside_the_round(phase: float) -> None:
+    """Its status is no part of the round: it is read twice a second, and the word goes behind."""
+    motor = Enabled(SPEED, LIMIT, response=(ACTUAL, CURRENT))
+    motor.line.live(10.82 + phase)
+    assert len(motor.line.when(ENABLE)) > 1, 'it is refreshed'
+    asked = motor.line.when(ASK_STATUS)[-1]
+    if motor.talk.now < asked + 0.02:   # what is on its way was true when it was said
+        motor.line.live(asked + 0.02)
+    motor.enabled = False
+    motor.never_again()
+
+
+def test_enable_is_refreshed_behind_a_status_beside_the_round() -> None:
+    motor = Enabled(SPEED, response=(ACTUAL,))
+    motor.line.live(20.0)
+    times = motor.line.when(ENABLE)
+    assert max(later - earlier for earlier, later in zip(times, times[1:])) < 0.6
+    behind = motor.line.when(ASK_STATUS)
+    assert all(any(0.0 < at - asked < 0.02 for asked in behind) for at in times[1:])
+
+
 def test_a_status_that_has_waited_for_a_process_that_stood_still_is_none() -> None:
     """Stopped for 0.6 s with a read under way: its answer is older than the drive's restart."""
     motor = Enabled(period=1.0)
@@ -86,4 +113,17 @@ def test_a_status_that_has_waited_for_a_process_that_stood_still_is_none() -> No
     assert motor.line.when(ASK)[-1] == 13.0
     motor.enabled, motor.line.answer = False, motor.answer
     motor.line.took(motor.talk.hears(RUNNING, 13.6))    # the reader comes first
+    motor.never_again()
+
+
+def test_neither_is_one_beside_the_round() -> None:
+    motor = Enabled(period=0.05, response=(ACTUAL,))
+    motor.line.live(12.0)
+    at = motor.line.when(ASK_STATUS)[-1] + 0.4
+    motor.line.live(at)
+    motor.line.answer = lambda text: None if text == ASK_STATUS else motor.answer(text)
+    while not motor.line.when(ASK_STATUS)[-1] > at:
+        motor.line.live(motor.talk.session.next_timer())
+    motor.enabled, motor.line.answer = False, motor.answer
+    motor.line.took(motor.talk.hears('7F1#0300ADDEADDEADDE', motor.talk.now + 0.6))
     motor.never_again()
