@@ -118,8 +118,8 @@ def test_frames_on_a_full_disk(capsys: pytest.CaptureFixture[str]) -> None:
         assert show is not None
         for _ in range(2):
             show('main', Frame(0x3FFFF0, bytes(8), True), True)
-    assert capsys.readouterr().err.splitlines() == [
-        'drive_can simulate: /dev/full: incomplete: No space left on device']
+    told, = capsys.readouterr().err.splitlines()
+    assert '/dev/full: incomplete: ' in told
 
 
 def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str) -> tuple[

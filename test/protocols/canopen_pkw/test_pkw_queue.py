@@ -10,8 +10,8 @@ import math
 from random import Random
 
 from builders import Conversation, write
-from pkw_builders import CLASS, configuration, FLC, STATUS, STATUS_2
 from extent import some
+from pkw_builders import CLASS, configuration, FLC, STATUS, STATUS_2
 import pytest
 
 from drive_can_bridge.core.events import RequestCompleted
