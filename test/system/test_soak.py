@@ -13,14 +13,14 @@ import random
 import signal
 import time
 
+from extent import times
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Process, Processes, Simulator
 import pytest
 from test_system_reconnection import status_of
 from waiting import SLOWNESS, wait_for_end
 
-LONG = os.environ.get('DRIVE_CAN_TEST_PROFILE') == 'long'
-SECONDS = float(os.environ.get('DRIVE_CAN_SOAK_SECONDS', '120' if LONG else '15'))
+SECONDS = float(os.environ.get('DRIVE_CAN_SOAK_SECONDS', times(15, 120)))
 SEED = int(os.environ['DRIVE_CAN_TEST_SEED'])
 #: how often something that has to work is tried, because a busy machine may lose the drive
 ATTEMPTS = 5

@@ -175,13 +175,8 @@ class ParameterTransactor(Transactor[Step, Reply]):
             self.free_at = max(self.free_at, now + SPACING)
         return answer
 
-    def is_news(self, now: float, asked_at: float | None = None) -> bool:
-        """
-        Tell whether an answer that is taken now has not waited for a process that stood still.
-
-        :param asked_at: when it was asked for; None: by the last read.
-        """
-        asked_at = self.asked_at if asked_at is None else asked_at
+    def is_news(self, asked_at: float, now: float) -> bool:
+        """Tell whether an answer taken now has not waited for a process that stood still."""
         return now - asked_at <= self.retry.timeout + TOLERANCE
 
     def time_lost(self, now: float) -> Reply | bool:

@@ -132,7 +132,8 @@ class ControlByNumber:
                 continue
             self._session.interlock.status(raw, now)
             self._session.control_changed(now)
-            if raw is not None and self._transactor.is_news(now):
+            if raw is not None and self._transactor.is_news(
+                    self._transactor.asked_at, now):
                 self._known(now)
             now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
 

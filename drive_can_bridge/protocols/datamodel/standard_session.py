@@ -178,7 +178,7 @@ class StandardSession(Session):
         elif asked_at > self.control.word_left_at:
             self.interlock.status(raws[self._status_slot], now)
             self.control_changed(now)
-            if transactor.is_news(now, asked_at):
+            if transactor.is_news(asked_at, now):
                 self._status_known(now)
 
     def _status_known(self, now: float) -> None:
