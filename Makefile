@@ -13,7 +13,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 help:
 	@echo 'make demo    simulated drives, a bridge and the live view; ARGS="..." goes to drive_can demo'
-	@echo 'make test    all tests; ARGS="..." goes to pytest (-n 0: one after the other)'
+	@echo 'make test    all tests; ARGS="..." goes to pytest (-n 1: one after the other)'
 	@echo '             DRIVE_CAN_TEST_PROFILE=long: all places and more chance, as in CI;'
 	@echo '             DRIVE_CAN_TEST_SEED=...: for the same random examples again'
 	@echo 'make check-stops  stories of stops, judged from the motor, without end; ARGS="--kind ... --seed ..."'

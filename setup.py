@@ -96,7 +96,6 @@ setup(
             'mypy',
             'pytest',
             'pytest-timeout',
-            'pytest-xdist>=3.3',
             'setuptools',
         ],
     },

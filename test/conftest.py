@@ -19,11 +19,7 @@ a drive; not so in the tests of that, ``configuration/`` and ``profiles/``.
 some of them (``extent.py``), unless DRIVE_CAN_TEST_PROFILE is ``long``, as in CI. How long one
 example takes says how busy the machine is, and is no failure.
 
-*In parallel*, with pytest-xdist (``--dist loadscope``, as ``make test`` does): the tests
-of a module stay together, because they may share what is expensive to start; those that consist of
-waiting for something of their own are spread. Long ones come first. What measures time has the
-mark ``alone``: nothing else of the test run happens meanwhile. A worker stays on a core of its
-own, but for these.
+*In parallel*: ``side_by_side.py`` starts processes that share the tests. Long ones come first.
 
 *The wall clock.* What runs against it has the mark ``real`` (``real.py`` says what that is, and
 which of them ``make test`` tells): these stories are told one after the other, by a run of their
@@ -46,12 +42,10 @@ from functools import cache
 import gc
 import os
 from pathlib import Path
-import random
 import shlex
 import signal
 import sys
 import tempfile
-import time
 from typing import Any
 
 from extent import PROFILE, SEED, times
@@ -59,6 +53,7 @@ from hypothesis import core as hypothesis_core, HealthCheck, settings
 from middleware import tell_in_messages
 import pytest
 import real
+import side_by_side
 from told_again import ToldAgain
 
 from drive_can_bridge.configuration import profiles
@@ -72,7 +67,6 @@ import world
 
 #: what a test looks at that is run again
 REPEATED = (SEED, PROFILE, 'DRIVE_CAN_SOAK_SECONDS')
-os.environ.setdefault(SEED, str(random.randrange(1_000_000)))   # workers inherit it
 PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile('ours', PATIENT, max_examples=times(10, 150))
 settings.load_profile('ours')
@@ -119,20 +113,12 @@ def _domain(in_process: bool) -> str:
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 tell_in_messages()
 
-#: directories and modules whose tests wait for something of their own: each test by itself
-SPREAD = ('test/system/', 'test/demo/', 'test/monitor/test_monitor_attach',
-          'test/simulation/test_simulate_command', 'test/process/')
 #: what comes first, because it takes longest
 FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
          'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
-         'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/', 'test/')
-#: s for which others are looked at
-LOOK = 0.5
+         'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/')
 #: whose tests read shipped profiles
 READING = ('test/configuration/', 'test/profiles/')
-#: processes for each core that has nothing else to do: most of the time they wait
-WORKERS_PER_CORE = 2
-CORES = os.sched_getaffinity(0)
 
 
 # -- signals and domains --------------------------------------------------------------------------
@@ -140,17 +126,17 @@ CORES = os.sched_getaffinity(0)
 
 def pytest_configure(config: pytest.Config) -> None:
     """Take a domain; let what is started here begin with the signals of a foreground job."""
-    if not hasattr(config, 'workerinput'):  # whoever only helps inherits it
-        logs = tempfile.TemporaryDirectory(prefix='drive_can_bridge_test_log_',
-                                           ignore_cleanup_errors=True)
-        os.environ['ROS_LOG_DIR'] = logs.name
-        config.add_cleanup(logs.cleanup)
+    logs = tempfile.TemporaryDirectory(prefix='drive_can_bridge_test_log_',
+                                       ignore_cleanup_errors=True)
+    os.environ['ROS_LOG_DIR'] = logs.name
+    config.add_cleanup(logs.cleanup)
     if config.getoption('--hypothesis-seed') is None:
         hypothesis_core.global_force_seed = int(os.environ[SEED])
     config.pluginmanager.register(ToldAgain(config))
     config.pluginmanager.register(Guard(config))
-    if config.getoption('dist', 'no') != 'no':
-        return  # only starts those who run the tests
+    sharer = side_by_side.sharer()
+    if sharer is not None:
+        config.pluginmanager.register(sharer)
     os.environ['ROS_DOMAIN_ID'] = _domain(False)
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
         if signal.getsignal(number) is signal.SIG_IGN:
@@ -175,9 +161,7 @@ def new_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Choose the domain of a test, its cores, and whether it reads shipped profiles anew."""
-    if hasattr(item.config, 'workerinput'):
-        os.sched_setaffinity(0, CORES if _alone(item) else {_own_core(item.config)})
+    """Choose the domain of a test, and whether it reads shipped profiles anew."""
     os.environ['ROS_DOMAIN_ID'] = _domain(item.nodeid.startswith('test/ros/'))
     profiles.read_profile = (READ_PROFILE if item.nodeid.startswith(READING)  # type: ignore
                              else _remembered)
@@ -192,7 +176,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.section('alone, with the same seed')
         for nodeid in dict.fromkeys(failed):
             terminalreporter.line(f'{given} {os.path.relpath(sys.executable)} -m pytest '
-                                  f'-n 0 {shlex.quote(nodeid)}')
+                                  f'{shlex.quote(nodeid)}')
 
 
 # -- shipped profiles -----------------------------------------------------------------------------
@@ -253,129 +237,18 @@ def foreground() -> Iterator[None]:
 # -- beside each other ----------------------------------------------------------------------------
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return how many processes ``-n auto`` means."""
-    wanted = os.environ.get('PYTEST_XDIST_AUTO_NUM_WORKERS')
-    if wanted:
-        return int(wanted)
-    cores = len(CORES)
-    return max(cores + 1, round(WORKERS_PER_CORE * (cores - _busy_cores())))
-
-
-def _busy_cores() -> float:
-    """Return how many cores others use now; the load average still tells of the set-up."""
-    def look() -> list[int]:
-        try:
-            return [int(word) for word in Path('/proc/stat').read_text().split()[1:9]]
-        except OSError:     # no Linux
-            return []
-    before = look()
-    time.sleep(LOOK)
-    spent = [after - former for after, former in zip(look(), before)]
-    if not sum(spent):
-        return 0.0
-    user, _, system, _, _, *interrupts = spent      # who is nice makes room
-    return float(os.cpu_count() or 1) * (user + system + sum(interrupts)) / sum(spent)
-
-
-def _own_core(config: Any) -> int:
-    """Return the core of a worker: threads that hand over to each other lose none of it there."""
-    return sorted(CORES)[int(config.workerinput['workerid'][2:]) % len(CORES)]
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_configure_node(node: Any) -> None:
-    """Tell each worker where the locks of this run are."""
-    folder = getattr(node.config, 'drive_can_locks', None)
-    if folder is None:
-        folder = node.config.drive_can_locks = tempfile.TemporaryDirectory()
-        node.config.add_cleanup(folder.cleanup)
-    node.workerinput['drive_can_locks'] = folder.name
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give whole modules to the workers, and single tests where these only wait."""
-    from xdist.scheduler import LoadScopeScheduling
-
-    class Scheduling(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return _unit(nodeid)
-
-    config.option.loadscopereorder = False
-    return Scheduling(config, log) if config.getoption('dist') == 'loadscope' else None
-
-
-def _unit(nodeid: str) -> str:
-    """Return the name of what stays together."""
-    module = nodeid.partition('::')[0]
-    return nodeid if module.startswith(SPREAD) else module
-
-
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is real, and let it come first; with xdist, let begin what takes longest."""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is real, and let it come first, and then what takes longest."""
     for item in items:
         real.mark(item)
     # a bench that others share lives to the end of their module, with a clock of its own
-    items.sort(key=lambda item: item.get_closest_marker('real') is None)
-    if hasattr(config, 'workerinput'):
-        items.sort(key=_place)
+    items.sort(key=lambda item: (item.get_closest_marker('real') is None, _place(item)))
 
 
 def _place(item: pytest.Item) -> int:
-    if _alone(item):
-        return -1
     return next((place for place, start in enumerate(FIRST) if item.nodeid.startswith(start)),
                 len(FIRST))
-
-
-def _alone(item: pytest.Item) -> bool:
-    return any(map(item.get_closest_marker, ('alone', 'real')))
-
-
-class _Room:
-    """
-    A room that many enter together or one enters alone; each test is a visit.
-
-    Everybody passes a gate, at which whoever wants to be alone keeps the others back: the room
-    becomes empty.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._gate, self._room = (os.open(folder / name, os.O_CREAT | os.O_RDWR, 0o666)
-                                  for name in ('gate', 'room'))
-
-    def enter(self, *, alone: bool) -> None:
-        how = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
-        fcntl.flock(self._gate, how)
-        fcntl.flock(self._room, how)
-        if not alone:
-            fcntl.flock(self._gate, fcntl.LOCK_UN)
-
-    def leave(self) -> None:
-        fcntl.flock(self._room, fcntl.LOCK_UN)
-        fcntl.flock(self._gate, fcntl.LOCK_UN)
-
-
-_ROOM = pytest.StashKey[_Room]()
-
-
-@pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[Any]:
-    """Let nothing else of this run happen during a test that wants to be alone."""
-    given = getattr(item.config, 'workerinput', {}).get('drive_can_locks')
-    if given is None:
-        return (yield)
-    if _ROOM not in item.config.stash:
-        item.config.stash[_ROOM] = _Room(Path(given))
-    room = item.config.stash[_ROOM]
-    room.enter(alone=_alone(item))
-    try:
-        return (yield)
-    finally:
-        room.leave()
 
 
 @pytest.fixture(autouse=True, scope='session')

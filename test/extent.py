@@ -9,12 +9,15 @@ listed, and each has several places.
 
 from collections.abc import Iterable
 import os
+import random
 from typing import TypeVar
 
 PROFILE = 'DRIVE_CAN_TEST_PROFILE'
 SEED = 'DRIVE_CAN_TEST_SEED'
 #: whether everything is looked at
 LONG = os.environ.get(PROFILE) == 'long'
+# who is started here inherits it
+os.environ.setdefault(SEED, str(random.randrange(1_000_000)))
 
 T = TypeVar('T')
 

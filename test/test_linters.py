@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-pytestmark = pytest.mark.linter
+#: they compute: as long as others leave them the processors for
+pytestmark = [pytest.mark.linter, pytest.mark.timeout(900)]
 CHECKOUT = Path(__file__).resolve().parent.parent
 SOURCES = ('drive_can_bridge', 'bench', 'docs', 'launch', 'test')
 
@@ -32,7 +33,6 @@ def test_flake8() -> None:
     passes('flake8', *SOURCES, 'setup.py')
 
 
-@pytest.mark.timeout(300)
 def test_types() -> None:
     passes('mypy')
 

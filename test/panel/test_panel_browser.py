@@ -39,7 +39,6 @@ def phone(tmp_path: Path) -> Iterator[Browser]:
     assert opened.complaints == []
 
 
-@pytest.mark.alone
 def test_the_page_is_live_within_two_seconds_and_values_move(
         site: Site, browser: Browser, somebody: Somebody) -> None:
     took = []

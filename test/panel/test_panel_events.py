@@ -98,7 +98,7 @@ def test_what_is_no_message_is_thrown_away(house: 'House') -> None:
 
 
 def test_what_a_browser_says_neither_rules_nor_fills_the_terminal(house: 'House') -> None:
-    house.live(61.0)    # what others had it say is forgotten
+    house.clock.stand_still(61.0)    # what others had it say is forgotten
     channel = Channel(house, 'viewer', '/')
     before = len(house.errors)
     for number in range(200):
@@ -107,7 +107,7 @@ def test_what_a_browser_says_neither_rules_nor_fills_the_terminal(house: 'House'
     assert 0 < len(lines) <= 10
     assert all(line.isprintable() and len(line) < 300 for line in lines)
     # how many there were besides is said with the next one
-    house.live(61.0)
+    house.clock.stand_still(61.0)
     Channel(house, 'viewer', '/').log('the next')
     assert f'({200 - len(lines)} lines' in house.errors[-1]
 

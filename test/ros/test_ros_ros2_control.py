@@ -14,6 +14,7 @@ from typing import Any
 
 from bridges import Bridge, cyclic_identifier, Recorder, StartBridge
 from clients import Client, wait_until
+from extent import some
 import pytest
 from ros2_control_twin import (
     Constraints, HardwareTwin, run, System, takes_positions, TrajectoryTwin,
@@ -287,8 +288,9 @@ def test_fault_reset_and_enable_again(arm: Arm) -> None:
     arm.travel(GOAL)
 
 
-@pytest.mark.parametrize('fault', ['silent', 'power_cut=1.5'])
-@BOTH
+@pytest.mark.parametrize(('fault', 'arm'), some([
+    ('silent', MECHANICS), ('silent', EXACT),
+    ('power_cut=1.5', EXACT), ('power_cut=1.5', MECHANICS)], 2), indirect=['arm'])
 def test_lost_drive(arm: Arm, fault: str, request: pytest.FixtureRequest) -> None:
     """Silent, or without power for a while: it is where it was, or where it was left."""
     moved(arm)

@@ -24,7 +24,6 @@ SECONDS = 6.0
 
 
 @pytest.mark.real
-@pytest.mark.alone
 def test_both_hold_their_periods(processes: Processes, client: Client, namespace: str,
                                  tmp_path: Path) -> None:
     """While other processes read and write parameters of both drives without pause."""

@@ -10,7 +10,7 @@ import sys
 import tty
 
 from clocks import REAL
-from extent import some
+from extent import LONG, some
 import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -79,8 +79,10 @@ def bus(path: str, interface: str = 'slcan') -> BusConfiguration:
     return BusConfiguration('main', interface, path, 125_000)
 
 
+# python-can waits for seconds for what a robotell tells of itself
 @pytest.mark.usefixtures('programs')
-@pytest.mark.parametrize('interface', some(['slcan', 'robotell', 'seeedstudio', 'serial'], 3))
+@pytest.mark.parametrize('interface', some(['slcan', 'seeedstudio', 'serial'], 3)
+                         + LONG * ['robotell'])
 def test_the_device_of_another_process_is_not_written_to(device: Device, interface: str) -> None:
     process = subprocess.Popen([sys.executable, '-c', HOLDER, interface, device.path],
                                stdin=subprocess.PIPE, stdout=subprocess.PIPE)
