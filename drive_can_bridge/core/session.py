@@ -201,6 +201,10 @@ class Session(ABC):
     def deactivate(self, now: float) -> None:
         """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
         self.activated = False
+        # left alone for a defect, and not told with success: it may hear this one
+        if self.defect and self.stopped and self.bus_available and any(
+                each.owed for each in (self, *self.partners)):
+            self.stage = Stage.RUNNING
         self._begin_end(sentences.bridge_inactive(), now)
 
     def fail(self, reason: Sentence, now: float) -> None:
@@ -225,7 +229,7 @@ class Session(ABC):
 
     def _begin_end(self, reason: Sentence, now: float) -> None:
         self.active = False
-        if not self.online:
+        if not self.online and not self.stopped:    # what ended before has been judged
             self.duty.happened(Happened.SILENT)
         owes = self.prepare_stop(now)
         if owes:

@@ -165,7 +165,7 @@ class SafeStop(Generic[StepT, ReplyT]):
         elif owed or kind.insists:
             session.report.warn(sentences.stop_failed(failed), may_run=owed)
             # the activation ends with it: there is no more to be said; behind a defect it goes on
-            if not session.active and not session.defect:
+            if not session.activated:
                 session.duty.happened(Happened.SAID)
         self._ended()
 

@@ -278,6 +278,34 @@ def test_a_listener_that_raises_costs_no_stop_frame(
         assert broken_frames.count(text) >= min(3, whole.count(text)), text
 
 
+@pytest.mark.parametrize('place', [0, 1])
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_drive_that_was_deaf_to_the_stop_for_a_defect_is_told_by_the_end(
+        kind: str, place: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within the second for which it is left alone, and whoever of a group it is."""
+    world = World(kind)
+    world.run()
+    device, members = world.devices[place], world.exchange._members
+    with monkeypatch.context() as patch:
+        patch.setattr(device, 'takes', lambda sent: [])
+        world.coming.clear()
+        with world.exchange.lock:
+            members[place].contain(KeyError('a defect'))
+        world.took()
+        world.live(0.9)
+    session = members[place].session
+    assert session.defect
+    assert session.stopped
+    assert session.owed
+    monkeypatch.setattr('time.sleep', lambda _: world.live(0.002))
+    monkeypatch.setattr(world.exchange, '_pass_to_stop', lambda: None)
+    assert world.exchange.deactivate()
+    world.took()
+    assert all(session.stopped for session in world.bench.sessions)
+    assert [device.registers[50] for device in world.devices] == [0, 0]
+    assert not any(session.owed for session in world.bench.sessions)
+
+
 def test_online_again_is_told() -> None:
     world = World('29 bit')
     world.run()

@@ -243,6 +243,66 @@ def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
     assert len(worries(partner)) == 1
 
 
+@pytest.mark.parametrize('kind', KINDS)
+def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) -> None:
+    """Also within the second for which it is left alone: it may hear this one."""
+    partner = running(kind)
+    session = partner.talk.session
+    partner.mute = True
+    session.fail(internal_error('KeyError', 'x'), partner.now)
+    partner.deliver(partner.talk.sent())
+    partner.live(session.longest_stop + 0.5)
+    assert session.stopped
+    assert session.owed
+    partner.mute = False
+    partner.talk.events()
+    ends(partner)
+    assert partner.registers[50] == 0
+    assert worries(partner) == []
+    assert not session.owed
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: str) -> None:
+    partner = running(kind)
+    session = partner.talk.session
+    partner.mute = True
+    session.fail(internal_error('KeyError', 'x'), partner.now)
+    partner.deliver(partner.talk.sent())
+    partner.live(session.longest_stop + 0.5)
+    partner.talk.events()
+    partner.take()
+    ends(partner)
+    assert partner.take() != []
+    assert len(worries(partner)) == 1
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_who_is_owed_nothing_behind_a_defect_is_left_alone_by_the_end(kind: str) -> None:
+    partner = running(kind)
+    session = partner.talk.session
+    session.fail(internal_error('KeyError', 'x'), partner.now)
+    partner.deliver(partner.talk.sent())
+    partner.live(session.longest_stop + 0.5)
+    assert session.stopped
+    assert not session.owed
+    partner.take()
+    ends(partner)
+    assert partner.take() == []
+    assert worries(partner) == []
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_behind_the_end_a_bridge_is_inactive_whatever_the_defect_was(kind: str) -> None:
+    partner = meet(kind)
+    session = partner.talk.session
+    session.fail(internal_error('KeyError', 'x'), partner.now)
+    refuses = session.services.control_refusal
+    assert refuses(ControlAction.QUICK_STOP).code == 'internal_error'
+    ends(partner)
+    assert refuses(ControlAction.QUICK_STOP).code == 'bridge_inactive'
+
+
 # -- control --------------------------------------------------------------------------------------
 
 
