@@ -190,9 +190,10 @@ class DriveServices:
 
     @property
     def _absence(self) -> Sentence:
-        if not self._session.active:
-            return self._session.defect or sentences.bridge_inactive()
-        return NOTHING if self._session.bus_available else sentences.bus_down()
+        session = self._session
+        if not session.active:
+            return (session.activated and session.defect) or sentences.bridge_inactive()
+        return NOTHING if session.bus_available else sentences.bus_down()
 
     def control_refusal(self, action: ControlAction) -> Sentence:
         """Say why a control action cannot be asked for now; '' if it can."""
