@@ -208,6 +208,11 @@ class ControlMachine:
         return self.pending and not self.pulsing and self._table.enabled is not None
 
     @property
+    def unseen(self) -> bool:
+        """Whether it runs, the drive does not report."""
+        return self._table.enabled is None
+
+    @property
     def holds(self) -> Sentence:
         """That the drive stands in a quick stop that does not end by itself; '' if not."""
         return self._rules.holds

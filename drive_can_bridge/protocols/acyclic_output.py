@@ -30,8 +30,9 @@ REPEAT_FIRST = 0.2
 REPEAT_LAST = 2.0
 #: how often at most where each write wears an EEPROM
 EEPROM_REPEATS = 3
-#: how often to a drive at fault: whether it got the word is not to be seen
-FAULT_REPEATS = 3
+#: how often to one that ran, and is at fault or reports nothing: whether it got a word that stops
+#: it is not to be seen
+UNSEEN_REPEATS = 3
 
 
 class Policy(Protocol):
@@ -46,7 +47,7 @@ class Policy(Protocol):
         Tell whether it is, by what the drive reports since.
 
         :param repeats: how often it was written once more already.
-        :param ran: the word before was ``enable``.
+        :param ran: it may run by a word before.
         """
 
 
@@ -69,7 +70,8 @@ class Judged(NamedTuple):
         if self.wears:
             return control.disregard != '' and repeats < EEPROM_REPEATS
         # rid of its fault, it would run by itself, had it missed the word
-        return control.unconfirmed or ran and control.fault and repeats < FAULT_REPEATS
+        unseen = control.fault or control.stopping and control.unseen
+        return control.unconfirmed or ran and unseen and repeats < UNSEEN_REPEATS
 
 
 class Acknowledged:
@@ -119,7 +121,7 @@ class AcyclicOutput:
     def forget_word(self) -> None:
         """Record that nobody knows which control word the drive has."""
         self.word: int | None = None
-        self._ran = False               # the word before was enable
+        self._ran = False               # the last one before that was no quick stop was enable
         self._repeats = 0
         self._repeat_at = math.inf      # when the drive must have taken notice
         self.again_at = math.inf
@@ -226,8 +228,9 @@ class AcyclicOutput:
             self._repeats += 1
         else:
             self._repeats = 0
-            if self.word is not None and self._control is not None:
-                self._ran = self.word == self._control.table.enable
+            table = self._control and self._control.table
+            if table and self.word not in (None, table.quick_stop):
+                self._ran = self.word == table.enable
         self.word = word
         self._repeat_at = self.again_at = math.inf  # until it left
 
@@ -246,6 +249,9 @@ class AcyclicOutput:
         control.word_sent(now)
         if control.pulsing:
             self._repeat_at = self.again_at = now + self._policy.pulse_spacing
+        elif again and control.unseen and self._policy.again(
+                control, self._repeats, ran=self._ran):
+            self.again_at = self._repeat_at     # no status has it looked at
         return True
 
     def word_unanswered(self, now: float) -> None:

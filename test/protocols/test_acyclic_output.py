@@ -18,6 +18,7 @@ TABLE = ControlTable(
     parameter='control_word', disable=OFF, enable=RUN, reset_fault=RESET,
     status_parameter='status_word', enabled=StatusPattern(0x0002, 0x0002),
     fault=StatusPattern(0x0008, 0x0008))
+UNSEEN = ControlTable(parameter='control_word', disable=OFF, enable=RUN)
 JUDGED = Judged(0.02)
 WEARS = Judged(0.02, wears=True)
 ACKNOWLEDGED = Acknowledged()
@@ -208,6 +209,29 @@ def test_a_drive_at_fault_that_ran_gets_disable_three_times_more() -> None:
             again.append(tick * 10)
             tell(output, control, now)
     assert again == [0, 200, 600, 1400]
+
+
+@pytest.mark.parametrize(('policy', 'again'), [
+    (JUDGED, [200, 600, 1400]), (WEARS, []), (ACKNOWLEDGED, [])])
+def test_a_drive_that_ran_and_reports_nothing_gets_its_stop_three_times_more(
+        policy: Policy, again: list[int]) -> None:
+    control = ControlMachine(UNSEEN, timeout=2.0)
+    control.word_sent(9.0)
+    assert repeats(policy, control) == [], 'it did not run'
+    ask(control, ControlAction.ENABLE)
+    output = AcyclicOutput(control, policy, 0)
+    tell(output, control, 10.0)
+    assert output.next_timer() == math.inf, 'that is not repeated'
+    ask(control, ControlAction.DISABLE)
+    tell(output, control, 10.0)
+    told = []
+    while output.next_timer() < math.inf:
+        now = output.next_timer()
+        assert output.handle_timer(now)
+        assert output.word_due(now)
+        told.append(round(1000 * (now - 10.0)))
+        tell(output, control, now)
+    assert told == again
 
 
 def test_a_pulse_leaves_as_often_as_it_has_to() -> None:

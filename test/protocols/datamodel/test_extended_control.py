@@ -313,6 +313,41 @@ def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
     assert [done[:2] for done in talk.control_outcomes()] == [('reset_fault', True)]
 
 
+@pytest.mark.parametrize(('action', 'times'), [
+    (ControlAction.DISABLE, {DISABLE: [10.5, 10.7, 11.1, 11.9]}),
+    (ControlAction.QUICK_STOP, {     # which keeps its word for 2 s
+        QUICK_STOP: [10.5, 10.7, 11.1, 11.9], DISABLE: [12.5, 12.7, 13.1, 13.9]})])
+def test_a_drive_that_reports_nothing_is_told_to_stop_more_than_once(
+        action: ControlAction, times: dict[str, list[float]]) -> None:
+    """A write may get lost, nobody acknowledges it, and no status says that it did."""
+    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    at_once(talk, 10.01, ANSWER)
+    sent = [(10.5, text) for text in talk.asks(action, 10.5)] + talk.until(19.0)
+    for text, when in times.items():
+        assert [now for now, each in sent if each == text] == pytest.approx(when, abs=0.01)
+    assert ENABLE not in [text for _, text in sent]
+
+
+def test_what_starts_a_drive_that_reports_nothing_is_written_once() -> None:
+    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
+    assert [text for _, text in talk.until(10.009)] == []   # nor what it has not run behind
+    talk.asks(ControlAction.ENABLE, 10.01)
+    at_once(talk, 10.01, ANSWER)
+    assert [text for _, text in talk.until(19.0)] == []
+
+
+def test_a_stop_is_not_told_again_behind_a_new_enable() -> None:
+    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    at_once(talk, 10.01, ANSWER)
+    assert DISABLE in talk.asks(ControlAction.DISABLE, 10.5)
+    at_once(talk, 10.5, ANSWER)
+    talk.asks(ControlAction.ENABLE, 10.6)
+    assert ENABLE in at_once(talk, 10.6, ANSWER)
+    assert DISABLE not in [text for _, text in talk.until(19.0)]
+
+
 def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
     talk = beside(missed_limit=25)
     talk.asks(ControlAction.ENABLE, 10.003)
