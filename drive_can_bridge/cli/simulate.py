@@ -144,7 +144,7 @@ def define(parser: argparse.ArgumentParser) -> None:
     add_params_file(parser, 'parameter file of the bridge')
     parser.add_argument('--interface', help='python-can interface for all buses, instead of the '
                                             "file's")
-    parser.add_argument('--channel', help="channel for all buses, instead of the file's")
+    parser.add_argument('--channel', help="channel of the bus, instead of the file's")
     parser.add_argument('--bitrate', type=bitrate, metavar='B',
                         help="bit/s of all buses, instead of the file's; who sets another one "
                              'on a pseudo-terminal then hears nothing')
@@ -275,8 +275,12 @@ def _wait(simulation: Simulation, wake: int, console: Console) -> int:
 
 def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel: str | None,
               bitrate: int | None) -> BridgeConfiguration:
-    """Replace the end points of all buses."""
-    buses = {}
+    """
+    Replace the end points of all buses.
+
+    :raises WrongUsage: two of them would be one: drives that never meet would answer together.
+    """
+    buses: dict[str, BusConfiguration] = {}
     for bus in configuration.buses.values():
         changed = replace(bus, interface=interface or bus.interface,
                           channel=bus.channel if channel is None else channel,
@@ -285,6 +289,12 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel
             # options of one adapter mean nothing to another
             changed = replace(changed, options={})
         buses[bus.name] = changed
+    apart = {bus.wire for bus in configuration.buses.values()}
+    if len({bus.wire for bus in buses.values()}) < len(apart):
+        given = ' '.join(option for option, value in (('--interface', interface),
+                                                      ('--channel', channel)) if value is not None)
+        raise WrongUsage(f'{given} puts the buses {", ".join(buses)} on one: use --pty, or a '
+                         f'parameter file with one bus')
     return replace(configuration, buses=buses)
 
 

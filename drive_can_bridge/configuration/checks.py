@@ -181,7 +181,8 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
     """
     claimed: dict[str, list[tuple[Claim, DriveConfiguration]]] = {}
     for drive in drives:
-        on_bus = claimed.setdefault(_same_bus(buses.get(drive.bus), drive.bus), [])
+        bus = buses.get(drive.bus)
+        on_bus = claimed.setdefault(drive.bus if bus is None else bus.wire, [])
         family = FAMILIES[drive.protocol]
         own = [*family.claims(drive), *family.reserved(drive)]
         hit = next(((mine, claim, other) for mine in own for claim, other in on_bus
@@ -195,13 +196,6 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
                 says('collides', station=drive.station, other=other.name,
                      other_station=other.station, bus=other.bus, purpose=what))
         on_bus.extend((claim, drive) for claim in own)
-
-
-def _same_bus(bus: BusConfiguration | None, name: str) -> str:
-    """Return what is the same for buses that are one for sure; an option may name an adapter."""
-    if bus is None:
-        return name
-    return f'{bus.interface} {bus.channel} {sorted(bus.options.items())}'
 
 
 def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:

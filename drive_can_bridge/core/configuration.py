@@ -46,6 +46,11 @@ class BusConfiguration:
         """Name the bus as people do, printable: ``slcan /dev/ttyACM0``."""
         return printable(f'{self.interface} {self.channel}')
 
+    @property
+    def wire(self) -> str:
+        """What is the same for buses that are one for sure; an option may name an adapter."""
+        return f'{self.interface} {self.channel} {sorted(self.options.items())}'
+
 
 @dataclass(frozen=True)
 class JointConfiguration:

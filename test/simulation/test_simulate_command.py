@@ -137,6 +137,8 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
 @pytest.mark.usefixtures('threads')
 @pytest.mark.parametrize(('arguments', 'status', 'message'), [
     (('--pty', '--interface', 'virtual'), 2, 'exclude each other'),
+    (('--channel', 'x'), 2, 'puts the buses main, second on one: '),
+    (('--interface', 'socketcan', '--channel', 'x'), 2, 'puts the buses main, second on one: '),
     (('--fault', 'conveyor'), 2, 'write DRIVE:FAULT'),
     (('--fault', 'belt:silent'), 2, "no drive 'belt'; drives: conveyor, lift"),
     (('--fault', 'lift:later'), 2, "unknown fault 'later'"),
