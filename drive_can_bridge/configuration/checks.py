@@ -195,6 +195,13 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
                 ('drives', drive.name, 'station'),
                 says('collides', station=drive.station, other=other.name,
                      other_station=other.station, bus=other.bus, purpose=what))
+        rival = next(((claim, other) for mine in own for claim, other in on_bus
+                      if other.bus != drive.bus and mine.rivals(claim)), None)
+        if rival is not None:
+            claim, other = rival
+            tree.wrong(('drives', drive.name, 'bus'), says(
+                'told_by_two_buses', bus=drive.bus, other=other.name, other_bus=other.bus,
+                what=claim.shared))
         on_bus.extend((claim, drive) for claim in own)
 
 

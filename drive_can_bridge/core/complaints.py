@@ -138,6 +138,9 @@ WORDS = {
     'collides':
         '{station} collides with drive {other} (station {other_station}) on bus {bus}: both '
         'use {purpose}; allowed is a station of its own',
+    'told_by_two_buses':
+        '{bus!r} is the same as bus {other_bus}: drive {other} there and this one would hear the '
+        '{what} of both; allowed is the bus of that drive',
     'period_too_short':
         '{period:.9g} s is too short for a round of polling at {bitrate} bit/s, allowed is at '
         'least {least:.9g} s',

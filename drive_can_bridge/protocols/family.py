@@ -108,12 +108,14 @@ class Claim(NamedTuple):
 
     :param heard: frames of others on it are for the session; False: the bus counts them, as
         frames that nobody should send.
+    :param once: what is shared is sent to all by the exchange of the bus: no other may, too.
     """
 
     route: Route
     purpose: str
     shared: str = ''
     heard: bool = True
+    once: bool = False
 
     def overlaps(self, other: 'Claim') -> bool:
         """Tell whether an identifier exists that both claim."""
@@ -121,6 +123,11 @@ class Claim(NamedTuple):
         return (self.route.extended == other.route.extended
                 and (self.route.identifier ^ other.route.identifier) & common == 0
                 and not (self.shared and self.shared == other.shared))
+
+    def rivals(self, other: 'Claim') -> bool:
+        """Tell whether drives of the other hear this, too, where two exchanges send them."""
+        return (self.once and other.once and self.shared == other.shared
+                and self.route.extended == other.route.extended)
 
 
 class Talk(NamedTuple):

@@ -188,6 +188,47 @@ def test_station_twice_on_a_bus_that_is_opened_twice(tmp_path: Path, station: in
            other_station=1, bus='main')] * collides
 
 
+SERVOS = """\
+/**/drive_can_bridge:
+  ros__parameters:
+    buses:
+      main: {interface: virtual, channel: demo, bitrate: 1000000}
+      other: {interface: virtual, channel: demo, bitrate: 1000000}
+    drives:
+"""
+SERVO = """\
+      {name}:
+        bus: {bus}
+        protocol: cia402
+        station: {station}
+        profile: cia402_servo
+        period: 0.01
+        mode: pv
+        cyclic_request: [target_velocity]
+        cyclic_response: [actual_velocity]
+"""
+
+
+@pytest.mark.parametrize(('first', 'second', 'what'), [
+    ('', '', 'SYNC'),
+    ('bridge_heartbeat: 0.0', '', 'SYNC'),
+    ('transmission: event', '', 'bridge heartbeat'),
+    ('transmission: event', 'bridge_node: 126', 'bridge heartbeat'),
+    ('transmission: event', 'bridge_heartbeat: 0.0', None)])
+def test_what_a_bus_sends_to_all_comes_once_although_it_is_opened_twice(
+        tmp_path: Path, first: str, second: str, what: str | None) -> None:
+    """Two SYNCs a period would have each drive take every setpoint, and answer, twice."""
+    text = SERVOS
+    for station, (name, bus, more) in enumerate(
+            [('slide', 'main', first), ('lift', 'other', second)], 1):
+        text += SERVO.format(name=name, bus=bus, station=station) + f'        {more}\n' * bool(more)
+    line = text.splitlines().index('        bus: other') + 1
+    assert problems(tmp_path, text) == [
+        at(f'f.yaml:{line}: drives.lift.bus', 'told_by_two_buses', bus='other', other='slide',
+           other_bus='main', what=what)] * (what is not None)
+    assert problems(tmp_path, text.replace('bus: other', 'bus: main').replace('126', '127')) == []
+
+
 @pytest.fixture
 def terminal() -> Iterator[str]:
     near, far = os.openpty()

@@ -194,6 +194,23 @@ def test_broadcast_identifiers_are_shared(tmp_path: Path, broadcast: str, extend
     assert not claims[0].overlaps(claims[1])
 
 
+@pytest.mark.parametrize(('first', 'second', 'refused'), [
+    ('group', 'group', True), ('group', 'all', True), ('group', 'none', False)])
+def test_broadcasts_of_two_buses_that_are_one(tmp_path: Path, first: str, second: str, *,
+                                              refused: bool) -> None:
+    """Each inverter would obey the control word of both."""
+    text = FILE.replace('bitrate: 125000\n', """bitrate: 125000
+      other: {interface: virtual, channel: demo, bitrate: 125000}
+""")
+    text = text.replace('broadcast: none', f'broadcast: {first}', 1).replace(
+        'broadcast: none', f'broadcast: {second}', 1)
+    head, hoist, tail = text.partition('      hoist:\n        bus: ')
+    text = head + hoist + tail.replace('main', 'other', 1)
+    assert problems(tmp_path, text, PROFILE) == [
+        at('f.yaml:21: drives.hoist.bus', 'told_by_two_buses', bus='other', other='lift',
+           other_bus='main', what='cannord broadcast')] * refused
+
+
 def test_members_that_differ(tmp_path: Path) -> None:
     assert problems(tmp_path, second(together(), '[speed]', '[second]'), PROFILE) == [
         at('f.yaml:25: drives.hoist.cyclic_request', 'request_differs',

@@ -107,7 +107,7 @@ class Cannord(Family):
         broadcast = broadcast_identifier(drive)
         if broadcast is not None:
             found.append(Claim(route(broadcast, extended=extended), 'broadcast process data',
-                               shared='cannord broadcast', heard=False))
+                               shared='cannord broadcast', heard=False, once=True))
         return found
 
     def overheard(self, drive: DriveConfiguration) -> list[Route]:

@@ -284,4 +284,4 @@ class Cia402(Family):
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:
     return Claim(Route(identifier, STANDARD_IDENTIFIER_MAX, False),
-                 f'{identifier:03X}h ({purpose})', mark, heard=False)
+                 f'{identifier:03X}h ({purpose})', mark, heard=False, once=True)
