@@ -198,6 +198,23 @@ def test_a_period_that_is_too_short(tmp_path: Path, bitrate: int, period: str,
               bitrate=bitrate, least=pytest.approx(shortest, abs=5e-6)) in found(tmp_path, text)
 
 
+# one read and two writes; and the status, which enable is repeated behind, every period: 6 frames
+@pytest.mark.parametrize(('request_', 'response', 'refresh', 'shortest'), [
+    ('[speed, word]', '[actual]', 0.005, 0.01048), ('[speed, word]', '[actual]', 0.5, 0.00732),
+    ('[speed, word]', '[actual]', 0.0, 0.00732), ('[speed, word]', '[status]', 0.005, 0.00732),
+    ('[speed, limit]', '[actual]', 0.005, 0.00732)])
+def test_a_status_that_is_read_in_every_period_counts(
+        tmp_path: Path, request_: str, response: str, refresh: float, shortest: float) -> None:
+    text = with_keys(f'refresh_interval: {refresh}')
+    text = changed(text, '[speed, limit]', request_)
+    text = changed(text, '[actual, current, status]', response)
+    too_short = changed(text, 'period: 0.02', 'period: 0.006')
+    assert found(tmp_path, too_short) == [
+        at('f.yaml:15: drives.conveyor.period', 'period_too_short', period=0.006, bitrate=125000,
+           least=shortest)]
+    assert found(tmp_path, changed(text, 'period: 0.02', f'period: {shortest}')) == []
+
+
 # reads of 1 ms and two frames of 135 bits each
 @pytest.mark.parametrize(('reads', 'bitrate', 'least'), [
     ('[actual]', 500_000, 0.00154),

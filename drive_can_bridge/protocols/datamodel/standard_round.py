@@ -6,6 +6,7 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
+from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Procedure, Read
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
@@ -35,9 +36,20 @@ def frames(drive: DriveConfiguration) -> int:
 
 
 def shortest_period(drive: DriveConfiguration, bitrate: int) -> float:
-    """Return the time of such a period at worst, in s."""
+    """
+    Return the time of such a period at worst, in s.
+
+    A word that starts the drive is repeated behind a status that was read just now: where that is
+    not in the round, and repeated this often, it is one read more.
+    """
     requests = len(reads(drive)) + len(drive.cyclic_request)
-    return round_time([FRAME_BITS] * frames(drive), requests, bitrate)
+    shortest = round_time([FRAME_BITS] * frames(drive), requests, bitrate)
+    status = status_word(drive)
+    if status is None or status in drive.cyclic_response or (
+            control_word(drive, controlled=True) not in drive.cyclic_request):
+        return shortest
+    longer = round_time([FRAME_BITS] * (frames(drive) + 2), requests + 1, bitrate)
+    return longer if 0 < drive.options.refresh_interval <= longer else shortest
 
 
 class StandardRound:
