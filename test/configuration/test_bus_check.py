@@ -221,7 +221,8 @@ def test_what_a_bus_sends_to_all_comes_once_although_it_is_opened_twice(
     text = SERVOS
     for station, (name, bus, more) in enumerate(
             [('slide', 'main', first), ('lift', 'other', second)], 1):
-        text += SERVO.format(name=name, bus=bus, station=station) + f'        {more}\n' * bool(more)
+        text += SERVO.format(name=name, bus=bus, station=station)
+        text += f'        {more}\n' * bool(more)
     line = text.splitlines().index('        bus: other') + 1
     assert problems(tmp_path, text) == [
         at(f'f.yaml:{line}: drives.lift.bus', 'told_by_two_buses', bus='other', other='slide',
