@@ -126,9 +126,11 @@ def write_atomically(path: Path, data: bytes) -> None:
 
     :raises OSError: the disk is full, the directory cannot be written, ….
     """
-    path = path.resolve()
+    special = path.exists() and not path.is_file()  # /dev/stdout, a pipe
+    if not special:     # what /dev/fd calls a pipe is no path
+        path = path.resolve()
     try:
-        if path.exists() and not path.is_file():  # /dev/stdout, a pipe
+        if special:
             path.write_bytes(data)
         else:
             _replace(path, data)

@@ -47,6 +47,17 @@ def test_replaced_as_a_whole_where_a_link_points(tmp_path: Path) -> None:
     assert not differs(tmp_path / 'b.yaml')
 
 
+def test_a_pipe_is_written_to_by_the_name_of_its_descriptor() -> None:
+    """``-o /dev/stdout``, and ``-o >(gzip …)`` of a shell."""
+    out, into = os.pipe()
+    try:
+        write_atomically(Path(f'/dev/fd/{into}'), b'settings')
+        assert os.read(out, 100) == b'settings'
+    finally:
+        os.close(into)
+        os.close(out)
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
