@@ -242,6 +242,29 @@ def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
                 tree.wrong(path, message)
 
 
+#: characters of a topic or service that ROS takes: 255, without what it puts in front
+_TOPIC_MAX = 247
+#: the longest name of those that every drive has
+_SERVICE = 'set_parameters_atomically'
+
+
+def check_topics(tree: Tree, drives: Iterable[DriveConfiguration], namespace: str) -> None:
+    """
+    Look for names that are too long together: ROS refuses them in the middle of configuring.
+
+    :param namespace: of the bridge, without the slash at its end.
+    """
+    for drive in drives:
+        topics = [_SERVICE, *(f'command/{parameter.name}' for parameter in drive.cyclic_request)]
+        for parameter in drive.cyclic_response:
+            topics += [parameter.name, *(f'{parameter.name}/{bit}' for bit, _ in parameter.bits)]
+        longest = max(topics, key=len)
+        length = len(f'{namespace}/{drive.name}/{longest}')
+        if length > _TOPIC_MAX:
+            tree.wrong(('drives', drive.name), says('topic_too_long', topic=f'~/{longest}',
+                                                    length=length, most=_TOPIC_MAX))
+
+
 def check_joint(tree: Tree, drive: DriveConfiguration) -> JointConfiguration | None:
     """Return the joint of a drive; None where it has none, or a wrong one."""
     entry = tree.data['drives'][drive.name].get('joint')

@@ -20,7 +20,7 @@ import yaml
 
 from drive_can_bridge.configuration.checks import (
     Adapters, check_buses, check_identifiers, check_joint_names, check_load, check_neighbours,
-    check_rounds, DriveChecker, LISTS,
+    check_rounds, check_topics, DriveChecker, LISTS,
 )
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
@@ -192,18 +192,21 @@ def configuration_from_file(path: str | FilePath, *, adapters: Adapters | None =
 
 
 def configuration_from_overrides(overrides: Mapping[str, object], *,
-                                 adapters: Adapters | None = None) -> BridgeConfiguration:
+                                 adapters: Adapters | None = None,
+                                 namespace: str = '') -> BridgeConfiguration:
     """
     Check the parameter overrides of a node.
 
     :param overrides: values by dotted name, as rclpy gives them; None is rcl's empty list.
+    :param namespace: of the node, which no file tells; without a slash at its end.
     :raises ConfigurationError: with one line per problem, ``key.path: message``; what is wrong
         inside a profile still has its file and line.
     """
-    return _configuration(tree_from_overrides(overrides), adapters)
+    return _configuration(tree_from_overrides(overrides), adapters, namespace)
 
 
-def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration:
+def _configuration(tree: Tree, adapters: Adapters | None,
+                   namespace: str = '') -> BridgeConfiguration:
     _forget_findings(tree)
     check_schema(tree, checked_bridge(), override=partial(_sentence, tree))
     check_qualities(tree)
@@ -219,6 +222,7 @@ def _configuration(tree: Tree, adapters: Adapters | None) -> BridgeConfiguration
         if drive is not None:
             drives[name] = drive
     _check_together(tree, buses, drives, checkers)
+    check_topics(tree, drives.values(), namespace)
     if not _names(tree, 'drives') and not tree.is_damaged(('drives',)):
         tree.suspicious(('drives',), says('no_drive'))
     found = [tree, *store.trees]

@@ -133,6 +133,9 @@ WORDS = {
     'no_drive': 'no drive is configured',
     'nobody_knows': 'cannot be used, nobody knows why',
     'name_of_bridge': '{name!r} is the name of the bridge itself, allowed is any other',
+    'topic_too_long':
+        '{topic} would have a name of {length} characters in ROS, with drive and namespace, '
+        'allowed are {most}',
     'unknown_protocol': '{value!r} is unknown{near}; available: {allowed}',
     'no_protocol': '{value!r} is no protocol; available: {allowed}',
     'collides':

@@ -353,8 +353,9 @@ class BridgeNode(LifecycleNode):
         if garbled:     # what else there is to be said would mislead
             raise ConfigurationError(garbled)
         try:
-            configuration = configuration_from_overrides(self._node_parameters.current,
-                                                         adapters=adapters)
+            configuration = configuration_from_overrides(
+                self._node_parameters.current, adapters=adapters,
+                namespace=self.get_namespace().rstrip('/'))
         except ConfigurationError as error:
             lines = [f'drive_can validate {shlex.quote(file)} names the lines'
                      for file in filter(_is_wrong, self._files)][:1]

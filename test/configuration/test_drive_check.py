@@ -195,6 +195,20 @@ def test_name_too_long(tmp_path: Path) -> None:
     assert found[0].startswith(f'f.yaml:10: drives.{"c" * 101}: ')
 
 
+def test_names_too_long_together(tmp_path: Path) -> None:
+    """ROS has at most 247 characters for the topic of a bit: /DRIVE/PARAMETER/BIT."""
+    drive, name = 'c' * 100, 's' * 100
+    text = changed(changed(FILE, 'conveyor', drive), 'current, status', f'status, {name}')
+
+    def profile(bit: str) -> str:
+        return changed(PROFILE, '  position:', (
+            f'  {name}: {{number: 212, access: ro, bits: {{{bit}: 1}}}}\n  position:'))
+    assert problems(tmp_path, text, profile('b' * 44)) == []
+    assert problems(tmp_path, text, profile('b' * 45)) == [
+        at(f'f.yaml:10: drives.{drive}', 'topic_too_long', length=248, most=247,
+           topic=f'~/{name}/{"b" * 45}')]
+
+
 PROTOCOL = 'f.yaml:12: drives.conveyor.protocol'
 AVAILABLE = ', '.join(FAMILIES)
 

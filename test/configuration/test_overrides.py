@@ -112,3 +112,12 @@ def test_drives_keep_the_order_of_the_file() -> None:
     overrides = {f'drives.{name}.{key}': 1 for name in ('west', 'north', 'east')
                  for key in ('joint.name', 'bus')}
     assert list(tree_from_overrides(overrides).data['drives']) == ['west', 'north', 'east']
+
+
+def test_names_too_long_in_their_namespace(good: dict[str, Any]) -> None:
+    configuration_from_overrides(good, namespace=f'/{"n" * 211}')
+    with pytest.raises(ConfigurationError) as caught:
+        configuration_from_overrides(good, namespace=f'/{"n" * 212}')
+    assert caught.value.problems == [
+        at('drives.conveyor', 'topic_too_long', length=248, most=247,
+           topic='~/set_parameters_atomically')]
