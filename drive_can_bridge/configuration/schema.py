@@ -68,10 +68,12 @@ def check_schema(tree: Tree, schema: Schema, *, override: Override | None = None
         for path, message, at in _sentences(error, tree):
             changed = override(path, error.instance, str(error.validator)) if override else None
             found.append((path, message if changed is None else changed, at))
+    told: set[Path] = set()
     for path, message, at in found:
         tree.cut(path)
-        if message:
+        if message and at not in told:  # of the wrong type, and out of range besides
             tree.wrong(path, message, at=at)
+            told.add(at)
 
 
 def check_value(value: Any, schema: Schema) -> Sentence | None:

@@ -118,6 +118,8 @@ VALUES = [
     ('rearm: neutrl', says('unknown_word', value='neutrl', near=says('near', word='neutral'),
                            allowed='neutral or immediate')),
     ('missed_limit: 0', says('out_of_range', value=0, allowed='an integer of 1 to 1000000')),
+    ('missed_limit: 0.5', says('wrong_type', value=0.5, kind='a number',
+                               allowed='an integer of 1 to 1000000')),
     ('command_timeout: -1', says('out_of_range', value=-1, allowed='a number of 0 to 3600')),
     ('parameter_timeout: 0', says('out_of_range', value=0, allowed='a number of 0.001 to 60')),
     ('control_timeout: x', says('wrong_type', value='x', kind='a string',
