@@ -2,19 +2,18 @@
 """The subcommand ``drive_can validate``: check a parameter file without touching a bus."""
 
 from argparse import ArgumentParser, Namespace
-import re
 import sys
 from typing import Any
 
 from drive_can_bridge.cli.command import FAILED, print_json
 from drive_can_bridge.configuration.checks import Adapters, bus_shares
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.text import printable
-
-_PLACE = re.compile(r'(.*?):(\d+): (?:([\w.\[\]-]+): )?(.*)', re.DOTALL)
 
 
 def define(parser: ArgumentParser) -> None:
@@ -85,11 +84,12 @@ def _document(drive: DriveConfiguration, bus: BusConfiguration, share: float) ->
 
 
 def _place(level: str, problem: str) -> dict[str, Any]:
-    """Take ``FILE:LINE: key.path: what is wrong`` apart."""
-    found = _PLACE.fullmatch(problem)
-    file, line, key, message = found.groups() if found else (None, None, None, problem)
-    return {'level': level, 'file': file, 'line': None if line is None else int(line),
-            'key': key, 'message': message}
+    """Return where a problem is, and what is wrong there."""
+    where = problem.fields if isinstance(problem, Sentence) else {}
+    file, line, key = where.get('file', ''), where.get('line'), where.get('key', '')
+    before = str(Problem(file, line or 0, key, NOTHING))
+    return {'level': level, 'file': file or None, 'line': line if file else None,
+            'key': key or None, 'message': problem.removeprefix(before)}
 
 
 def _names(parameters: tuple[Parameter, ...]) -> str:

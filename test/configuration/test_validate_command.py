@@ -252,3 +252,17 @@ def test_a_terminal_that_is_not_to_matter_does_not(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(front_end, '_run', go_on)
     monkeypatch.setattr(sys, 'argv', ['drive_can', 'record'])
     assert front_end.main() == 3
+
+
+@pytest.mark.parametrize(('old', 'new', 'key', 'line'), [
+    ('main:\n', '"a b":\n', 'buses.a b', 5),
+    ('    autostart: true\n', '    <<: 1\n', '<<', 3),
+])
+def test_json_names_any_key(tmp_path: Path, old: str, new: str, key: str, line: int) -> None:
+    file = tmp_path / 'part: 7: f.yaml'
+    file.write_text(changed(changed(FILE, 'profile: table', 'profile: datamodel_example'),
+                            old, new))
+    found = [json.loads(each) for each in run('validate', '--json', str(file)).stdout.splitlines()]
+    assert (str(file), line, key) in [
+        (each['file'], each['line'], each['key']) for each in found]
+    assert not any(each['message'].startswith(key) for each in found)
