@@ -53,6 +53,7 @@ class StandardSession(Session):
             slot=self._side.control_slot)
         self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
+        self._missed = False    # a round, and nothing was shown to have arrived since
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -166,7 +167,12 @@ class StandardSession(Session):
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
         transactor = self._side.transactor
-        if not found and transactor.asked_at > transactor.wrote_at:
+        # as long as it is told to run as well, no answer shows a stop: that is seen to then
+        missed, self._missed = self._missed, self._missed and not found and self.owed
+        if not found and missed and (
+                self.neutral_stop.pending or self.unshown and not self.owed):
+            self._writer.write_all(now)     # what left meanwhile, the drive may have missed, too
+        elif not found and transactor.asked_at > transactor.wrote_at:
             self.neutral_stop.answered()
             self.duty.happened(Happened.ANSWERED)
         if self.control is None:
@@ -187,6 +193,7 @@ class StandardSession(Session):
             self._writer.write_word(now, known=True)
 
     def exchange_missed(self, reason: Sentence, now: float) -> None:
+        self._missed = True
         if not self.online:
             self.report.advice = self._round.gap or sentences.reads_unanswered()
         elif reason:

@@ -3,6 +3,7 @@
 
 from functools import partial
 import math
+from typing import Any
 
 from builders import (
     ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, parameter, RAMP, read,
@@ -55,6 +56,37 @@ def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
     talk.bus_down(12.0221)
     assert [note.text for note in talk.events(Noted) if note.warning] == [
         says('may_still_be_running', why=says('bus_lost_before_stop'))]
+
+
+def deaf_at_its_stop(**options: Any) -> Conversation:
+    """Return one of a drive that runs, and misses its round of 10.04 s and what is written then."""
+    talk = online(rearm_immediate=True, refresh_interval=30.0, **options)
+    talk.commands(0, 100.0, 10.01)
+    assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    talk.hears(ANSWER, 10.023)
+    assert talk.until(10.0405) == [(10.04, ASK)]
+    return talk
+
+
+def test_a_quick_stop_of_a_missed_round_is_written_again_behind_an_answer() -> None:
+    talk = deaf_at_its_stop()
+    assert talk.asks(ControlAction.QUICK_STOP, 10.05) == [SPEED_ZERO]
+    assert talk.until(10.2405) == [(10.051, LIMIT_ZERO), (10.24, ASK)]
+    assert talk.hears(ANSWER, 10.242) == []
+    assert talk.control_outcomes() == []
+    assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.244, LIMIT_ZERO), (10.26, ASK)]
+    talk.hears(ANSWER, 10.262)
+    assert talk.control_outcomes() == [('quick_stop', True, says('neutral_without_control'))]
+
+
+def test_what_expired_in_a_missed_round_is_written_again_behind_an_answer() -> None:
+    talk = deaf_at_its_stop(command_timeout=0.05)
+    assert talk.until(10.2405) == [(10.06, SPEED_ZERO), (10.24, ASK)]
+    talk.hears(ANSWER, 10.242)
+    assert talk.session.unshown
+    assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.244, LIMIT_ZERO), (10.26, ASK)]
+    talk.hears(ANSWER, 10.262)
+    assert not talk.session.unshown
 
 
 def test_a_round_cut_short_by_the_end_does_not_keep_the_next_from_beginning() -> None:
