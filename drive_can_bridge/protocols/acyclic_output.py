@@ -184,6 +184,14 @@ class AcyclicOutput:
         """Record that nobody knows what the drive has: it is due at the next look."""
         self._written[index] = None
 
+    def doubt(self, since: float, *, but: Container[int | None] = ()) -> bool:
+        """Let what was written since then, ``but`` these, be due again; tell if there was any."""
+        found = [index for index, at in enumerate(self._written_at)
+                 if at > since and index not in but]
+        for index in found:
+            self.failed(index)
+        return bool(found)
+
     def write_all(self, *, but: Container[int] = ()) -> None:
         """Let everything be due at the next look, ``but`` these, whether it has changed or not."""
         for index in range(len(self._written)):

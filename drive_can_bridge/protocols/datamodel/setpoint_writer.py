@@ -227,6 +227,19 @@ class SetpointWriter:
         self.look(now, known=known)
         self.write(now)
 
+    def write_again(self, since: float, now: float) -> bool:
+        """
+        Write what has left since then once more, but a word that starts the drive.
+
+        :return: there was any.
+        """
+        control, slot = self._session.control, self._slot
+        starts = control is not None and not (control.at_rest or control.stopping)
+        doubtful = self._output.doubt(since, but=[slot] if starts else ())
+        if doubtful:
+            self.write_word(now)
+        return doubtful
+
     def write_all(self, now: float) -> None:
         """Write all setpoints, whether they have changed or not, without waiting for a period."""
         self._output.write_all(but=[

@@ -9,6 +9,8 @@ silent; that is how it is found. Setpoints are written only to a drive that answ
 back (:mod:`.acyclic_side`).
 """
 
+import math
+
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -53,7 +55,8 @@ class StandardSession(Session):
             slot=self._side.control_slot)
         self.look_after(self._writer, *self._side.parts, channel=self._channel)
         self._expected = False  # the answer of a read that nobody wants any more may come
-        self._missed = False    # a round, and nothing was shown to have arrived since
+        self._missed = False            # a round, since the last one that was answered
+        self._heard_at = -math.inf      # when that was asked for
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -167,12 +170,11 @@ class StandardSession(Session):
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
         transactor = self._side.transactor
-        # as long as it is told to run as well, no answer shows a stop: that is seen to then
-        missed, self._missed = self._missed, self._missed and not found and self.owed
-        if not found and missed and (
-                self.neutral_stop.pending or self.unshown and not self.owed):
-            self._writer.write_all(now)     # what left meanwhile, the drive may have missed, too
-        elif not found and transactor.asked_at > transactor.wrote_at:
+        missed, self._missed = self._missed, False
+        since, self._heard_at = self._heard_at, transactor.asked_at
+        # what left while rounds were missed, the drive may have missed, too
+        if not found and not (missed and self._writer.write_again(since, now)) and (
+                transactor.asked_at > transactor.wrote_at):
             self.neutral_stop.answered()
             self.duty.happened(Happened.ANSWERED)
         if self.control is None:

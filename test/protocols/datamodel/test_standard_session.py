@@ -58,9 +58,9 @@ def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
         says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
-def deaf_at_its_stop(**options: Any) -> Conversation:
-    """Return one of a drive that runs, and misses its round of 10.04 s and what is written then."""
-    talk = online(rearm_immediate=True, refresh_interval=30.0, **options)
+def deaf_for_a_round(**options: Any) -> Conversation:
+    """Return one of a drive that runs, and misses its round of 10.04 s and what is sent then."""
+    talk = online(rearm_immediate=True, refresh_interval=0.0, **options)
     talk.commands(0, 100.0, 10.01)
     assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
     talk.hears(ANSWER, 10.023)
@@ -69,7 +69,7 @@ def deaf_at_its_stop(**options: Any) -> Conversation:
 
 
 def test_a_quick_stop_of_a_missed_round_is_written_again_behind_an_answer() -> None:
-    talk = deaf_at_its_stop()
+    talk = deaf_for_a_round()
     assert talk.asks(ControlAction.QUICK_STOP, 10.05) == [SPEED_ZERO]
     assert talk.until(10.2405) == [(10.051, LIMIT_ZERO), (10.24, ASK)]
     assert talk.hears(ANSWER, 10.242) == []
@@ -80,13 +80,31 @@ def test_a_quick_stop_of_a_missed_round_is_written_again_behind_an_answer() -> N
 
 
 def test_what_expired_in_a_missed_round_is_written_again_behind_an_answer() -> None:
-    talk = deaf_at_its_stop(command_timeout=0.05)
+    talk = deaf_for_a_round(command_timeout=0.05)
     assert talk.until(10.2405) == [(10.06, SPEED_ZERO), (10.24, ASK)]
     talk.hears(ANSWER, 10.242)
     assert talk.session.unshown
-    assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.244, LIMIT_ZERO), (10.26, ASK)]
+    assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.26, ASK)]
     talk.hears(ANSWER, 10.262)
     assert not talk.session.unshown
+
+
+def test_a_setpoint_of_a_missed_round_is_written_again_behind_an_answer() -> None:
+    talk = deaf_for_a_round(command_timeout=0.0)
+    talk.commands(0, 10.0, 10.05)
+    assert talk.until(10.2405) == [(10.06, '3F1#0632006400000000'), (10.24, ASK)]
+    talk.hears(ANSWER, 10.242)
+    talk.commands(0, 9.0, 10.2425)
+    assert talk.until(10.2605) == [(10.243, '3F1#0632005A00000000'), (10.26, ASK)]
+    talk.hears(ANSWER, 10.262)
+    assert talk.until(10.2905) == [(10.28, ASK)], 'and not once more'
+
+
+def test_a_missed_round_in_which_nothing_left_has_nothing_written_again() -> None:
+    talk = deaf_for_a_round(command_timeout=0.0)
+    assert talk.until(10.2405) == [(10.24, ASK)]
+    talk.hears(ANSWER, 10.242)
+    assert talk.until(10.2605) == [(10.26, ASK)]
 
 
 def test_a_round_cut_short_by_the_end_does_not_keep_the_next_from_beginning() -> None:
@@ -639,6 +657,22 @@ def test_a_word_of_which_no_notice_is_taken_is_written_again() -> None:
         talk.hears(ENABLED, 10.044 + 0.02 * beat)
     assert again == [10.26, 10.68]
     assert DISABLE_WORD in talk.asks(ControlAction.DISABLE, 12.05), 'at once for who asks again'
+
+
+def test_of_a_missed_round_only_a_word_that_stops_is_written_again() -> None:
+    talk = controlled(refresh_interval=0.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    assert talk.until(10.2405) == [
+        (10.025, SPEED_ZERO), (10.026, ENABLE_WORD), (10.04, ASK), (10.24, ASK)]
+    talk.hears(ENABLED, 10.242)
+    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    assert talk.until(10.2605) == [(10.243, SPEED_ZERO), (10.26, ASK)]
+    talk.hears(ENABLED, 10.262)
+    assert talk.asks(ControlAction.DISABLE, 10.27) == [DISABLE_WORD]
+    assert talk.until(10.4805) == [(10.28, ASK), (10.48, ASK)]
+    talk.hears(READY, 10.482)
+    assert talk.until(10.5005) == [(10.483, DISABLE_WORD), (10.5, ASK)]
 
 
 def test_enable_with_the_word_by_hand() -> None:
