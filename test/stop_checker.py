@@ -9,9 +9,10 @@ from their motors, by these rules:
 
 1. What runs and is not wanted any more has stopped, 3 s after the drive can be talked to again.
 2. A stop that has ended without the word that the drive may still be running has stopped it.
-3. Nothing begins to run, or is given a setpoint, without an enable and a command of a user who
+3. A stop that was answered with success has stopped it.
+4. Nothing begins to run, or is given a setpoint, without an enable and a command of a user who
    meant it: later than the last loss, stall, stop, restart or end.
-4. A drive that runs when its bus is lost is said to run, perhaps.
+5. A drive that runs when its bus is lost is said to run, perhaps.
 
 Nothing in here asks a session what it owes, and no codec of the package is used.
 
@@ -357,6 +358,12 @@ class World:
             self.enabling = False
             if not event.success:
                 self.ends()
+        elif isinstance(event, ControlCompleted) and event.success and (
+                self.now >= self.looked_at):
+            for each in self.partners:
+                if self.driven(each) and not (
+                        each.wanted or each.left_over or self.now <= each.unseen_until):
+                    raise Violation(f'drive {each.index + 1} runs, and was said to stand')
 
     def live(self, seconds: float) -> None:
         """Let time pass."""
@@ -419,6 +426,10 @@ class World:
             raise Violation(f'drive {index + 1} gets a setpoint that is '
                             f'{self.now - self.commanded_at:.3f} s old')
 
+    def driven(self, partner: Partner) -> bool:
+        """Tell whether something moves it."""
+        return partner.motor.runs and (self.control or not partner.armed)
+
     def reachable(self) -> bool:
         return self.bus and not (self.deaf or self.mute or self.refusing)
 
@@ -459,9 +470,12 @@ class World:
 
     def _ask(self, action: ControlAction) -> None:
         session = self.leader
-        if session.control is None or session.services.control_refusal(action):
+        if session.services.control_refusal(action):
             return
-        if action is ControlAction.ENABLE:
+        if session.control is None:
+            for partner in self.partners:
+                partner.armed = False
+        elif action is ControlAction.ENABLE:
             self.enabling = True
             for partner in self.partners:
                 partner.wanted = True

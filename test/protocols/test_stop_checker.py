@@ -14,6 +14,7 @@ from stop_checker import (
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.setpoints import Setpoint
 from drive_can_bridge.core.stop_duty import Do, StopDuty
+from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.safe_stop import SafeStop
 
@@ -76,6 +77,8 @@ DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
     (SafeStop, '_done', lambda self, kind, failed: DONE(self, kind, []), '11 bit, no word',
      (('silent', 0.0), ('end', 0.0))),
     (ControlMachine, 'withdraw', _nothing, 'CANnord', (('silent', 0.9), ('well', 0.9))),
+    (SetpointWriter, 'write_again', lambda self, since, now: False, '11 bit, no word',
+     (('silent', 0.013), ('quick_stop', 0.11), ('well', 0.9))),
     (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),
 ]
 
