@@ -271,8 +271,8 @@ class Cia402Session(Session):
             self._expect_set(now)
 
     def heartbeat_lost(self, now: float) -> None:
-        """Handle a node whose heartbeats have ceased."""
-        if self.exchange.cycling:
+        """Handle a node whose heartbeats have ceased; one that is lost gets its last cycles."""
+        if self.exchange.cycling and not self.exchange.leaving:
             self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
     def _silent(self, reason: Sentence, now: float) -> None:

@@ -265,6 +265,21 @@ class TestLosses:
         assert axis.session.online
         assert axis.session.state is DriveState.DISABLED
 
+    @pytest.mark.parametrize('timeout', [0.31, 0.35, 0.45, 0.5])
+    def test_so_does_one_whose_heartbeats_are_missed_meanwhile(self, timeout: float) -> None:
+        axis = Axis('pv', period=0.1, heartbeat_timeout=timeout).enabled()
+        axis.commands(0.0, 100.0)
+        axis.live(0.35)
+        axis.take()
+        axis.talk.events()
+        axis.mute = True
+        axis.live(1.5)
+        sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
+        quiet = sent.index('605#2B40600007000000')
+        assert sent[quiet - 3:quiet] == ['205#070000000000'] * 3
+        assert [event.text.code for event in axis.talk.events(Noted) if event.danger] == [
+            'may_still_be_running']
+
     def test_a_node_that_restarts_is_set_up_anew(self) -> None:
         axis = running()
         for each in axis.drive.restarts():
