@@ -75,6 +75,26 @@ def test_what_the_bus_refused_was_not_sent(family: str) -> None:
     assert told(partner)['speed_setpoint'] == -1500
 
 
+def test_a_stop_that_is_told_when_the_bus_is_back(family: str) -> None:
+    """By whatever way a family has for it; nobody answers."""
+    partner = started(family)
+    partner.enable()
+    session = partner.talk.session
+    session.setpoints.items[0].armed = True
+    session.services.command(0, -150.0, partner.now)
+    partner.live(0.1)
+    assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
+    partner.deliver(partner.talk.bus_down(partner.now))
+    assert told(partner) == {**word(partner, 'enable'), 'speed_setpoint': -1500}
+    partner.mute = True
+    partner.deliver(partner.talk.bus_up(partner.now))
+    partner.live(1.0)
+    assert not session.online
+    assert told(partner)['speed_setpoint'] == 0
+    if partner.words:
+        assert told(partner)['control_word'] != partner.words['enable']
+
+
 @pytest.mark.parametrize('request_, order', [
     ((SPEED, LIMIT), ['speed_setpoint', 'torque_limit', 'control_word']),
     ((WORD, SPEED), ['control_word', 'speed_setpoint'])])

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
@@ -72,13 +73,16 @@ class SdoTransactor(Transactor[Ask, Reply]):
     too, for an upload whose answer says only after it was given up that it takes segments.
 
     :param outbox: takes the frames.
+    :param sent: is told the setpoints and control words that left.
     """
 
-    def __init__(self, node: int, outbox: Outbox,
-                 retry: RetryPolicy) -> None:
+    def __init__(self, node: int, outbox: Outbox, retry: RetryPolicy, sent: LastSent) -> None:
         super().__init__(retry)
         self._node = node
         self._outbox = outbox
+        self._sent = sent
+        self._places = {(each.index, each.subindex or 0): place
+                        for place, each in enumerate(sent.parameters)}
         self._toggle = 0
         self._collected: bytearray | None = None    # of an object that takes segments
         self._abandoned = False                     # no further one is asked for
@@ -95,9 +99,13 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self.expect(step, now + (self.retry.timeout if step.timeout is None else step.timeout))
 
         def left(sent: bool, then: float) -> None:
-            # a read that the bus refused is repeated when its time is over
-            if not sent and step.data is not None:
+            if step.data is None:
+                return      # a read that the bus refused is repeated when its time is over
+            if not sent:
                 self.end(step, NOT_SENT, then)
+            elif (step.index, step.subindex) in self._places:
+                self._sent.take((int.from_bytes(step.data, 'little'),),
+                                self._places[step.index, step.subindex])
         if step.data is None:
             self._open_upload = step, self.deadline + self.silence + LATE_MAX
         frame = sdo.encode_upload(self._node, step.index, step.subindex) if step.data is None \

@@ -119,7 +119,7 @@ class Cia402Session(Session):
             roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
-        self._transactor = SdoTransactor(drive.station, self.outbox, self.retry)
+        self._transactor = SdoTransactor(drive.station, self.outbox, self.retry, self.sent)
         self._channel: SdoChannel = Channel(self._transactor)
         self.services = DriveServices(self, SdoAccess(self._channel, self.retry))
         self._stop: SafeStop[Ask, Reply] = SafeStop(
@@ -255,6 +255,7 @@ class Cia402Session(Session):
         self._machine.status_received(status, now)
         self._answers.book.forget_asked()
         self._answers.book.stale = self._beat.running    # it answers to the SYNC of others
+        self.setpoints.changed = True   # what was written by SDO meanwhile was something else
         exchange.start(now)
         self.report.advice = sentences.cycles_unanswered()
 

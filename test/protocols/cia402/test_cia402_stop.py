@@ -280,6 +280,18 @@ class TestLosses:
         assert [event.text.code for event in axis.talk.events(Noted) if event.danger] == [
             'may_still_be_running']
 
+    def test_what_cycles_carry_is_what_was_sent_last_when_it_is_back(self) -> None:
+        axis = Axis(objects={(0x605A, 0): b'\6\0'}, disable_word='shutdown').online()
+        axis.mute = True
+        axis.live(0.2)
+        axis.drive.becomes(axis.drive.QUICK_STOP)       # by somebody else
+        axis.mute = False
+        axis.live(1.0)
+        sent = axis.take()
+        assert '605#2B40600000000000' in sent
+        assert [text for text in sent if text.startswith('205#')][-1] == '205#060000000000'
+        assert axis.session.sent.raws == (0x0006, 0)
+
     def test_a_node_that_restarts_is_set_up_anew(self) -> None:
         axis = running()
         for each in axis.drive.restarts():
