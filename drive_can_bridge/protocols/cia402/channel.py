@@ -155,11 +155,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._collected += found.data
         self._toggle ^= sdo.TOGGLE
         if not found.last:
-            if len(self._collected) > LENGTH_MAX:
-                self._give_up(_TOO_LONG, self.step)
-                self.finish()
-                return Reply(abort=_TOO_LONG)
-            return self._ask_segment(now)
+            if len(self._collected) <= LENGTH_MAX:
+                return self._ask_segment(now)
+            self._give_up(_TOO_LONG, self.step)     # not the drive's word: what came is the reply
         data = bytes(self._collected)
         self.finish()
         return Reply(data)

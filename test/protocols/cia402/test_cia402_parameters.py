@@ -106,6 +106,15 @@ def test_texts_are_no_numbers(axis: Axis) -> None:
         '605#4008100000000000', '605#6000000000000000', '605#7000000000000000']
 
 
+def test_what_does_not_end_is_broken_off(axis: Axis) -> None:
+    """Which is no refusal of the drive."""
+    axis.drive.instead = {
+        '4008100000000000': '4108100000100000', '6000000000000000': '0053657276696365',
+        '7000000000000000': '1053657276696365'}
+    assert outcomes(axis, read(NAME)) == [says('too_long', length=37 * 7)]
+    assert '605#8008100005000405' in axis.take()
+
+
 def test_what_is_longer_than_four_bytes_is_not_written(axis: Axis) -> None:
     """Nothing of a profile is longer, so that no download needs segments."""
     assert max(kind.bits for kind in ParameterType) == 32
