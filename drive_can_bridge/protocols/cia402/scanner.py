@@ -40,6 +40,8 @@ _IDENTITY = {1: 'vendor', 2: 'product', 3: 'revision', 4: 'serial number'}
 KEYS = ('mode', 'mapping', 'disable_word', 'bridge_heartbeat')
 _DEVICE_PROFILE = 402
 _CONSUMER_HEARTBEAT = 0x1016
+#: what 605Bh and 605Ch say
+_COASTS, _RAMP = 0, 1
 _SILENT = 'no answer: check station, bit rate and power'
 
 
@@ -179,19 +181,25 @@ class Cia402Prober(Prober):
         return found
 
     def _disable_word(self) -> Generator[Question, Frame | None, Finding]:
-        disable = yield from self._value(DISABLE_OPTION, 0)
-        shutdown = yield from self._value(SHUTDOWN_OPTION, 0)
+        disable = yield from self._option(DISABLE_OPTION)
+        shutdown = yield from self._option(SHUTDOWN_OPTION)
         told = ', '.join(f'{index:04X}h is {"missing" if value is None else value}'
                          for index, value in ((DISABLE_OPTION, disable),
                                               (SHUTDOWN_OPTION, shutdown)))
-        if disable:
+        if disable == _RAMP:
             return Finding('disable_word', 'disable_operation', f'{told}: 0007h brakes by ramp')
-        if shutdown:
+        if shutdown == _RAMP:
             return Finding('disable_word', 'shutdown', f'{told}: 0006h brakes by ramp')
-        if disable is None:
+        if disable != _COASTS:      # others are the maker's own
             return Finding('disable_word', None, f'{told}: the manual says what 0007h does')
+        if shutdown not in (_COASTS, None):
+            return Finding('disable_word', None, f'{told}: the manual says what 0006h does')
         return Finding('disable_word', 'disable_operation', (
             f'{told}: the axis coasts with every word; write 605Ch := 1 if it may be'))
+
+    def _option(self, index: int) -> Generator[Question, Frame | None, int | None]:
+        value = yield from self._value(index, 0)
+        return None if value is None else (value & 0xFFFF ^ 0x8000) - 0x8000
 
     def _bridge_heartbeat(self) -> Generator[Question, Frame | None, Finding]:
         places = yield from self._value(_CONSUMER_HEARTBEAT, 0)
