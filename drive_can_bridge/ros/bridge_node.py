@@ -234,9 +234,7 @@ class BridgeNode(LifecycleNode):
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
         self._files = list(files)
         self._transition_lock = clock.lock()
-        self._control_thread = ServiceThread('control', self.context, self.log.error, clock,
-                                             raise_priority, share=1.0,
-                                             send=self._answers.send)
+        self._control_threads: dict[str, ServiceThread] = {}     # by bus
         self._parameter_thread = ServiceThread('parameters', self.context, self.log.error,
                                                clock, send=self._answers.send)
         self._ending = False
@@ -373,7 +371,7 @@ class BridgeNode(LifecycleNode):
             self.log.warning(warning)
         self._node_parameters.declare(configuration)
         self._runtime = BridgeRuntime(
-            self, self.log, configuration, self._spinner, self._control_thread,
+            self, self.log, configuration, self._spinner, self._control_thread_of,
             self._parameter_thread, self._stamps, self._steady, open_bus=self._open_bus,
             announce=self._node_parameters.announce, dismiss=self._dismiss, fatal=self._fatal)
         self._node_parameters.pass_on()     # since they are declared
@@ -382,6 +380,14 @@ class BridgeNode(LifecycleNode):
         except BaseException:
             self._clean_up()
             raise
+
+    def _control_thread_of(self, bus: str) -> ServiceThread:
+        """Return what serves the stops of a bus: one that hangs holds up those of no other."""
+        if bus not in self._control_threads:
+            self._control_threads[bus] = ServiceThread(
+                f'control {bus}', self.context, self.log.error, self._steady, raise_priority,
+                share=1.0, send=self._answers.send)
+        return self._control_threads[bus]
 
     def _activate(self) -> None:
         if self._runtime is not None:
@@ -434,7 +440,8 @@ class BridgeNode(LifecycleNode):
         self._clean_up()
         while self._leaving:
             self._leaving.pop().destroy()
-        self._control_thread.stop()
+        for thread in self._control_threads.values():
+            thread.stop()
         self._parameter_thread.stop()
         self._answers.stop()
 

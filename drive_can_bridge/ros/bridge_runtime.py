@@ -199,7 +199,7 @@ class BridgeRuntime:
     The buses of a configuration, and their drives (a ``BusListener`` of each exchange).
 
     :param spinner: serves the drive nodes.
-    :param control_thread: serves what stops drives.
+    :param control_thread: (bus): returns the thread that serves what stops its drives.
     :param parameter_thread: serves their parameters.
     :param stamps: of all messages.
     :param open_bus: opens a bus; None: python-can, by its configuration.
@@ -211,7 +211,7 @@ class BridgeRuntime:
     """
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
-                 spinner: ExecutorThread, control_thread: ServiceThread,
+                 spinner: ExecutorThread, control_thread: Callable[[str], ServiceThread],
                  parameter_thread: ServiceThread, stamps: Stamps, clock: Clock, *,
                  open_bus: Callable[[BusConfiguration], EndPoint] | None,
                  announce: Callable[[str, str], None],
@@ -240,7 +240,7 @@ class BridgeRuntime:
             for bus in configuration.buses.values():
                 self._build(bus, lambda drive, session, exchange: DriveNode(
                     node, drive, session, FAMILIES[drive.protocol], exchange, spinner, log,
-                    control_thread, parameter_thread, stamps,
+                    control_thread(drive.bus), parameter_thread, stamps,
                     partial(announce, identity_name(drive.name)), clock))
             if any(drive.joint is not None for drive in configuration.drives.values()):
                 self.joints = Joints(node, log, configuration, self.drives, stamps, clock)

@@ -201,6 +201,26 @@ def test_a_bus_that_hangs_holds_up_no_stop_of_another(bridge: StartBridge, clien
     ending.join()
 
 
+def test_nor_one_that_is_asked_for_behind_one_of_its_own(bridge: StartBridge,
+                                                         client: Client) -> None:
+    """Whoever has both stopped, as ``drive_can stop`` does, has that of the other at once."""
+    bus = parameters()['buses']['main']
+    one = run(bridge, client, parameters(buses={'hung': bus, 'main': dict(bus)}, lift=LIFT,
+                                         conveyor={**CONVEYOR, 'bus': 'hung'}))
+    client.service('/lift/quick_stop', Trigger)
+    client.service('/conveyor/quick_stop', Trigger)
+    with one.record() as recorder, late(one.node.exchanges['hung']):
+        first = client.ask('/conveyor/quick_stop', Trigger)
+        pause(0.02)
+        second = client.ask('/lift/quick_stop', Trigger)
+        pause(0.1)
+        assert not first.done()
+        assert [words[0] for words in last_cycles(recorder)] != [1] * 3
+        wait_until(lambda: first.done() and second.done())
+    assert first.result().message == sentences.bus_hangs('hung')
+    assert second.result().success
+
+
 def test_a_bus_that_hangs_keeps_nobody_else_from_being_served(bridge: StartBridge,
                                                               client: Client) -> None:
     bus = parameters()['buses']['main']
