@@ -31,6 +31,8 @@ _DONE = states.BIT_12 | states.TARGET_REACHED
 _STILL = 0.1
 #: likewise where it says otherwise, which may be noise: so much of control_timeout
 _STILL_ANYWAY = 0.5
+#: periods that it takes at least to be seen standing: bit 4 falls, then four samples
+_LATCHING_PERIODS = 5
 #: s until a mode that the drive did not take is written again
 _WRITE_AGAIN = 1.0
 
@@ -167,8 +169,9 @@ class Homing:
 
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
-        self._failure = failure
-        self._deadline = self._now + self._session.configuration.control_timeout
+        drive, self._failure = self._session.configuration, failure
+        self._deadline = self._now + max(
+            drive.control_timeout, _LATCHING_PERIODS * drive.period)
         self._rules.homing_bits = 0
         self._stay, self._looking, self._no_velocity = [], False, False
         self._go(Step.LATCHING)

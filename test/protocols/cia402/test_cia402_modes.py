@@ -543,6 +543,19 @@ class TestHomingThatEndsOnTheWay:
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
 
 
+@pytest.mark.parametrize('period', [0.6, 1.0])
+def test_an_axis_is_given_samples_enough_to_be_seen_standing(period: float) -> None:
+    axis = Axis('pp', homing=True, period=period, heartbeat_timeout=0.0)
+    drive = axis.drive = PositionDrive(5, OBJECTS)
+    axis.start()
+    axis.live(6 * period)
+    assert axis.asks(ControlAction.ENABLE, 7 * period) == [('enable', True, 'operation enabled')]
+    drive.homing = -2
+    assert home(axis, 12 * period) == [('home', False, says('homing_failed'))]
+    assert drive.state == drive.ENABLED
+    assert drive.number(0x6060) == 1
+
+
 class Creeps(PositionDrive):
     """
     Of few steps: it goes one each four SYNCs behind an error in homing, and 606Ch says so.
