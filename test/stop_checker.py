@@ -9,7 +9,8 @@ from their motors, by these rules:
 
 1. What runs and is not wanted any more has stopped, 3 s after the drive can be talked to again.
 2. A stop that has ended without the word that the drive may still be running has stopped it.
-3. A stop that was answered with success has stopped it.
+3. A stop that was answered with success has stopped it; but for 11 bits without a control word
+   where a write is lost and no round with it: nobody can see that until it is written again.
 4. Nothing begins to run, or is given a setpoint, without an enable and a command of a user who
    meant it: later than the last loss, stall, stop, restart or end.
 5. A drive that runs when its bus is lost is said to run, perhaps.
@@ -285,6 +286,30 @@ class Partner:
     events: list[Any] = field(default_factory=list)
 
 
+@dataclass
+class Unheard:
+    """
+    Writes with 11 bits, which nobody acknowledges, that a drive did not hear.
+
+    :ivar forever: it has answered a round since as if it had heard them.
+    """
+
+    write: bool = False
+    read: bool = False
+    forever: bool = False
+
+    def goes(self, sent: Frame, *, lost: bool) -> None:
+        """Take a frame."""
+        writes = sent.data[0] == 6
+        if lost:
+            self.write, self.read = self.write or writes, self.read or not writes
+        elif writes:
+            self.write = self.forever = False
+        else:
+            self.forever = self.forever or self.write and not self.read
+            self.write = self.read = False
+
+
 class World:
     """
     Sessions of a kind, their drives, their users and their bus.
@@ -311,6 +336,7 @@ class World:
         self.coming: list[tuple[float, int, int, Frame]] = []
         self.number = count()
         self.looked_at = -math.inf
+        self.unheard = Unheard()
         self.enabling = False   # a call that nobody has answered yet
         self.commanded_at = self.zero_at = -math.inf
         self.publish_at = math.inf
@@ -337,6 +363,8 @@ class World:
                 self.told(partner, event)
 
     def hear(self, sent: Frame) -> None:
+        if isinstance(self.partners[0].device, StandardDrive) and not self.control:
+            self.unheard.goes(sent, lost=self.deaf)
         if self.deaf:
             return
         for partner in self.partners:
@@ -362,7 +390,8 @@ class World:
                 self.now >= self.looked_at):
             for each in self.partners:
                 if self.driven(each) and not (
-                        each.wanted or each.left_over or self.now <= each.unseen_until):
+                        each.wanted or each.left_over or self.now <= each.unseen_until
+                        or self.unheard.forever):
                     raise Violation(f'drive {each.index + 1} runs, and was said to stand')
 
     def live(self, seconds: float) -> None:
