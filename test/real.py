@@ -7,12 +7,10 @@ what DDS does, signals, buses of the kernel, threads that wait for a time of thi
 Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
 say so; otherwise the test has the mark ``real``. They run one after the other: in ``make test``
 those of :data:`CHOSEN`, each executable and each fact about the machine once; in ``.ci/run`` the
-others, too, which have the mark ``ci``. As a program (``real.py [all]``) it prints the files of
-those of ``make test``, or of all.
+others, too, which have the mark ``ci``. As a program it prints the files of all.
 """
 
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -92,4 +90,4 @@ def files(everything: bool) -> list[str]:
 
 
 if __name__ == '__main__':
-    print(*files('all' in sys.argv[1:]), sep='\n')
+    print(*files(everything=True), sep='\n')

@@ -4,8 +4,9 @@ Runs tests in several processes side by side.
 
 usage: side_by_side.py [-n PROCESSES] [ARGUMENT...]
 
-The arguments go to pytest. Without any, the tests are those of ``make test``: what knows no wall
-clock in a process for each core, and beside these, one after the other, the real stories of
+The arguments go to pytest, which leaves out what needs more than a checkout unless they have a
+``-m`` of their own. Without any, the tests are those of ``make test``: what knows no wall clock in
+a process for each core, and beside these, one after the other, the real stories of
 :data:`real.CHOSEN`. Those wait most of the time; the others take what they leave of the cores, and
 have a little less right to them. (Not much less: beside others who compute they would never end.)
 
@@ -116,7 +117,7 @@ def main() -> int:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     if words:
-        return _run([(words, 0)] * processes)
+        return _run([(['-m', WANTED, *words], 0)] * processes)
     begun = time.monotonic()
     stories = real.files(everything=False)
     code = _run([(['-m', f'{WANTED} and not real'], 1)] * processes

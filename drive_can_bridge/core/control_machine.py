@@ -161,6 +161,11 @@ class ControlMachine:
         return self._sending in _STOPS
 
     @property
+    def starts(self) -> bool:
+        """The current word starts a drive, or has it run on, or resets its fault."""
+        return not (self.at_rest or self.stopping)
+
+    @property
     def pulsing(self) -> bool:
         """The current word is a pulse: it has to leave again soon."""
         return self._sending is ControlAction.RESET_FAULT
@@ -205,7 +210,7 @@ class ControlMachine:
         if self._sending is ControlAction.DISABLE:
             return self._reports.running_on
         # what the drive does not report at all, it cannot confirm; and a pulse has its own end
-        return self.pending and not self.pulsing and self._table.enabled is not None
+        return self.pending and not self.pulsing and not self.unseen
 
     @property
     def unseen(self) -> bool:

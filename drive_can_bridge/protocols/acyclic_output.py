@@ -208,7 +208,7 @@ class AcyclicOutput:
         """
         control = self._control
         if control is None or not (control.word_due or again) or (
-                control.at_rest or control.stopping or control.pulsing):
+                not control.starts or control.pulsing):
             self._lacking = None
             return False
         if self._lacking is None:

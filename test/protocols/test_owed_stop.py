@@ -222,16 +222,23 @@ def test_an_activation_owes_nothing_of_the_one_before(kind: str) -> None:
     assert worries(partner) == []
 
 
-@pytest.mark.parametrize('kind', KINDS)
-def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
-    """The activation goes on behind it: the drive is told again, and named again at the end."""
+def stopped_for_a_defect(kind: str, *, mute: bool) -> Partner:
+    """Return one that ran, and whose stop for a defect has ended."""
     partner = running(kind)
     session = partner.talk.session
-    partner.mute = True
+    partner.mute = mute
     session.fail(internal_error('KeyError', 'x'), partner.now)
     partner.deliver(partner.talk.sent())
     partner.live(session.longest_stop + 0.5)
     assert session.stopped
+    return partner
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
+    """The activation goes on behind it: the drive is told again, and named again at the end."""
+    partner = stopped_for_a_defect(kind, mute=True)
+    session = partner.talk.session
     assert worries(partner)
     assert session.owed
     session.begin_anew(partner.now)
@@ -246,13 +253,8 @@ def test_a_stop_that_failed_for_a_defect_is_owed_on(kind: str) -> None:
 @pytest.mark.parametrize('kind', KINDS)
 def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) -> None:
     """Also within the second for which it is left alone: it may hear this one."""
-    partner = running(kind)
+    partner = stopped_for_a_defect(kind, mute=True)
     session = partner.talk.session
-    partner.mute = True
-    session.fail(internal_error('KeyError', 'x'), partner.now)
-    partner.deliver(partner.talk.sent())
-    partner.live(session.longest_stop + 0.5)
-    assert session.stopped
     assert session.owed
     partner.mute = False
     partner.talk.events()
@@ -264,12 +266,7 @@ def test_who_is_owed_a_stop_behind_a_defect_is_told_again_by_the_end(kind: str) 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: str) -> None:
-    partner = running(kind)
-    session = partner.talk.session
-    partner.mute = True
-    session.fail(internal_error('KeyError', 'x'), partner.now)
-    partner.deliver(partner.talk.sent())
-    partner.live(session.longest_stop + 0.5)
+    partner = stopped_for_a_defect(kind, mute=True)
     partner.talk.events()
     partner.take()
     ends(partner)
@@ -279,12 +276,8 @@ def test_who_is_owed_a_stop_behind_a_defect_and_deaf_is_named_once_more(kind: st
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_who_is_owed_nothing_behind_a_defect_is_left_alone_by_the_end(kind: str) -> None:
-    partner = running(kind)
+    partner = stopped_for_a_defect(kind, mute=False)
     session = partner.talk.session
-    session.fail(internal_error('KeyError', 'x'), partner.now)
-    partner.deliver(partner.talk.sent())
-    partner.live(session.longest_stop + 0.5)
-    assert session.stopped
     assert not session.owed
     partner.take()
     ends(partner)

@@ -174,7 +174,7 @@ class SetpointWriter:
         self._session.interlock.expire(now)      # nothing is handed out that is too old
         control, slot, output = self._session.control, self._slot, self._output
         stopping = control is not None and control.stopping
-        starts = control is not None and not (control.at_rest or stopping)
+        starts = control is not None and control.starts
         if slot is not None and output.word_due(now) and (
                 stopping or not self._exchange.reading):
             output.failed(slot)
@@ -198,9 +198,8 @@ class SetpointWriter:
     def wants_status(self, now: float) -> bool:
         """Tell whether a word that starts the drive is to be repeated, behind its status."""
         control, slot = self._session.control, self._slot
-        return control is not None and slot is not None and not (
-            control.at_rest or control.stopping or control.pulsing) and (
-                self._output.wants(slot, control.word, now))
+        return control is not None and slot is not None and (
+            control.starts and not control.pulsing and self._output.wants(slot, control.word, now))
 
     def write(self, now: float) -> None:
         """Write one that is due, if there is one, with the value that it has now."""
@@ -234,7 +233,7 @@ class SetpointWriter:
         :return: there was any.
         """
         control, slot = self._session.control, self._slot
-        starts = control is not None and not (control.at_rest or control.stopping)
+        starts = control is not None and control.starts
         doubtful = self._output.doubt(since, but=[slot] if starts else ())
         if doubtful:
             self.write_word(now)
