@@ -2,6 +2,7 @@
 """The pictures of the panel: a demo that runs, seen in a real browser (``.ci/browser``)."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 import re
 import signal
@@ -13,11 +14,20 @@ import time
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / 'test'), str(HERE.parent / 'test' / 'panel')]
 
-#: s that the chart gets to fill
-_CHART = 40.0
-#: file -> address below the panel's, phone or not, s to wait
-VIEWS = {'panel.webp': ('/', False, 3.0), 'panel_drive.webp': ('/drive/lift', False, _CHART),
+#: file -> address below the panel's, phone or not, s to wait: a chart is to fill
+VIEWS = {'panel.webp': ('/', False, 3.0), 'panel_drive.webp': ('/drive/lift', False, 40.0),
          'panel_phone.webp': ('/', True, 3.0)}
+
+
+@dataclass
+class Care:
+    """How much is done for a picture: s to wait at most, and attempts at one without a gap."""
+
+    wait: float = 60.0
+    attempts: int = 3
+
+
+care = Care()
 
 
 def missing() -> str:
@@ -59,7 +69,7 @@ def _take(browser: 'Browser', base: str, token: str, path: Path, address: str,  
     browser.open(f'{base}/{token}')
     browser.shows('lift.*online.*enabled.*turntable.*offline')
     browser.open(f'{base}{address}')
-    time.sleep(patience)
+    time.sleep(min(patience, care.wait))
     browser.picture(path)
     browser.close()
 

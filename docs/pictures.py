@@ -24,6 +24,7 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
 import panel_pictures
+from panel_pictures import care
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -50,7 +51,7 @@ _FONTS = 'Fira Code, DejaVu Sans Mono, Menlo, Consolas, monospace'
 
 def live_view(path: Path, *options: str) -> None:
     """Draw the live view of a demo whose drives move."""
-    for _ in range(3):
+    for _ in range(care.attempts):
         demo = subprocess.Popen(
             [sys.executable, '-m', 'drive_can_bridge.cli.main', 'demo', '--drive',
              '--params-file', str(HERE.parent / 'config' / 'demo.yaml'), *options],
@@ -63,8 +64,8 @@ def live_view(path: Path, *options: str) -> None:
         if undisturbed:
             break
     else:
-        print(f'pictures: {path.name}: exchanges were missed, three times: make it again where '
-              'nothing else runs', file=sys.stderr)
+        print(f'pictures: {path.name}: exchanges were missed: make it again where nothing else '
+              'runs', file=sys.stderr)
     _save(view, path, 'drive_can monitor', SIZE[0], SIZE[1])
 
 
@@ -92,7 +93,7 @@ def _watch(demo: 'subprocess.Popen[bytes]') -> tuple[RenderableType, bool]:
                 for drive in snapshot.drives):
             full_at = None  # on a busy machine one is lost now and then
         elif full_at is None:
-            full_at = now + TREND_SPAN
+            full_at = now + min(TREND_SPAN, care.wait)
         if full_at is not None and (now >= full_at or now > deadline):
             break
         if demo.poll() is not None or now > deadline + TREND_SPAN:
@@ -225,7 +226,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(PICTURES))
     parser.add_argument('--directory', type=Path, default=HERE)
+    parser.add_argument('--soon', action='store_true', help='take what there is after a second: '
+                        'shows that they can be made')
     options = parser.parse_args()
+    if options.soon:
+        care.wait, care.attempts = 1.0, 1
     unknown = [name for name in options.names if name not in PICTURES]
     if unknown:
         parser.error(f'{", ".join(unknown)}: allowed are {", ".join(PICTURES)}')

@@ -19,7 +19,7 @@ a drive; not so in the tests of that, ``configuration/`` and ``profiles/``.
 some of them (``extent.py``), unless DRIVE_CAN_TEST_PROFILE is ``long``, as in CI. How long one
 example takes says how busy the machine is, and is no failure.
 
-*In parallel*: ``side_by_side.py`` starts processes that share the tests. Long ones come first.
+*In parallel*: ``side_by_side.py`` starts processes that share the tests.
 
 *The wall clock.* What runs against it has the mark ``real`` (``real.py`` says what that is, and
 which of them ``make test`` tells): these stories are told one after the other, by a run of their
@@ -67,8 +67,10 @@ import world
 
 #: what a test looks at that is run again
 REPEATED = (SEED, PROFILE, 'DRIVE_CAN_SOAK_SECONDS')
+# thousands of tests come, and nothing of what is loaded meanwhile goes
+gc.disable()
 PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile('ours', PATIENT, max_examples=times(10, 150))
+settings.register_profile('ours', PATIENT, max_examples=times(5, 60))
 settings.load_profile('ours')
 
 DOMAINS = range(10, 90)
@@ -113,10 +115,6 @@ def _domain(in_process: bool) -> str:
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 tell_in_messages()
 
-#: what comes first, because it takes longest
-FIRST = ('test/system/test_system_parameters', 'test/system/test_system_backup',
-         'test/ros/test_ros_contract', 'test/system/test_soak', 'test/panel/', 'test/system/',
-         'test/monitor/test_monitor_attach', 'test/demo/', 'test/ros/')
 #: whose tests read shipped profiles
 READING = ('test/configuration/', 'test/profiles/')
 
@@ -239,16 +237,12 @@ def foreground() -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is real, and let it come first, and then what takes longest."""
+    """Mark what is real, and let it come first, and last what processes share."""
     for item in items:
         real.mark(item)
     # a bench that others share lives to the end of their module, with a clock of its own
-    items.sort(key=lambda item: (item.get_closest_marker('real') is None, _place(item)))
-
-
-def _place(item: pytest.Item) -> int:
-    return next((place for place, start in enumerate(FIRST) if item.nodeid.startswith(start)),
-                len(FIRST))
+    items.sort(key=lambda item: (item.get_closest_marker('real') is None,
+                                 side_by_side.turn(item.nodeid.partition('::')[0])))
 
 
 @pytest.fixture(autouse=True, scope='session')
@@ -269,3 +263,4 @@ def pytest_collection_finish() -> None:
     """Let garbage collection, which tests in ros/ ask for, leave out thousands of tests."""
     gc.collect()
     gc.freeze()
+    gc.enable()

@@ -137,6 +137,13 @@ def nodes_of(path: Path) -> list[ast.AST]:
 
 
 @cache
+def functions_of(path: Path) -> list[tuple[int, int]]:
+    """Return the first and the last line of each function in a file."""
+    return [(node.lineno, node.end_lineno or node.lineno) for node in nodes_of(path)
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+
+
+@cache
 def imports_of(path: Path) -> list[Import]:
     """Return the imports of a file; names of modules are complete."""
     return list(_imports_of(path))
@@ -144,12 +151,9 @@ def imports_of(path: Path) -> list[Import]:
 
 def _imports_of(path: Path) -> Iterator[Import]:
     package = ['drive_can_bridge', *path.relative_to(PACKAGE).parent.parts]
-    lazy_nodes: set[ast.AST] = set()
     for node in nodes_of(path):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            lazy_nodes.update(ast.walk(node))
-    for node in nodes_of(path):
-        lazy = node in lazy_nodes
+        lazy = isinstance(node, (ast.Import, ast.ImportFrom)) and any(
+            first <= node.lineno <= last for first, last in functions_of(path))
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield Import(alias.name, node.lineno, lazy)
@@ -361,3 +365,55 @@ def test_whether_a_stop_is_owed_is_asked_of_the_session_only() -> None:
         and (isinstance(node.value, ast.Attribute) and node.value.attr == 'duty'
              or isinstance(node.value, ast.Name) and node.value.id == 'duty')]
     assert not wrong, '\n'.join(wrong)
+
+
+# -- clocks: only the steady one decides when something happens -----------------------------------
+
+#: Who may look at the system clock, or write down a day, and how often.
+ALLOWED = {
+    # everybody else asks this one
+    'clock.py': 1,
+    # no look at the clock: a day and a time as text
+    'trace/files.py': 1,
+    'trace/flight.py': 2,
+    'cli/backup.py': 1,
+    'panel/pages.py': 2,
+    'view/parts.py': 2,
+    'panel/parts.py': 2,
+    'ros/diagnostics.py': 2,
+}
+SYSTEM_CLOCK = {'time', 'time_ns', 'localtime', 'gmtime', 'strftime', 'ctime', 'asctime',
+                'CLOCK_REALTIME', 'datetime'}
+#: who may wait by himself, or ask for a time that nobody injects: processes, descriptors, signals
+OWN_WAYS = {'clock.py', 'process/locks.py', 'process/scheduling.py', 'process/signals.py',
+            'process/standard_outputs.py', 'ros/demo/commander.py',
+            'view/live.py'}
+WAYS = {'monotonic', 'monotonic_ns', 'perf_counter', 'sleep', 'thread_time', 'process_time',
+        'clock_gettime', 'Thread', 'Event', 'Condition', 'Timer', 'Semaphore', 'SimpleQueue',
+        'Queue'}
+
+
+def uses(path: Path, modules: tuple[str, ...], names: set[str]) -> int:
+    """Count the places where a file uses one of these names of these modules."""
+    return sum(isinstance(node, ast.Attribute) and node.attr in names
+               and isinstance(node.value, ast.Name) and node.value.id in modules
+               for node in nodes_of(path))
+
+
+def test_who_looks_at_the_system_clock() -> None:
+    found = {}
+    for path in SOURCES:
+        count = uses(path, ('time', 'datetime'), SYSTEM_CLOCK)
+        for node in nodes_of(path):
+            if isinstance(node, ast.ImportFrom) and node.module in ('time', 'datetime'):
+                count += sum(alias.name in SYSTEM_CLOCK for alias in node.names)
+            elif isinstance(node, ast.Import):
+                count += sum(alias.name == 'datetime' for alias in node.names)
+        if count:
+            found[path.relative_to(PACKAGE).as_posix()] = count
+    assert found == ALLOWED
+
+
+def test_everybody_else_is_handed_a_clock() -> None:
+    assert {path.relative_to(PACKAGE).as_posix() for path in SOURCES
+            if uses(path, ('time', 'threading', 'queue'), WAYS)} == OWN_WAYS

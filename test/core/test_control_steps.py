@@ -71,7 +71,7 @@ def test_each_step_is_needed(step: Step, expected: dict[Story, list[object]],
     changes = [(), *[(step._replace(then=then),) for then in Then if then is not step.then],
                *[(step._replace(when=tuple(seen for seen in step.when if seen is not left)),)
                  for left in step.when]]
-    for change in some(changes, 2):
+    for change in some(changes, 4):
         monkeypatch.setattr(
             control_machine, 'STEPS', (*STEPS[:place], *change, *STEPS[place + 1:]))
         assert any(live(story) != words for story, words in expected.items()), change

@@ -210,7 +210,7 @@ def raising(times: float, then: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize(('kind', 'place', 'times'), some(product(
-    KINDS, [*LISTENER, *STEPS], [1, float('inf')]), 3))
+    KINDS, [*LISTENER, *STEPS], [1, float('inf')]), 7))
 def test_a_defect_stops_one_drive_and_disturbs_no_other(
         kind: str, place: str, times: float, monkeypatch: pytest.MonkeyPatch) -> None:
     world = World(kind)
@@ -248,7 +248,7 @@ def test_a_defect_stops_one_drive_and_disturbs_no_other(
 
 
 @pytest.mark.parametrize(('kind', 'place', 'mute'), some(product(
-    KINDS, LISTENER, [False, True]), 3))
+    KINDS, LISTENER, [False, True]), 5))
 def test_a_listener_that_raises_costs_no_stop_frame(
         kind: str, place: str, mute: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """The stop of the end goes out whole, and to its end, whoever hears it."""

@@ -48,7 +48,7 @@ def run(content: bytes, suffix: str, *options: str) -> None:
 
 
 @given(TABLES)
-@settings(deadline=None, max_examples=times(60, 300))
+@settings(deadline=None, max_examples=times(30, 300))
 @example('Nr;Name;Min;Max\n1;a;1e300;-1e300')
 @example('Nr;Typ;Scale;Offset\n1;int32;1e15;1e15')
 @example('Nr;Name;Scale\n1;a;0.0000000000001')
@@ -76,7 +76,7 @@ def test_any_bytes(content: bytes) -> None:
                      'DefaultValue=6', 'Unit=%', '[2001]', 'NrOfEntries=%d', '[DummyUsage]',
                      'Dummy0001=1', '[Comments]', 'Lines=x']),
     st.text(max_size=15)), max_size=25))
-@settings(deadline=None, max_examples=times(60, 300))
+@settings(deadline=None, max_examples=times(30, 300))
 @example(['[2000]', 'ParameterName=a', 'DataType=3', 'AccessType=rw', 'Factor=nan'])
 @example(['[2000]', 'ParameterName=a', 'DataType=3', 'AccessType=rw', 'Factor=1e999',
           'LowLimit=1'])

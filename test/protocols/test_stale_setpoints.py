@@ -62,7 +62,7 @@ class Bus:
 @pytest.mark.parametrize('seconds', [0.25, 0.5, 0.9])
 @pytest.mark.parametrize('protocol', PARTNERS)
 def test_nothing_stale_after_a_stall(protocol: str, seconds: float) -> None:
-    for step in some(range(60), 3):
+    for step in some(range(60), 7):
         partner = PARTNERS[protocol](command_timeout=TIMEOUT, refresh_interval=0.3) if (
             protocol in ('canopen_pkw', 'datamodel_standard')) else PARTNERS[protocol](
             command_timeout=TIMEOUT)

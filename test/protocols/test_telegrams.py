@@ -431,7 +431,7 @@ def test_every_change_is_seen(module: ModuleType, names: set[str],
     tree = ast.parse(Path(module.__file__ or '').read_text(encoding='utf-8'))
     survivors, everything = [], [*changes(tree, names)]
     assert len(everything) > 50
-    for what, node, field, value in some(everything, 3):
+    for what, node, field, value in some(everything, 12):
         before = getattr(node, field)
         setattr(node, field, value)
         changed = ModuleType('changed')

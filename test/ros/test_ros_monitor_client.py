@@ -97,7 +97,7 @@ def test_hundreds_of_drives_are_got_to_know_a_few_at_a_time(
 
 
 def test_a_bridge_that_tells_seldom_is_not_silent(bridge: StartBridge, client: Client) -> None:
-    bridge({**parameters(lift={**LIFT, 'period': 0.1}), 'diagnostics_period': 10.0}).online()
+    bridge({**parameters(lift={**LIFT, 'period': 0.5}), 'diagnostics_period': 10.0}).online()
     looking = Looking()
 
     def silent(seconds: float) -> set[bool]:

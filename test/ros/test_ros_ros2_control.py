@@ -136,7 +136,7 @@ class Arm:
 
     def travel(self, goal: dict[str, float]) -> None:
         """Go there, and wait until the controller says that it succeeded."""
-        self.go_until(goal, lambda: self.controller.result == 'succeeded')
+        self.go_until(goal, lambda: self.controller.result == 'succeeded', 1.2)
         wait_until(lambda: all(abs(self.steps(name) - wanted(goal, name)) <= 1 for name in AXES),
                    what='the goal')
 
@@ -290,7 +290,7 @@ def test_fault_reset_and_enable_again(arm: Arm) -> None:
 
 @pytest.mark.parametrize(('fault', 'arm'), some([
     ('silent', MECHANICS), ('silent', EXACT),
-    ('power_cut=1.5', EXACT), ('power_cut=1.5', MECHANICS)], 2), indirect=['arm'])
+    ('power_cut=1.5', EXACT), ('power_cut=1.5', MECHANICS)], 4), indirect=['arm'])
 def test_lost_drive(arm: Arm, fault: str, request: pytest.FixtureRequest) -> None:
     """Silent, or without power for a while: it is where it was, or where it was left."""
     moved(arm)

@@ -205,7 +205,7 @@ def monitor() -> None:
     """Look for a while, as ``drive_can monitor`` does."""
     from drive_can_bridge.ros.monitor.client import MonitorClient
     source = MonitorClient(Model())
-    for _ in range(50):
+    for _ in range(20):
         source.poll(waiting.clock().now())
         waiting.pause(0.1)
     source.close()
@@ -217,7 +217,7 @@ def panel() -> None:
     from drive_can_bridge.ros.monitor.client import Operations
     source = MonitorClient(Model())
     operations = Operations(source.node)
-    for _ in range(50):
+    for _ in range(20):
         source.poll(waiting.clock().now())
         operations.poll({'/lift': Stop, '/conveyor': [Stop.QUICK_STOP]}, waiting.clock().now())
         waiting.pause(0.1)

@@ -274,7 +274,7 @@ def happens(cable: Cable, what: str) -> None:
     cable._collect()
 
 
-@settings(max_examples=times(8, 25), deadline=None)
+@settings(max_examples=times(4, 25), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(ANYTHING), st.sampled_from((0.0, 0.013, 0.1, 0.7, 3.0))),
                 max_size=12), st.sampled_from(('csp', 'ip', 'pp')))
 def test_whatever_happens_no_axis_moves_by_our_doing_and_none_is_left_enabled(
@@ -301,7 +301,7 @@ def test_whatever_happens_no_axis_moves_by_our_doing_and_none_is_left_enabled(
     assert not drive.plant.operation.enabled
 
 
-@settings(max_examples=times(8, 25), deadline=None)
+@settings(max_examples=times(4, 25), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from((*ANYTHING, 'neutral', 'fast', 'back')),
                           st.sampled_from((0.0, 0.013, 0.1, 0.4, 2.0))), max_size=12),
        st.sampled_from(('csv', 'pv', 'vl')), st.sampled_from(('end', 'kill')))
