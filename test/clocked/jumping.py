@@ -19,6 +19,8 @@ from typing import Any
 
 #: when stories begin: s of the steady clock, and ns since 1970 at its 0
 BEGIN, EPOCH = 1000.0, 1_700_000_000_000_000_000
+#: s between two looks at what a story waits for: in which something happens, and at most
+LOOK, SELDOM = 0.001, 0.02
 #: turns without time that nobody needs who does not go round in circles
 TURNS_MAX = 100_000
 #: s of real time after which a thread does not only compute, but hangs
@@ -232,15 +234,15 @@ class JumpingClock:
         """Let time pass in which nobody runs."""
         self._time += seconds
 
-    def until(self, condition: Callable[[], Any], what: str = '', limit: float = 60.0,
-              look: float = 0.001) -> Any:
+    def until(self, condition: Callable[[], Any], what: str = '', limit: float = 60.0) -> Any:
         """Let time pass until a condition holds; return what it returned."""
         end = self._time + limit
         while not (found := condition()):
             self.check()
             if self._time >= end:
                 raise AssertionError(f'{limit:g} s went by without {what or condition}')
-            self.wait(self._time + look)
+            coming = self._coming[0][0] if self._coming else math.inf
+            self.wait(self._time + max(LOOK, min(SELDOM, coming - self._time)))
         return found
 
     def check(self) -> None:

@@ -106,13 +106,15 @@ class Browser:
         self._done(clicked, f'{text} to be clicked')
 
     def _done(self, action: Callable[[], bool], what: str) -> None:
-        """Wait until something could be done, with elements that may be drawn anew meanwhile."""
-        from selenium.common.exceptions import StaleElementReferenceException
+        """Wait until it could be done, with elements that may be drawn, or move, meanwhile."""
+        from selenium.common import exceptions
 
         def done() -> bool:
             try:
                 return action()
-            except StaleElementReferenceException:
+            except (exceptions.StaleElementReferenceException,
+                    exceptions.ElementNotInteractableException,
+                    exceptions.ElementClickInterceptedException):
                 return False
         wait_for(done, what)
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import struct
 import threading
-import time
 from typing import Any
 
 from bridges import Bridge, LIFT, parameters, StartBridge
@@ -87,9 +86,9 @@ def _call_until(caller: Any, kind: Any, condition: Callable[[], Any]) -> None:
 
     def look() -> Any:
         nonlocal due
-        if time.monotonic() >= due:
+        if clock().now() >= due:
             caller.call_async(kind.Request())
-            due = time.monotonic() + AGAIN
+            due = clock().now() + AGAIN
         return condition()
     wait_until(look, what=f'{caller.srv_name} to be called')
 

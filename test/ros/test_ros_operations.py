@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import time
 from typing import Any
 
 from clients import Client, wait_until
@@ -13,6 +12,7 @@ from rcl_interfaces.srv import GetParameterTypes, SetParameters
 import rclpy
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
+from waiting import clock
 
 from drive_can_bridge.core.sentences import (
     may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, together,
@@ -73,7 +73,7 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
     shy, told, later = Shy(client, known_after=3), list[Outcome](), 0.0
 
     def now() -> float:
-        return time.monotonic() + later
+        return clock().now() + later
 
     def write(value: float) -> Outcome:
         operations.write('/lift', 'ramp_time', value, told.append, now())
@@ -105,7 +105,7 @@ def test_a_write_that_was_sent_and_not_answered_may_have_been_done(client: Clien
     shy, told = Shy(client, known_after=1, ends=True), list[Outcome]()
     try:
         with asking(client) as operations:
-            now = time.monotonic()
+            now = clock().now()
             operations.write('/lift', 'ramp_time', 1.5, told.append, now)
             wait_until(lambda: operations.poll({}, now) and shy.writes, what='a write')
             assert not operations.poll({}, now + PARAMETER_TIMEOUT)
