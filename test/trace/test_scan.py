@@ -3,10 +3,12 @@
 
 from dataclasses import replace
 import json
+import os
 from pathlib import Path
 from random import Random
 
 from asked_bus import AskedBus, drive_can, takes_nothing
+from extent import SEED
 from foreign_devices import (
     cannord, canopen, CROWD as CROWD_OF_ALL, datamodel_extended, datamodel_standard, Device,
 )
@@ -179,6 +181,42 @@ def test_noise_makes_no_drive() -> None:
     for place in range(3000):
         scanner.hear(Frame(noise.getrandbits(29), noise.randbytes(8), True), place / 2000)
     assert not scanner.sightings
+
+
+#: what masters and drives of every family say, conversations by others included
+SAID_ON_BUSES = [
+    '705#05', '704#00', '000#0105', '605#4000100000000000', '585#4300100092010200',
+    '585#4300100000000000', '585#8000100000000206', '605#4018100100000000',
+    *(f'585#431810{place}05550000' for place in ('00', '01', '02', '03')),
+    '585#431810010555', '605#4003160100000000', '585#4303160120010030', '585#8003160100000206',
+    '585#4303140105050000', '585#4303140105020000', '505#C701002500000000',
+    '485#C701002583200000', '0C8#7F040020', '0C9#370F0020', '2C8#6610000000000000',
+    '2C9#6610000000006700', '3F2#031E000100000000', '7F2#0000000000000000',
+    '004007A4#0000000000000000', '104007A4#0032003300000000', '004007E4#0000000000000000',
+    '104007E4#00D300D100000000', '104007A4#FFFF003200320000', '003FFFF0#0000000000000000',
+    ANSWER_1]
+
+
+@pytest.mark.parametrize('place', range(10))
+def test_whatever_others_say_in_whatever_order_a_file_can_be_written(
+        place: int, tmp_path: Path) -> None:
+    choose = Random(int(os.environ[SEED]) + place)
+    cycle = [frame_of(text) for text in ('205#0F0000000000', '080#', '185#371200000000')]
+    said = [*map(frame_of, SAID_ON_BUSES), *cycle]
+    scanners = {protocol: FAMILIES[protocol].make_scanner() for protocol in FAMILIES}
+    for turn in range(100):
+        frames = choose.choice((cycle * 3, choose.sample(said, 2), [choose.choice(said)]))
+        for frame, scanner in ((frame, each) for frame in frames for each in scanners.values()):
+            scanner.hear(frame, 0.01 * turn)
+            question = scanner.take_question()
+            if question is not None:
+                scanner.asked(question, 0.01 * turn)
+        seen = [each for scanner in scanners.values() for each in scanner.sightings.values()]
+    nodes = {node for scanner in scanners.values() for node in scanner.nodes}
+    output = tmp_path / 'found.yaml'
+    write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', BITRATE), seen, [
+        scanners[each.protocol].settings(each.station) for each in seen], nodes)
+    assert drive_can('validate', output) == 0
 
 
 def test_one_frame_before_all_stations_are_asked_makes_no_drive() -> None:

@@ -99,10 +99,13 @@ def bridge(directory: Path, file: Path, simulation: Simulation) -> Iterator[Runn
     """Run a bridge with a file, all of whose drives come online and answer."""
     pytest.importorskip('rclpy')
     # what is written is for machines that keep it
-    file.write_text(re.sub(
+    text = re.sub(
         'period: ([0-9.]+)', lambda match: f'period: {float(match[1]) * SLOWNESS:g}\n'
-        f'        parameter_timeout: {0.3 * SLOWNESS:g}', file.read_text(encoding='utf-8')),
-        encoding='utf-8')
+        f'        parameter_timeout: {0.3 * SLOWNESS:g}', file.read_text(encoding='utf-8'))
+    heartbeats = ''.join(f'        {key}: {seconds * SLOWNESS:g}\n' for key, seconds in (
+        ('heartbeat_producer', 0.1), ('heartbeat_timeout', 0.35), ('bridge_heartbeat', 0.2)))
+    file.write_text(text.replace('        mode: pv\n', f'        mode: pv\n{heartbeats}'),
+                    encoding='utf-8')
     process = Running(directory / 'bridge', 'drive_can_bridge', '--ros-args', '--params-file',
                       str(file))
     try:

@@ -117,7 +117,9 @@ class Cia402Scanner(Scanner):
                 self._ask_identity(node)
         elif index == sdo.IDENTITY and subindex in _IDENTITY and value is not None:
             self._identities.setdefault(node, {})[_IDENTITY[subindex]] = f'{value:X}h'
-            if node in self.sightings:
+            # one that only looks like a drive of CiA 402 has not said so in 1000h
+            if node in self.sightings and (
+                    self.sightings[node].certainty is Certainty.CERTAIN):
                 self._tell(node)
 
     def _tell(self, node: int) -> None:
