@@ -2,22 +2,20 @@
 """
 Controllers of the kernel that report errors, go bus-off, and get nothing onto the bus.
 
-Needs root and the kernel's slcan driver, as the emulated kernel has them (.ci/socketcan/run); what
-is on emulated controllers with a bit rate runs where DRIVE_CAN_CONTROLLERS names two of them.
+Needs root and the kernel's slcan driver, as the kernels of .ci/socketcan/run have them.
 """
 
 from collections.abc import Iterator
-import os
 from pathlib import Path
 import re
 
-from kernel_adapter import ip, KernelAdapter
+from kernel_adapter import KernelAdapter
 from parameter_files import bridge_file, CONVEYOR
 from processes import Client, Processes
 import pytest
 from repeating import again_and_again
 from slcan_peer import NEUTRAL_WORDS, ZEROS
-from test_system_reconnection import rearm_and_move, start_moving, status_of
+from test_system_reconnection import status_of
 from waiting import SLOWNESS, wait_for, wait_for_end
 
 from drive_can_bridge.cli.main import main as drive_can
@@ -31,7 +29,6 @@ PERIOD = 0.1
 #: what is lost here is a bus, and not answers that a slow machine gives late
 DRIVES = {'conveyor': {**CONVEYOR, 'period': PERIOD, 'mapping': 'assume', 'missed_limit': 100,
                        'parameter_timeout': SLOWNESS, 'command_timeout': 5.0 * SLOWNESS}}
-CONTROLLERS = os.environ.get('DRIVE_CAN_CONTROLLERS', '').split()
 
 pytestmark = pytest.mark.socketcan
 
@@ -145,28 +142,3 @@ def test_a_scan_says_what_is_wrong_with_the_bus(adapter: KernelAdapter,
         'send: transmit queue full: no other node acknowledges: check power, cable, termination '
         'and bit rate\n')
     adapter.read_again()
-
-
-@pytest.mark.controllers
-@pytest.mark.skipif(len(CONTROLLERS) != 2, reason='DRIVE_CAN_CONTROLLERS names no two controllers')
-def test_two_controllers_on_a_wire(processes: Processes, client: Client, namespace: str,
-                                   tmp_path: Path) -> None:
-    # the bridge at one, the drive at the other; each is an SJA1000 with a bit rate
-    drives = {'conveyor': {**DRIVES['conveyor'], 'mapping': 'verify'}}
-    here, there = CONTROLLERS
-    file = bridge_file(tmp_path, interface='socketcan', channel=here, drives=drives)
-    simulator = processes.simulator(file, '--channel', there, link=False)
-    bridge = processes.bridge(file, namespace)
-    drive = f'/{namespace}/conveyor'
-    bus = f'{namespace}/drive_can_bridge: bus main'
-    start_moving(client, drive)
-    # its own controller is switched off; the drive's is not, and hears nothing any more
-    ip('link', 'set', here, 'down')
-    client.online(drive, wanted=False)
-    bridge.error(r'bus main: .*Network is down.*tried again every 0\.2 s')
-    assert client.diagnostics(bus, state='^down$')['level'] == '2'
-    count = len(simulator.frames())
-    ip('link', 'set', here, 'up')
-    rearm_and_move(client, drive, bridge, simulator, count)
-    assert client.diagnostics(bus, state='^up$')['error_frames'] == '0'
-    assert bridge.end() == 0
