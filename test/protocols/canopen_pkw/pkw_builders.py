@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Registers, frames and conversations of node 5, in candump's notation."""
 
+from collections.abc import Callable
 from typing import Any
 
 from builders import Conversation, drive, INT32, parameter, RAM, RO, WO
@@ -61,8 +62,6 @@ DISABLE_0 = '505#C002002A00000000'
 DISABLE_1 = '505#C00200AA00000000'
 DISABLED_0 = '485#C002002A00000000'
 DISABLED_1 = '485#C00200AA00000000'
-
-
 #: 704 = 1
 ENABLE_0 = '505#C002002A01000000'
 ENABLE_1 = '505#C00200AA01000000'
@@ -113,10 +112,7 @@ def online(**options: Any) -> Conversation:
     assert talk.hears(IDLE_ANSWER, begin + 0.001) == [READ_1]
     sent = talk.hears(ANSWER_1, begin + 0.002)
     assert talk.session.online
-    while sent:  # disable, neutral setpoints
-        text, = sent
-        assert text[12:] == '00000000'
-        sent = talk.hears(text.replace('505#', '485#'), begin + 0.003)
+    assert {text[12:] for text in answered(talk, sent, begin + 0.003)} <= {'00000000'}
     talk.events()
     return talk
 
@@ -148,28 +144,42 @@ def echo(text: str, status: str = 'C320') -> str:
     return f'{reply[:12]}{status}0000' if text[10:12] in ('26', 'A6') else reply[:12] + '00000000'
 
 
+def denied(text: str, code: str = '22000008') -> str:
+    """Return how the device refuses a request: 0800 0022h, not in its present state."""
+    return f'485#{text[4:10]}{"CE" if text[10] in "8A" else "4E"}{code}'
+
+
+def answered(talk: Conversation, sent: list[str], now: float, status: str = '4100') -> list[str]:
+    """Let the device answer from ``now`` on until nothing more is sent; return what was sent."""
+    found = []
+    while sent:
+        text, = sent
+        found.append(text)
+        sent = talk.hears(echo(text, status), now)
+        now += 0.0005
+    return found
+
+
+def commanding(talk: Conversation, index: int, value: float) -> Callable[[float], list[str]]:
+    """Return a step of a timeline: a command."""
+    def step(now: float) -> list[str]:
+        talk.commands(index, value, now)
+        return []
+    return step
+
+
 def driven(request: tuple[Parameter, ...] = (SPEED,), **options: Any) -> Conversation:
     """Return a drive that was enabled and runs at 10 Hz; the next round is due at 10.13 s."""
     options.setdefault('control', CONTROL)
     talk = online(request=request, **options)
-    first, = talk.at(10.07)
-    assert talk.hears(echo(first, '4100'), 10.071) == []
-    asked = talk.asks(ControlAction.ENABLE, 10.075)
-    for _ in request:   # neutral first
-        text, = asked
-        assert text[12:] == '00000000'
-        asked = talk.hears(echo(text), 10.0755)
-    enable, = asked
-    assert enable in ('505#C002002A01000000', '505#C00200AA01000000')
-    assert talk.hears(echo(enable), 10.076) == []
-    text, = talk.at(10.09)
-    assert talk.hears(echo(text), 10.091) == []
+    answered(talk, talk.at(10.07), 10.071)
+    *neutral, enable = answered(talk, talk.asks(ControlAction.ENABLE, 10.075), 10.0755)
+    assert [text[12:] for text in neutral] == ['00000000'] * len(request)
+    assert enable in (ENABLE_0, ENABLE_1)
+    answered(talk, talk.at(10.09), 10.091, 'C320')
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.commands(0, 0.0, 10.095) is CommandOutcome.ARMED
     assert talk.commands(0, 10.0, 10.095) is CommandOutcome.ACCEPTED
-    text, = talk.at(10.11)
-    assert text in (SPEED_0, SPEED_1)
-    text, = talk.hears(echo(text), 10.111)
-    assert talk.hears(echo(text), 10.112) == []
+    assert answered(talk, talk.at(10.11), 10.111, 'C320')[0] in (SPEED_0, SPEED_1)
     talk.events()
     return talk

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from builders import Conversation, read, write
 from pkw_builders import (
-    CLASS, DISABLE_0, DISABLE_1, driven, echo, FLC, online, running, SPEED, SPEED_1, STILL_0,
-    STILL_1, TORQUE,
+    CLASS, denied, DISABLE_0, DISABLE_1, driven, echo, FLC, online, running, SPEED, SPEED_1,
+    STILL_0, STILL_1, TORQUE,
 )
 import pytest
 from saying import says
@@ -58,32 +58,28 @@ def swapping(every: float, delay: float) -> Timeline:
     return drive
 
 
-def lost_when_deaf(drive: Timeline) -> bool:
-    """Tell whether a drive is lost, once, that answers nothing any more."""
-    drive.live(12.0)
-    drive.answer = deaf
-    drive.live(40.0)
-    return len(drive.talk.events(StationLost)) == 1
-
-
-@pytest.mark.parametrize('every', [0.02, 0.1, 0.2])
-@pytest.mark.parametrize('delay', [0.002, 0.01, 0.02, 0.06])
-def test_a_deaf_drive_is_lost(every: float, delay: float) -> None:
-    assert lost_when_deaf(swapping(every, delay))
-
-
-def expiring(every: float, delay: float) -> Timeline:
+def expiring(every: float, delay: float, timeout: float = 0.01) -> Timeline:
     """Return the same, with commands that are too old after 10 ms; any value arms."""
     drive = swapping(every, delay)
-    drive.talk.session.setpoints.timeout = 0.01
+    drive.talk.session.setpoints.timeout = timeout
     drive.talk.session.setpoints.rearm_immediate = True
     return drive
 
 
-@pytest.mark.parametrize(('delay', 'every'), [
-    (0.01, 0.02), (0.06, 0.02), (0.02, 0.05), (0.002, 0.08)])
-def test_a_deaf_drive_whose_setpoints_expire_is_lost(delay: float, every: float) -> None:
-    assert lost_when_deaf(expiring(every, delay))
+BEGIN = pytest.mark.parametrize('begin', [swapping, expiring])
+Begin = Callable[[float, float], Timeline]
+
+
+@BEGIN
+@pytest.mark.parametrize(('every', 'delay'), [
+    (0.02, 0.002), (0.02, 0.01), (0.02, 0.06), (0.05, 0.02), (0.08, 0.002), (0.1, 0.01),
+    (0.1, 0.06), (0.2, 0.02), (0.2, 0.06)])
+def test_a_deaf_drive_is_lost(every: float, delay: float, begin: Begin) -> None:
+    drive = begin(every, delay)
+    drive.live(12.0)
+    drive.answer = deaf
+    drive.live(40.0)
+    assert len(drive.talk.events(StationLost)) == 1
 
 
 @pytest.mark.parametrize('every', [0.1, 0.2, 0.4])
@@ -97,9 +93,8 @@ def test_a_drive_that_answers_no_reads_is_lost(every: float) -> None:
 @pytest.mark.parametrize(('delay', 'every'), [
     (0.01, 0.02), (0.03, 0.02), (0.06, 0.08), (0.06, 0.1), (0.06, 0.12), (0.06, 0.15),
     (0.1, 0.02)])
-@pytest.mark.parametrize('begin', [swapping, expiring])
-def test_rounds_and_users_have_their_turn(
-        delay: float, every: float, begin: Callable[[float, float], Timeline]) -> None:
+@BEGIN
+def test_rounds_and_users_have_their_turn(delay: float, every: float, begin: Begin) -> None:
     drive = begin(every, delay)
     drive.live(12.0)
     drive.talk.events()
@@ -110,20 +105,13 @@ def test_rounds_and_users_have_their_turn(
     assert any(isinstance(event, RequestCompleted) for event in events)
 
 
-@pytest.mark.parametrize(('delay', 'every'), [(0.06, 0.05), (0.2, 0.05), (0.08, 0.05)])
-def test_a_drive_that_answers_everything_goes_on(delay: float, every: float) -> None:
+@pytest.mark.parametrize(('delay', 'every', 'timeout'), [
+    (0.06, 0.05, 0.0), (0.2, 0.05, 0.0), (0.08, 0.05, 0.0),
+    (0.1, 0.08, 0.06)])     # what had to make room has as long as a slow device may take
+def test_a_drive_that_answers_everything_goes_on(
+        delay: float, every: float, timeout: float) -> None:
     """It answers in time (0.5 s), if not to the first attempts at neutral, of 50 ms each."""
-    drive = swapping(every, delay)
-    drive.live(20.0)
-    assert [note.text for note in drive.talk.events(Noted) if note.warning] == []
-    assert operating(drive.talk)
-
-
-def test_one_whose_setpoints_expire_goes_on_as_well() -> None:
-    """What had to make room was not waited for as long as a slow device may take."""
-    drive = swapping(0.08, 0.1)
-    drive.talk.session.setpoints.timeout = 0.06
-    drive.talk.session.setpoints.rearm_immediate = True
+    drive = expiring(every, delay, timeout) if timeout else swapping(every, delay)
     drive.live(20.0)
     assert [note.text for note in drive.talk.events(Noted) if note.warning] == []
     assert operating(drive.talk)
@@ -148,32 +136,17 @@ def test_a_users_write_is_answered_although_a_setpoint_passes_zero() -> None:
 # -- what was refused -----------------------------------------------------------------------------
 
 
-def out_of_range(text: str) -> str:
-    """Return the refusal of a write: 06090030h."""
-    function = '4E' if text[10] == '2' else 'CE'
-    return f'485#{text[4:10]}{function}00000602'
-
-
-def test_a_refused_setpoint_is_no_refused_neutral() -> None:
-    """20 Hz is refused; meanwhile somebody commands 0, which the drive would take."""
+@pytest.mark.parametrize(('refused', 'meanwhile'), [(20.0, 0.0), (0.0, 10.0)])
+def test_a_refused_neutral_disables_and_no_other_setpoint(
+        refused: float, meanwhile: float) -> None:
+    """Whatever is commanded before the refusal comes: 0 instead of 20 Hz the drive would take."""
     talk = driven()
-    talk.commands(0, 20.0, 10.125)
+    talk.commands(0, refused, 10.125)
     text, = talk.at(10.13)
-    assert text[12:16] == 'C800', '20 Hz'
-    talk.commands(0, 0.0, 10.131)
-    talk.hears(out_of_range(text), 10.132)
-    assert operating(talk), talk.events()
-
-
-def test_a_refused_neutral_disables_whatever_is_commanded_meanwhile() -> None:
-    talk = driven()
-    talk.commands(0, 0.0, 10.125)
-    text, = talk.at(10.13)
-    assert text[4:10] == 'C60200'
-    assert text[12:] == '00000000'
-    talk.commands(0, 10.0, 10.131)
-    talk.hears(out_of_range(text), 10.132)
-    assert not operating(talk)
+    assert text[4:10] + text[12:16] == 'C60200' + ('C800' if refused else '0000')
+    talk.commands(0, meanwhile, 10.131)
+    talk.hears(denied(text, '00000602'), 10.132)
+    assert operating(talk) is (refused != 0.0), talk.events()
 
 
 # -- a bus that takes nothing ---------------------------------------------------------------------

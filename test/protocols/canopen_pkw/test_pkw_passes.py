@@ -5,7 +5,7 @@ from functools import partial
 
 from builders import Conversation, frame
 from literal_drives import PkwNode
-from pkw_builders import configuration, CONTROL, SPEED, TORQUE
+from pkw_builders import commanding, configuration, CONTROL, SPEED, TORQUE
 import pytest
 from timeline import Timeline
 
@@ -52,11 +52,7 @@ class Device:
                  ) -> None:
         for index, value in enumerate((speed, torque)):
             if value is not None:
-                self.line.plan(at, partial(self._command, index, value))
-
-    def _command(self, index: int, value: float, now: float) -> list[str]:
-        self.talk.commands(index, value, now)
-        return []
+                self.line.plan(at, commanding(self.talk, index, value))
 
     def told(self, what: str, value: str, since: float) -> list[float]:
         """Return when a register was given a value."""

@@ -8,7 +8,7 @@ from builders import Conversation, read, write
 from pkw_builders import (
     ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, DISABLE_1, echo, FLC, FLC_2, IDLE,
     IDLE_ANSWER, KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_1, reading, running, SPEED,
-    START, started, STATUS, TABLE,
+    START, STATUS, TABLE,
 )
 import pytest
 from saying import says
@@ -59,7 +59,11 @@ def asked(talk: Conversation, request: Any) -> str:
     (write((FLC, 90), atomic=True), '505#8C02002A5A000000', '485#8C02002A00000000', ['written']),
 ])
 def test_by_register(request_: Any, sent: str, answer: str, outcome: list[object]) -> None:
-    talk = online()
+    check(online(), request_, sent, answer, outcome)
+
+
+def check(talk: Conversation, request_: Any, sent: str, answer: str, outcome: list[object],
+          ) -> None:
     assert asked(talk, request_) == sent
     assert talk.hears(answer, 10.061) == []
     assert talk.outcomes() == [outcome]
@@ -75,10 +79,7 @@ def test_by_register(request_: Any, sent: str, answer: str, outcome: list[object
      ['written', 'written']),
 ])
 def test_by_index(request_: Any, sent: str, answer: str, outcome: list[object]) -> None:
-    talk = online_by_index()
-    assert asked(talk, request_) == sent
-    assert talk.hears(answer, 10.061) == []
-    assert talk.outcomes() == [outcome]
+    check(online_by_index(), request_, sent, answer, outcome)
 
 
 def online_by_index() -> Conversation:
@@ -97,10 +98,8 @@ def online_by_index() -> Conversation:
     ('p0', '505#0000002500000000'), ('p500', '505#F401002500000000'),     # one half of a value
 ])
 def test_raw_names_say_themselves_how_they_go(name: str, sent: str, by_index: bool) -> None:
-    talk = online_by_index() if by_index else online()
-    assert asked(talk, read(raw(name))) == sent
-    talk.hears(sent.replace('505', '485')[:12] + '34120000', 10.061)
-    assert talk.outcomes() == [[0x1234]]
+    check(online_by_index() if by_index else online(), read(raw(name)), sent,
+          sent.replace('505', '485')[:12] + '34120000', [0x1234])
 
 
 def test_raw_writes_are_16_bits() -> None:
@@ -110,14 +109,10 @@ def test_raw_writes_are_16_bits() -> None:
 
 def test_word_order_of_a_parameter_wins() -> None:
     swapped = replace(POSITION, word_order='low_first')
-    talk = online()
-    assert asked(talk, write((swapped, 0x12345678))) == '505#D002002B78563412'
-    talk = online()
-    assert asked(talk, read(swapped)) == '505#D002002600000000'
-    talk.hears('485#D002002678563412', 10.061)
-    assert talk.outcomes() == [[0x12345678]]
-    talk = online(word_order='low_first')
-    assert asked(talk, write((POSITION, 0x12345678))) == '505#D002002B78563412'
+    written = '505#D002002B78563412', '485#D002002B00000000', ['written']
+    check(online(), write((swapped, 0x12345678)), *written)
+    check(online(), read(swapped), '505#D002002600000000', '485#D002002678563412', [0x12345678])
+    check(online(word_order='low_first'), write((POSITION, 0x12345678)), *written)
 
 
 @pytest.mark.parametrize('layout, sent, answer', [
@@ -128,9 +123,7 @@ def test_writes_in_other_layouts(layout: str, sent: str, answer: str) -> None:
     talk, (request,) = reading(layout=layout)
     talk.hears(request.replace('505', '485'), 10.052)
     talk.events()
-    assert asked(talk, write((FLC, 90))) == sent
-    talk.hears(answer, 10.061)
-    assert talk.outcomes() == [['written']]
+    check(talk, write((FLC, 90)), sent, answer, ['written'])
 
 
 @pytest.mark.parametrize('items', [
@@ -186,16 +179,6 @@ def test_refused_pair_is_read_one_by_one() -> None:
     assert talk.outcomes() == [[7, says('refused_by_drive', number=0x06020000)]]
 
 
-def test_lost_answer_of_a_read_is_asked_for_again() -> None:
-    talk = online(parameter_timeout=0.1, period=5.0)
-    assert asked(talk, read(FLC)) == '505#8C02002500000000'
-    assert talk.until(10.17) == [(10.16, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 10.161) == ['505#8C0200A500000000']
-    assert talk.hears('485#8C02002501000000', 10.162) == [], 'the late answer does not fit'
-    talk.hears('485#8C0200A502000000', 10.163)
-    assert talk.outcomes() == [[2]]
-
-
 def test_read_that_nobody_answers_fails() -> None:
     talk = online(parameter_timeout=0.1, period=5.0)
     assert asked(talk, read(FLC, LEVEL)) == '505#D101002500000000'
@@ -212,25 +195,6 @@ def test_lost_answer_of_a_write_is_never_repeated() -> None:
     assert talk.hears(IDLE_ANSWER, 10.161) == ['505#5E0200AA0A000000'], 'the next one'
     talk.hears('485#5E0200AA00000000', 10.162)
     assert talk.outcomes() == [[says('no_answer', timeout=0.1, attempts=1), 'written']]
-
-
-def test_late_acknowledgement_is_not_that_of_the_next_write() -> None:
-    """The device answers others meanwhile, and refuses the next one."""
-    talk = online(parameter_timeout=0.2, period=5.0)
-    assert asked(talk, write((FLC, 44))) == '505#8C02002A2C000000'
-    assert talk.until(10.261) == []
-    assert talk.submits(read(FLC_2), 10.265) == [IDLE]
-    assert talk.hears(IDLE_ANSWER, 10.266) == ['505#8D0200A500000000']
-    assert talk.hears('485#8D0200A53C000000', 10.267) == []
-    # the toggle is that of the one that was given up
-    assert talk.submits(write((FLC, 33)), 10.27) == [IDLE]
-    assert talk.hears(IDLE_ANSWER, 10.271) == ['505#8C0200AA21000000']
-    assert talk.hears('485#8C02002A00000000', 10.4) == []
-    assert talk.hears('485#8C0200CE30000906', 10.46) == []
-    assert talk.outcomes() == [
-        [says('no_answer', timeout=0.2, attempts=1)], [60],
-        [says('refused_by_drive', number=0x06090030)]]
-    assert (talk.session.statistics.late, talk.session.statistics.rejected) == (1, 0)
 
 
 @pytest.mark.parametrize('late', ['485#8C02002A00000000', '485#8C02004E30000906'])
@@ -278,18 +242,6 @@ def test_write_waits_until_the_function_byte_is_known() -> None:
         [says('no_answer', timeout=0.1, attempts=attempts)] for attempts in (1, 2)]
 
 
-def test_offline_drive_is_tried_and_then_given_up() -> None:
-    talk = started(parameter_timeout=0.1)
-    talk.submits(read(FLC, LEVEL, CLASS), 10.01)
-    talk.submits(write((FLC, 1), (CLASS, 2)), 10.01)
-    frames = talk.until(13.5)
-    assert talk.outcomes() == [[says('no_answer_offline')] * number for number in (3, 2)]
-    asked_for = [text[:9] for _, text in frames]
-    assert asked_for.count('505#D1010') == 3
-    assert '505#8C020' not in asked_for
-    assert '505#5E020' not in asked_for
-
-
 # -- restart --------------------------------------------------------------------------------------
 
 
@@ -308,13 +260,6 @@ def test_restart_in_the_middle_of_a_write() -> None:
     talk.hears(ANSWER_1, 10.153)
     assert talk.session.online
     assert talk.submits(write((FLC, 90)), 10.16) == ['505#8C02002A5A000000']
-
-
-def test_request_right_after_a_restart_waits_for_the_node() -> None:
-    talk = online()
-    talk.hears(BOOT_UP, 10.06)
-    assert talk.submits(read(FLC), 10.07) == []
-    assert talk.until(10.1501) == [(10.1, START), (10.15, IDLE)]
 
 
 def test_node_that_is_known_to_be_stopped_gets_no_requests() -> None:

@@ -1,13 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The polled exchange: what is read, what is published, what counts as missed."""
 
-import math
 from typing import Any
 
-from builders import Conversation
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, configuration, CONTROL, CURRENT, IDLE, IDLE_ANSWER, LEVEL, online, RATIO,
-    READ_0, READ_1, reading, START, started, STATUS, STATUS_2,
+    ANSWER_0, ANSWER_1, CONTROL, CURRENT, IDLE, IDLE_ANSWER, LEVEL, online, RATIO, READ_0, READ_1,
+    reading, START, started, STATUS, STATUS_2,
 )
 import pytest
 from saying import says
@@ -16,22 +14,6 @@ from drive_can_bridge.core.events import (
     AnswerLate, DriveState, FrameRejected, Noted, ProcessDataReceived, StationFound, StationLost)
 
 READ_SINGLE_0 = '505#C701002500000000'
-
-
-def test_the_way_to_the_first_sample() -> None:
-    talk = started()
-    assert talk.session.offline_advice == says('looked_for')
-    assert talk.until(10.049) == []
-    assert talk.until(10.05) == [(10.05, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 10.051) == [READ_1]
-    assert talk.hears('485#C70100A641000200', 10.052) == []
-    found, sample = talk.events()
-    assert found == StationFound()
-    assert sample == ProcessDataReceived((0x0041, 0x0002), 10.052)
-    assert talk.session.online
-    assert talk.session.ever_online
-    assert talk.session.offline_advice == ''
-    assert talk.session.state is DriveState.ONLINE
 
 
 def test_rounds_keep_their_beat_and_alternate_the_toggle() -> None:
@@ -142,29 +124,6 @@ def test_three_missed_rounds_make_it_offline_and_one_good_one_online() -> None:
     assert talk.session.online
     assert talk.events(StationFound, ProcessDataReceived) == [
         StationFound(), ProcessDataReceived((0x41, 0), 10.71)]
-
-
-def test_one_good_round_forgives_missed_ones() -> None:
-    talk = online(parameter_timeout=0.1, period=1.0)
-    assert talk.until(12.5) == [(11.05, READ_0), (12.05, IDLE), (12.15, READ_1)]
-    assert talk.until(13.051) == [(13.05, IDLE)]
-    assert talk.hears(IDLE_ANSWER, 13.052) == [READ_0]
-    assert talk.hears(ANSWER_0, 13.053) == []
-    assert talk.until(15.5) == [(14.05, READ_1), (15.05, IDLE), (15.15, READ_0)]
-    assert talk.session.statistics.missed == 4
-    assert talk.session.online
-    talk.until(16.5)
-    assert not talk.session.online
-
-
-def test_nobody_there() -> None:
-    talk = started(parameter_timeout=0.1)
-    sent = talk.until(13.1)
-    assert [now for now, text in sent if text == START] == [11.0, 12.0, 13.0]
-    assert {text for _, text in sent} == {START, IDLE, READ_0, READ_1}
-    assert not talk.session.ever_online
-    assert talk.session.offline_advice == says('rounds_unanswered')
-    assert talk.events() == []
 
 
 def test_slow_device_gets_no_bursts() -> None:
@@ -310,13 +269,3 @@ def test_another_master_is_noticed() -> None:
     event, = talk.events()
     assert event.text == says('other_master_asks_node', what='PKW requests',
                               frame='505#C002002A01000000', node=5)
-
-
-def test_nothing_is_planned_before_activation() -> None:
-    talk = Conversation(configuration())
-    assert talk.session.offline_advice == 'not activated'
-    assert talk.session.next_timer() == math.inf
-    assert talk.bus_up(1.0) == []
-    assert talk.at(5.0) == []
-    assert talk.hears('705#00', 6.0) == []
-    assert talk.session.facts() == {'nmt_state': 'pre-operational', 'emergency': 'none'}

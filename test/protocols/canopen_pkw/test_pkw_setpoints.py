@@ -1,16 +1,18 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Setpoints: written on change and after a while, neutral when in doubt, and the safe stop."""
 
+from functools import partial
 import math
 from typing import Any
 
 from builders import Conversation, read
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, driven, echo,
-    IDLE, IDLE_ANSWER, LEVEL, online, POSITION, READ_0, READ_1, SPEED, SPEED_0, SPEED_1, START,
-    started, STATUS, STILL_0, STILL_1, STOPPED, TORQUE,
+    ANSWER_0, ANSWER_1, answered, BOOT_UP, CLASS, commanding, CURRENT, denied, DISABLE_0,
+    DISABLE_1, DISABLED_0, driven, echo, IDLE, LEVEL, online, POSITION, READ_0, READ_1, SPEED,
+    SPEED_1, START, started, STATUS, STILL_0, STILL_1, STOPPED, TORQUE,
 )
 from saying import may_run, says
+from timeline import Timeline
 
 from drive_can_bridge.core.events import DriveState, Noted, SetpointsExpired, StationLost
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -18,25 +20,14 @@ from drive_can_bridge.core.setpoints import CommandOutcome
 WITHDRAWN = Noted('enable withdrawn: bridge inactive; only ~/enable starts the drive again')
 
 
-def answered(talk: Conversation, sent: list[str], now: float) -> list[str]:
-    """Let the device answer until nothing more is sent; return the writes."""
-    writes = []
-    while sent:
-        text, = sent
-        function = text[10:12]
-        reply = text.replace('505#', '485#')
-        if function in ('26', 'A6', '25', 'A5'):
-            reply = reply[:12] + '41000000'
-        elif function != '00':
-            writes.append(text[4:8] + text[12:])
-        now += 0.0002
-        sent = talk.hears(reply, now)
-    return writes
+def writes(sent: list[str]) -> list[str]:
+    """Return address and words of what was written."""
+    return [text[4:8] + text[12:] for text in sent if text[10:12] in ('2A', 'AA', '2B', 'AB')]
 
 
 def cycle(talk: Conversation, now: float) -> list[str]:
     """Let the round of this time pass; return address and words of what was written."""
-    return answered(talk, talk.at(now), now)
+    return writes(answered(talk, talk.at(now), now))
 
 
 def armed(**options: Any) -> Conversation:
@@ -55,20 +46,6 @@ def test_change_is_written_before_the_round_and_once() -> None:
     assert talk.hears('485#C60200AA00000000', 10.071) == [READ_0]
     assert talk.hears(ANSWER_0, 10.072) == []
     assert cycle(talk, 10.09) == []
-
-
-def test_command_while_the_write_is_under_way_goes_with_the_next_round() -> None:
-    talk = armed(command_timeout=0.0)
-    assert talk.at(10.07) == [SPEED_1]
-    talk.commands(0, 20.0, 10.0705)
-    assert answered(talk, [SPEED_1], 10.071) == ['C60264000000']
-    assert cycle(talk, 10.09) == ['C602C8000000']
-
-
-def test_unchanged_values_are_written_again_after_the_refresh_interval() -> None:
-    talk = armed(command_timeout=0.0, refresh_interval=0.1)
-    written = [cycle(talk, 10.07 + 0.02 * beat) for beat in range(13)]
-    assert [beat for beat, writes in enumerate(written) if writes] == [0, 5, 10]
 
 
 def test_32_bits() -> None:
@@ -113,17 +90,8 @@ def test_lost_neutral_that_is_commanded_is_repeated_as_soon() -> None:
     assert talk.until(10.141) == [(10.14, STILL_0)]
     assert talk.commands(0, 10.0, 10.145) is CommandOutcome.ACCEPTED
     assert talk.until(10.191) == [(10.19, IDLE)], 'what starts it is not sent blindly'
-    assert answered(talk, [IDLE], 10.192) == []
+    assert writes(answered(talk, [IDLE], 10.192)) == []
     assert cycle(talk, 10.21) == ['C60264000000']
-
-
-def test_setpoints_go_out_although_a_parameter_is_silent() -> None:
-    talk = armed(command_timeout=0.0, parameter_timeout=0.1)
-    assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
-    assert talk.until(10.1609) == []
-    (_, text), = talk.until(10.162)
-    assert text == IDLE
-    assert talk.hears(IDLE_ANSWER, 10.162) == [SPEED_0], 'before anything else'
 
 
 def test_commands_do_not_wait_for_a_round() -> None:
@@ -131,39 +99,24 @@ def test_commands_do_not_wait_for_a_round() -> None:
     talk = started(request=(SPEED,), response=(STATUS, LEVEL, CURRENT), command_timeout=0.0,
                    parameter_timeout=0.2, parameter_retries=0, rearm_immediate=True,
                    refresh_interval=0.0)
-    sent: list[tuple[float, str]] = []
-    todo = [*[(10.5, lambda: talk.submits(read(CLASS), 10.5))] * 6,
-            (10.9, lambda: talk.commands(0, 20.0, 10.9))]
-    while talk.now < 12.0:
-        now = max(talk.now, talk.session.next_timer())
-        while todo and now >= todo[0][0]:
-            todo.pop(0)[1]()
-        asked = talk.at(now)
-        while asked:
-            sent.append((talk.now, asked[0]))
-            silent = asked[0][4:8] == '5E02'
-            asked = [] if silent else talk.hears(echo(asked[0]), talk.now + 0.001)
-    at, = [at for at, text in sent if text[4:8] == 'C602' and text[12:16] == 'C800']
+    line = Timeline(talk, lambda text: None if text[4:8] == '5E02' else (0.001, echo(text)))
+    for _ in range(6):
+        line.plan(10.5, partial(talk.submits, read(CLASS)))
+    line.plan(10.9, commanding(talk, 0, 20.0))
+    line.live(12.0)
+    at, = [at for at, text in line.log if text[4:8] == 'C602' and text[12:16] == 'C800']
     assert at < 10.9 + 0.25
-    assert len([text for _, text in sent if text[4:8] == '5E02']) > 3
+    assert len([text for _, text in line.log if text[4:8] == '5E02']) > 3
 
 
 # -- lost and refused -----------------------------------------------------------------------------
 
 
-def test_lost_acknowledgement_is_written_again_with_the_next_round() -> None:
-    talk = armed(command_timeout=0.0, parameter_timeout=0.05, refresh_interval=0.0)
-    assert talk.at(10.07) == [SPEED_1]
-    assert talk.at(10.1201) == [IDLE]
-    assert answered(talk, [IDLE], 10.121) == []
-    assert cycle(talk, 10.13) == ['C60264000000']
-    assert cycle(talk, 10.15) == []
-
-
 def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
     talk = armed(command_timeout=0.0)
     assert talk.at(10.07) == [SPEED_1]
-    assert answered(talk, talk.hears('485#C60200CE30000906', 10.071), 10.071) == []
+    assert talk.hears('485#C60200CE30000906', 10.071) == [READ_0]
+    assert talk.hears(ANSWER_0, 10.072) == []
     refused = says(
         'write_refused', what='speed', reason=says('refused_by_drive', number=0x06090030))
     assert talk.session.warning == says('setpoint_not_taken', what=refused)
@@ -177,18 +130,17 @@ def test_refused_setpoint_is_shown_until_one_is_taken() -> None:
 
 def test_what_was_refused_before_a_restart_is_forgotten_and_told_anew() -> None:
     talk = armed(command_timeout=0.0)
-    refusal = 'write of speed refused by the drive: 06090030h (value out of range)'
+    said = 'write of speed refused by the drive: 06090030h (value out of range)'
     for begin in (10.0, 11.0):
         text, = talk.at(begin + 0.07)
         assert text[:10] == '505#C60200' and text[12:] == '64000000'
-        refused = f'485#C60200{"CE" if text[10:12] == "AA" else "4E"}30000906'
-        answered(talk, talk.hears(refused, begin + 0.071), begin + 0.071)
-        assert talk.session.warning.startswith(refusal)
-        assert [note.text for note in talk.events(Noted) if 'refused' in note.text] == [refusal]
+        answered(talk, talk.hears(denied(text, '30000906'), begin + 0.071), begin + 0.072)
+        assert talk.session.warning.startswith(said)
+        assert [note.text for note in talk.events(Noted) if 'refused' in note.text] == [said]
         talk.hears(BOOT_UP, begin + 0.2)
         talk.hears('485#C60200AA00000000', begin + 0.21)
         talk.hears('485#C602002A00000000', begin + 0.21)
-        answered(talk, talk.at(begin + 0.3), begin + 0.3)
+        cycle(talk, begin + 0.3)
         assert talk.session.online
         assert talk.session.warning == ''
         talk.commands(0, 0.0, begin + 1.06)
@@ -206,18 +158,10 @@ def test_restart_disarms() -> None:
     assert [item.armed for item in talk.session.setpoints.items] == [False]
     assert talk.commands(0, 10.0, 10.12) is CommandOutcome.NOT_ARMED
     assert talk.hears('485#C60200AA00000000', 10.13) == []
-    assert answered(talk, talk.at(10.17), 10.17) == ['C60200000000'], 'once more when it is back'
+    assert cycle(talk, 10.17) == ['C60200000000'], 'once more when it is back'
     assert talk.session.state is DriveState.NOT_ARMED
     assert talk.commands(0, 10.0, 10.18) is CommandOutcome.NOT_ARMED
     assert cycle(talk, 10.2) == []
-
-
-def test_silent_drive_gets_neutral_before_it_is_left_alone() -> None:
-    talk = armed(command_timeout=0.0, parameter_timeout=0.05)
-    cycle(talk, 10.07)
-    sent = [text for _, text in talk.until(10.6) if text.startswith('505#C602')]
-    assert sent == [STILL_0, STILL_1, STILL_0]
-    assert talk.events(StationLost)
 
 
 # -- the stop -------------------------------------------------------------------------------------
@@ -283,17 +227,6 @@ def test_slow_device_acknowledges_each_stop_once() -> None:
     assert talk.events(Noted) == [WITHDRAWN]
 
 
-def test_stop_waits_for_the_answer_to_the_request_under_way() -> None:
-    """The mailbox takes one request at a time."""
-    talk = armed()
-    assert talk.submits(read(CLASS), 10.061) == ['505#5E0200A500000000']
-    assert talk.deactivate(10.062) == []
-    assert talk.outcomes() == [['bridge inactive']]
-    assert talk.until(10.1) == []
-    assert talk.hears('485#5E0200A507000000', 10.1) == [STILL_0]
-    assert talk.session.statistics.rejected == 0
-
-
 def test_refused_stop_is_an_answer() -> None:
     talk = armed()
     assert cycle(talk, 10.07) == ['C60264000000']
@@ -307,16 +240,11 @@ def test_refused_stop_is_an_answer() -> None:
 
 
 def test_nothing_to_stop() -> None:
-    talk = online()
-    assert talk.deactivate(10.06) == []
-    assert talk.session.stopped
-
-
-def test_stopped_node_is_left_alone() -> None:
     talk = armed()
     talk.hears(STOPPED, 10.061)
-    assert talk.deactivate(10.062) == []
-    assert talk.session.stopped
+    for each in (online(), talk):
+        assert each.deactivate(10.062) == []
+        assert each.session.stopped
 
 
 def test_node_that_restarts_during_the_stop_has_stopped() -> None:
@@ -332,6 +260,6 @@ def test_activation_during_the_stop() -> None:
     assert talk.deactivate(10.061) == [STILL_1]
     assert talk.activate(10.07) == ['000#0105']
     assert talk.hears('485#C60200AA00000000', 10.08) == []
-    assert answered(talk, talk.at(10.121), 10.121) == ['C60200000000']
+    assert cycle(talk, 10.121) == ['C60200000000']
     assert talk.session.online
     assert not talk.session.stopped

@@ -1,17 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A drive that ran, fell silent, and shows up without being online, is told to stop again."""
 
-from builders import Conversation, read
+from builders import Conversation
 from pkw_builders import (
-    BOOT_UP, CLASS, CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, echo, ENABLE_0,
-    ENABLE_1, IDLE, OPERATIONAL, PRE_OPERATIONAL, READ_1, running, SPEED, START, started, STATUS,
-    STATUS_2,
+    CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, echo, ENABLE_0, ENABLE_1, IDLE,
+    OPERATIONAL, PRE_OPERATIONAL, READ_1, running, START, started, STATUS, STATUS_2,
 )
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.setpoints import CommandOutcome
 
 STOPS = (DISABLE_0, DISABLE_1)
 CONFIRMED = 'told to stop once more, which it has confirmed'
@@ -143,15 +141,6 @@ def test_any_sign_of_life(sign: str) -> None:
     assert len(times) == 3, 'and only for a sign'
 
 
-def test_answer_to_a_user() -> None:
-    talk = silent(running(), 14.0)
-    assert talk.submits(read(CLASS), 14.001) == [], 'a read of the round is under way'
-    sent = talk.served(17.0, lambda text: echo(text) if text[4:8] == '5E02' else None)
-    place = next(place for place, (_, text) in enumerate(sent) if text[4:8] == '5E02')
-    assert sent[place + 1][1] in STOPS
-    assert sent[place + 1][0] == pytest.approx(sent[place][0] + 0.002)
-
-
 def test_complete_rounds_of_a_node_whose_heartbeats_have_ceased() -> None:
     """It is there, but does not count as online."""
     talk = running(heartbeat_timeout=0.5)
@@ -177,36 +166,6 @@ def test_node_that_is_held_back_and_says_so() -> None:
     assert [note.text for note in talk.events(Noted) if note.danger] == [FAILED]
 
 
-def test_drive_without_control() -> None:
-    talk = started(request=(SPEED,), response=(STATUS, STATUS_2, CURRENT), command_timeout=0.0,
-                   period=0.1)
-    talk.served(10.2, well)
-    assert talk.commands(0, 0.0, 10.21) is CommandOutcome.ARMED
-    assert talk.commands(0, 10.0, 10.21) is CommandOutcome.ACCEPTED
-    talk.served(10.6, well)
-    talk.until(14.0)
-    assert not talk.session.online
-    assert talk.session.duty.owed
-    sent = talk.served(16.0, half)
-    told = [text for _, text in sent if text[4:8] == 'C602']
-    assert len(told) == 1
-    assert told[0][12:] == '00000000'
-    assert not talk.session.duty.owed
-
-
 def test_drive_that_was_told_nothing_but_disable_is_left_alone() -> None:
     talk = started(response=(STATUS, STATUS_2, CURRENT), control=CONTROL, period=0.1)
     assert stops(talk.served(16.0, half)) == []
-
-
-def test_services_refuse_while_it_is_offline() -> None:
-    talk = silent(runs_in_two_reads(), 14.0)
-    talk.served(14.5, half)
-    for action in (ControlAction.DISABLE, ControlAction.QUICK_STOP):
-        assert talk.session.services.control_refusal(action) == 'drive offline'
-
-
-def test_restart_has_it_told_once() -> None:
-    talk = silent(running(), 14.0)
-    sent = [(14.001, text) for text in talk.hears(BOOT_UP, 14.001)] + talk.until(17.0)
-    assert len(stops(sent)) == 3

@@ -99,18 +99,12 @@ def test_values_of_32_bits(row: dict[str, Any]) -> None:
 
 
 def test_requests_that_do_not_fit() -> None:
-    with pytest.raises(LocalProtocolError):
-        pkw.read_request(pkw.Address(0x10000), 1, False)
-    with pytest.raises(LocalProtocolError):
-        pkw.read_request(pkw.Address(0xFFFF), 2, False)
-    with pytest.raises(LocalProtocolError):
-        pkw.read_request(pkw.Address(0x2004, 0xFF), 2, False)
-    with pytest.raises(LocalProtocolError):
-        pkw.read_request(pkw.Address(455), 3, False)
-    with pytest.raises(LocalProtocolError):
-        pkw.write_request(pkw.Address(704), (0x10000,), False)
-    with pytest.raises(LocalProtocolError):
-        pkw.write_request(pkw.Address(704), (1, -1), False)
+    for place, count in (((0x10000,), 1), ((0xFFFF,), 2), ((0x2004, 0xFF), 2), ((455,), 3)):
+        with pytest.raises(LocalProtocolError):
+            pkw.read_request(pkw.Address(*place), count, False)
+    for words in ((0x10000,), (1, -1)):
+        with pytest.raises(LocalProtocolError):
+            pkw.write_request(pkw.Address(704), words, False)
 
 
 # -- refusals -------------------------------------------------------------------------------------
