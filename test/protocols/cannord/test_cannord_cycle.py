@@ -6,8 +6,8 @@ from typing import Any
 
 from builders import Conversation, frame
 from cannord_session_builders import (
-    ACTUAL, commanded, CURRENT, ENABLED, enabled, exchange, FAULT, FREQUENCY, INPUTS, inverter,
-    online, READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, STANDING, started, THIRD, VALUES,
+    ACTUAL, commanded, CURRENT, ENABLED, enabled, exchange, FAULT, FREQUENCY, INPUTS, online,
+    READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
 )
 import pytest
 from saying import says, status_word
@@ -17,20 +17,6 @@ from drive_can_bridge.core.events import (
     DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived, StationFound,
     StationLost)
 from drive_can_bridge.core.setpoints import CommandOutcome
-
-
-def test_first_exchange() -> None:
-    talk = started()
-    assert talk.at(10.0) == [READY_FRAME]
-    assert talk.session.offline_advice == says('looked_for')
-    assert talk.session.state is DriveState.OFFLINE
-    assert talk.hears(READY, 10.002) == []
-    assert talk.events() == [StationFound(), ProcessDataReceived((0x0B31, 0), 10.002)]
-    assert talk.session.offline_advice == ''
-    assert talk.session.state is DriveState.DISABLED
-    assert talk.session.control is not None
-    assert talk.session.control.state == STANDING
-    assert talk.session.next_timer() == pytest.approx(10.02)
 
 
 def test_sample_parameters() -> None:
@@ -86,27 +72,20 @@ def test_with_two_entries_the_swapped_second_is_in_the_last_word() -> None:
     assert talk.samples() == [(0x0B31, 0, -50)]
 
 
-def test_29_bit_identifiers() -> None:
-    talk = Conversation(inverter(station=100, extended_identifiers=True))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    assert talk.at(10.0) == ['03200000#7E040000']
-    assert talk.hears('0C9#310B0000', 10.001) == []
+@pytest.mark.parametrize(('extended', 'sent', 'answer', 'others'), [
+    (True, '03200000#7E040000', '03240000#310B0020', ['0C9#310B0000']),
+    (False, '0C8#7E040000', '0C9#310B0020', ['03240000#310B0020', '000000C9#310B0020'])])
+def test_identifiers_have_11_or_29_bits(extended: bool, sent: str, answer: str,
+                                        others: list[str]) -> None:
+    talk = started(station=100, extended_identifiers=extended)
+    assert talk.at(10.0) == [sent]
+    for text in others:
+        talk.hears(text, 10.001)
     assert not talk.session.online
-    assert talk.session.statistics.rejected == 1
-    talk.hears('03240000#310B0020', 10.002)
+    assert talk.session.statistics.rejected == len(others)
+    talk.hears(answer, 10.002)
+    assert talk.session.online
     assert talk.samples() == [(0x0B31, 8192)]
-    assert talk.session.online
-
-
-def test_11_bit_session_takes_no_29_bit_frames() -> None:
-    talk = started(station=100)
-    assert talk.at(10.0) == ['0C8#7E040000']
-    talk.hears('03240000#310B0020', 10.001)
-    talk.hears('000000C9#310B0020', 10.001)
-    assert not talk.session.online
-    talk.hears('0C9#310B0020', 10.002)
-    assert talk.session.online
 
 
 # -- the additional frame of SK 54xE --------------------------------------------------------------

@@ -34,6 +34,13 @@ def asked(talk: Conversation, request: Any, *talks: tuple[str, str]) -> list[obj
     return outcomes
 
 
+def no_answer(talk: Conversation) -> None:
+    """Let the time pass that a request at 10.003 s has, while process data are answered."""
+    for place in range(1, 6):
+        exchange(talk, 10.0 + 0.02 * place)
+    talk.until(10.11)
+
+
 # -- reading --------------------------------------------------------------------------------------
 
 
@@ -70,13 +77,6 @@ def test_errors_in_words(number: int, text: str) -> None:
     response = f'667000000000{number:02X}00'
     assert asked(online(), read(ACCELERATION), ('6610000000000000', response)) == [
         says('refused_by_drive', number=number, text=text)]
-
-
-def test_one_refusal_takes_no_other_along() -> None:
-    assert asked(online(), read(ACCELERATION, OFFSET),
-                 ('6610000000000000', '6670000000000000'),
-                 ('9B11000000000000', '9B11000000000500')) == [
-        says('refused_by_drive', number=0), 5]
 
 
 def test_a_wrong_element_tells_how_many_there_are() -> None:
@@ -155,19 +155,10 @@ def test_write_refused() -> None:
         says('refused_by_drive', number=2), 'written']
 
 
-def test_a_lost_acknowledgement_is_a_failure_and_nothing_is_repeated() -> None:
-    talk = online()
-    assert talk.submits(write((ACCELERATION, 9999)), 10.003) == ['202#6620000000000F27']
-    assert [text for _, text in talk.until(10.2) if text.startswith('202')] == []
-    assert talk.outcomes() == [[says('no_answer_offline')]]
-
-
 def test_no_answer_to_a_write_while_online() -> None:
     talk = online()
     talk.submits(write((ACCELERATION, 9999)), 10.003)
-    for place in range(1, 6):
-        exchange(talk, 10.0 + 0.02 * place)
-    talk.until(10.11)
+    no_answer(talk)
     assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.1)]]
 
 
@@ -191,9 +182,7 @@ def test_an_acknowledgement_with_another_value_is_none() -> None:
     assert talk.outcomes() == [['written']]
     talk.submits(write((ACCELERATION, 9999)), 10.007)
     talk.hears('203#6610000000006400', 10.008)
-    for place in range(1, 6):
-        exchange(talk, 10.0 + 0.02 * place)
-    talk.until(10.11)
+    no_answer(talk)
     assert talk.outcomes() == [[says('read_back_differs', found='1', wanted='99.99')]]
 
 
@@ -202,9 +191,7 @@ def test_another_value_is_forgotten_with_its_write() -> None:
     talk.submits(write((ACCELERATION, 9999), (FLAG, 1)), 10.003)
     talk.hears('203#6610000000006400', 10.004)
     assert talk.hears('203#6610000000000F27', 10.005) == ['202#78E0000000000100']
-    for place in range(1, 6):
-        exchange(talk, 10.0 + 0.02 * place)
-    talk.until(10.11)
+    no_answer(talk)
     assert talk.outcomes() == [['written', says('no_answer', attempts=1, timeout=0.1)]]
 
 
@@ -291,15 +278,6 @@ def test_malformed_responses(size: int) -> None:
     talk.submits(read(OFFSET), 10.003)
     talk.hears('203#' + '00' * size, 10.004)
     assert talk.events(FrameRejected) == [FrameRejected(says('malformed', what=what))]
-
-
-def test_requests_go_one_after_the_other() -> None:
-    talk = online()
-    assert talk.submits(read(OFFSET), 10.003) == ['202#9B11000000000000']
-    assert talk.submits(read(FLAG), 10.0031) == []
-    assert talk.hears('203#9B11000000000700', 10.004) == ['202#7810000000000000']
-    talk.hears('203#7810000000000100', 10.005)
-    assert talk.outcomes() == [[7], [1]]
 
 
 def test_an_absent_drive_ends_a_request_with_its_first_name() -> None:
@@ -485,23 +463,16 @@ def test_telegram_time_out_in_words() -> None:
 
 
 def test_telegram_time_out_is_looked_at_again_when_it_was_written() -> None:
+    """Users have their turn behind that."""
     talk, _ = monitored(period=0.1)
     talk.hears('203#0112000000000200', 10.005)
     assert talk.session.warning
     assert talk.submits(write((MONITORING, 5)), 10.006) == ['202#0122000000000500']
-    assert talk.hears('203#0112000000000500', 10.007) == ['202#0112000000000000']
-    assert talk.outcomes() == [['written']]
-    talk.hears('203#0112000000000500', 10.008)
-    assert talk.session.warning == ''
-
-
-def test_telegram_time_out_takes_turns_with_requests_of_users() -> None:
-    talk, _ = monitored(period=0.1)
-    talk.hears('203#0112000000000200', 10.005)
-    assert talk.submits(write((MONITORING, 5)), 10.006) == ['202#0122000000000500']
     assert talk.submits(read(COUNTER), 10.0065) == []
     assert talk.hears('203#0112000000000500', 10.007) == ['202#0112000000000000']
+    assert talk.outcomes() == [['written']]
     assert talk.hears('203#0112000000000500', 10.008) == ['202#CA12000000000000']
+    assert talk.session.warning == ''
 
 
 def test_telegram_time_out_that_cannot_be_read() -> None:

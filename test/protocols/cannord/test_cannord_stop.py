@@ -7,7 +7,7 @@ from cannord_session_builders import (
     READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
 )
 import pytest
-from saying import may_run, says
+from saying import says
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
@@ -217,16 +217,3 @@ def test_a_drive_that_comes_and_goes_is_asked_once_for_its_time_out() -> None:
     assert sent == ['202#9B11000000000000']
     talk.hears('203#9B11000000000700', 15.001)
     assert talk.outcomes() == [[7]]
-
-
-# -- silent while it runs -------------------------------------------------------------------------
-
-
-def test_bus_that_is_lost_before_silent_neutral_cycles_count_as_unheard() -> None:
-    """It fell silent while it ran, and what it was told since, nobody answered."""
-    talk = running()
-    talk.until(10.13)
-    assert not talk.session.online
-    assert warnings(talk) == []
-    talk.bus_down(10.135)
-    assert warnings(talk) == [may_run('bus_lost_before_stop')]

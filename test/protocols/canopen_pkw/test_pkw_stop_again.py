@@ -164,8 +164,3 @@ def test_node_that_is_held_back_and_says_so() -> None:
     assert [round(now, 2) for now in times[:2]] == [10.43, 10.57]
     assert times[2] == pytest.approx(11.1), 'three attempts, and the next heartbeat'
     assert [note.text for note in talk.events(Noted) if note.danger] == [FAILED]
-
-
-def test_drive_that_was_told_nothing_but_disable_is_left_alone() -> None:
-    talk = started(response=(STATUS, STATUS_2, CURRENT), control=CONTROL, period=0.1)
-    assert stops(talk.served(16.0, half)) == []
