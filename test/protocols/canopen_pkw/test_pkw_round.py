@@ -3,9 +3,10 @@
 
 from typing import Any
 
+from builders import write
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, CONTROL, CURRENT, IDLE, IDLE_ANSWER, LEVEL, online, RATIO, READ_0, READ_1,
-    reading, START, started, STATUS, STATUS_2,
+    ANSWER_0, ANSWER_1, CONTROL, CURRENT, FLC, IDLE, IDLE_ANSWER, LEVEL, online, RATIO, READ_0,
+    READ_1, reading, START, started, STATUS, STATUS_2,
 )
 import pytest
 from saying import says
@@ -63,22 +64,21 @@ def test_word_order(options: dict[str, Any], raw: int) -> None:
     assert talk.samples() == [(raw,)]
 
 
-@pytest.mark.parametrize('layout, read, answer', [
-    ('dword_swapped', '505#00A6C70100000000', '485#00A6C70100004100'),
-    ('word_be', '505#01C7A60000000000', '485#01C7A60000410000'),
+@pytest.mark.parametrize('layout, read, answer, written, acknowledged', [
+    ('dword_swapped', '505#00A6C70100000000', '485#00A6C70100004100',
+     '505#002A8C0200005A00', '485#002A8C0200000000'),
+    ('word_be', '505#01C7A60000000000', '485#01C7A60000410000',
+     '505#028C2A00005A0000', '485#028C2A0000000000'),
 ])
-def test_other_layouts(layout: str, read: str, answer: str) -> None:
+def test_other_layouts(layout: str, read: str, answer: str, written: str,
+                       acknowledged: str) -> None:
     talk, sent = reading(layout=layout)
     assert sent == [read]
     assert talk.hears(answer, 10.052) == []
     assert talk.samples() == [(0x41, 0)]
-
-
-def test_addressing_by_index() -> None:
-    talk, sent = reading(addressing='canopen')
-    assert sent == ['505#042006B600000000']
-    talk.hears('485#042006B641000700', 10.052)
-    assert talk.samples() == [(0x41, 7)]
+    assert talk.submits(write((FLC, 90)), 10.06) == [written]
+    talk.hears(acknowledged, 10.061)
+    assert talk.outcomes() == [['written']]
 
 
 def test_other_identifiers() -> None:

@@ -70,24 +70,19 @@ def test_slow_device_after_the_bus_came_back() -> None:
 
 
 @pytest.mark.parametrize('heard', [PRE_OPERATIONAL, STOPPED])
-def test_stop_while_the_heartbeat_holds_rounds_back(heard: str) -> None:
+@pytest.mark.parametrize('confirmed', [False, True])
+def test_stop_while_the_heartbeat_holds_rounds_back(heard: str, confirmed: bool) -> None:
     """The network module says so; what the motor does is another matter."""
     talk = running()
     assert talk.hears(heard, 10.3) == [START, DISABLE_0]
-    assert talk.until(10.319) == []
-    assert talk.deactivate(10.32) == []
-    assert talk.until(10.371) == [(10.37, DISABLE_1)], '50 ms for the answer under way'
-    assert talk.hears(DISABLED_1, 10.38) == []
-    assert talk.session.stopped
-    assert worries(talk) == []
-
-
-def test_nothing_more_to_a_node_that_is_held_back_and_has_stopped() -> None:
-    talk = running()
-    assert talk.hears(PRE_OPERATIONAL, 10.3) == [START, DISABLE_0]
-    assert talk.hears(DISABLED_0, 10.302) == []
-    assert talk.until(11.0) == []
-    assert talk.deactivate(11.0) == []
+    if confirmed:
+        assert talk.hears(DISABLED_0, 10.302) == []
+    now = 11.0 if confirmed else 10.32
+    assert talk.until(now) == []
+    assert talk.deactivate(now) == []
+    if not confirmed:
+        assert talk.until(10.371) == [(10.37, DISABLE_1)], '50 ms for the answer under way'
+        assert talk.hears(DISABLED_1, 10.38) == []
     assert talk.session.stopped
     assert worries(talk) == []
 
