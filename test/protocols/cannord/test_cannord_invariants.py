@@ -11,10 +11,10 @@ from typing import Any
 from any_order import AnyOrder, Observer, PATIENCE, SETTINGS, SLACK
 from builders import drive
 from cannord_session_builders import (
-    ACCELERATION, ACCELERATION_2, ACTUAL, COUNTER, CURRENT, FOURTH, FREQUENCY, INPUTS, MONITORING,
-    OFFSET, PARAMETERS, SECOND, THIRD, VALUE_4,
+    ACCELERATION, ACCELERATION_2, ACTUAL, COUNTER, CURRENT, FAULT_NUMBER, FLAG, FOURTH, FREQUENCY,
+    INPUTS, inverter, MONITORING, OFFSET, PARAMETERS, POSITION, SECOND, THIRD, VALUE_4,
 )
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
 
@@ -321,3 +321,33 @@ class SessionMachine(AnyOrder):
 TestSession = SessionMachine.TestCase
 TestSession.settings = SETTINGS
 pytestmark = pytest.mark.timeout(PATIENCE)
+
+
+@given(frames=st.lists(st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8),
+                                 st.booleans()), max_size=20),
+       state=st.sampled_from(['inactive', 'starting', 'online', 'asking', 'stopping']),
+       extended=st.booleans(), broadcast=st.sampled_from(['none', 'group', 'all']))
+def test_no_frame_ever_raises(frames: list[tuple[int, bytes, bool]], state: str, extended: bool,
+                              broadcast: str) -> None:
+    session = FAMILIES['cannord'].make_session(inverter(
+        extended_identifiers=extended, broadcast=broadcast, extra_setpoints=True,
+        response=(ACTUAL, CURRENT, INPUTS, VALUE_4)))
+    shift = 18 if extended else 0
+    session.bus_up(0.0)
+    now = 1.0
+    if state != 'inactive':
+        session.activate(1.0)
+    if state in ('online', 'asking', 'stopping'):
+        session.handle_timer(1.0)
+        session.receive_frame(
+            Frame(3 << shift, bytes.fromhex('310B000000000000'), extended), 1.001)
+        assert session.online
+    if state == 'asking':
+        session.services.submit(ReadRequest((OFFSET, POSITION, FLAG, FAULT_NUMBER)), 1.001)
+    if state == 'stopping':
+        session.deactivate(1.001)
+    for place, (identifier, data, is_extended) in enumerate(frames):
+        near = (identifier, 3 << shift, 0x203 << shift, 0x400 << shift)[place % 4]
+        session.receive_frame(Frame(near, data, extended if place % 4 else is_extended), now)
+        session.handle_timer(now)
+        now += 0.001
