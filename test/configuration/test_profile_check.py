@@ -5,13 +5,11 @@ import math
 from pathlib import Path
 
 from configuration_builders import (
-    at, changed, FILE, line_of, load, local, problems, PROFILE, PROTOCOLS, warnings, write,
+    at, changed, FILE, line_of, load, problems, PROFILE, PROTOCOLS, warnings,
 )
 import pytest
 from saying import says
 
-from drive_can_bridge.configuration.load import configuration_from_file
-from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
@@ -279,6 +277,10 @@ def test_good_profile(tmp_path: Path) -> None:
     ('fault: [8, 8]', 'fault: [8, 0]'),
     ('description: for tests\n', ''),
     ('protocols: [datamodel_extended]', 'protocols: [cannord, datamodel_extended]'),
+    # a subindex is of the other protocol
+    ('protocols: [datamodel_extended]\nparameters:\n',
+     'protocols: [datamodel_extended, cannord]\nparameters:\n'
+     '  part: {number: 51, subindex: 4}\n'),
     ('limit:', 'px: {number: 1}\n  xyz: {number: 2}\n  enabled: {number: 3}\n  limit:'),
 ])
 def test_all_right(tmp_path: Path, old: str, new: str) -> None:
@@ -323,12 +325,6 @@ def test_nothing_says_when_there_is_a_fault(tmp_path: Path) -> None:
     assert warnings(tmp_path, profile=with_bit) == []
 
 
-def test_subindex_of_another_protocol(tmp_path: Path) -> None:
-    profile = changed(PROFILE, '[datamodel_extended]', '[datamodel_extended, cannord]')
-    profile = changed(profile, 'number: 51', 'number: 51, subindex: 4')
-    assert problems(tmp_path, profile=profile) == []
-
-
 def test_profile_by_its_path(tmp_path: Path) -> None:
     folder = tmp_path / 'elsewhere'
     folder.mkdir()
@@ -350,12 +346,9 @@ def test_profile_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 def test_profile_that_is_too_large(tmp_path: Path) -> None:
-    path = write(tmp_path, changed(FILE, 'profile: table', 'profile: large'))
     large = tmp_path / 'large.yaml'
     with large.open('wb') as file:
         file.truncate(5 << 20)
-    with pytest.raises(ConfigurationError) as caught:
-        configuration_from_file(path)
-    assert local(tmp_path, caught.value.problems) == [
+    assert problems(tmp_path, changed(FILE, 'profile: table', 'profile: large')) == [
         at('f.yaml:14: drives.conveyor.profile', 'cannot_be_read', path=large,
            why='too large, allowed are 4 MiB')]
