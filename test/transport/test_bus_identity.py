@@ -2,6 +2,7 @@
 """Which buses are the same one."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 import os
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,21 @@ def same(first: BusConfiguration, second: BusConfiguration) -> bool:
     return bool(set(identity_of(first).names) & set(identity_of(second).names))
 
 
+@contextmanager
+def opened() -> Iterator[tuple[int, str]]:
+    """Open a pseudo-terminal: its far end, and the name that a bus has."""
+    near, far = os.openpty()
+    try:
+        yield near, os.ttyname(far)
+    finally:
+        os.close(near)
+        os.close(far)
+
+
 @pytest.fixture
 def terminal() -> Iterator[str]:
-    near, far = os.openpty()
-    yield os.ttyname(far)
-    os.close(near)
-    os.close(far)
+    with opened() as (_, name):
+        yield name
 
 
 def test_a_port_by_another_name_is_the_same(terminal: str, tmp_path: Path) -> None:
@@ -41,45 +51,29 @@ def test_a_port_by_another_name_is_the_same(terminal: str, tmp_path: Path) -> No
 
 
 def test_other_ports_are_others(terminal: str, tmp_path: Path) -> None:
-    near, far = os.openpty()
-    try:
-        assert not same(bus('slcan', terminal), bus('slcan', os.ttyname(far)))
-    finally:
-        os.close(near)
-        os.close(far)
+    with opened() as (_, other):
+        assert not same(bus('slcan', terminal), bus('slcan', other))
     assert not same(bus('slcan', str(tmp_path / 'a')), bus('slcan', str(tmp_path / 'b')))
 
 
-def test_a_port_that_is_not_plugged_in_goes_by_its_name(tmp_path: Path) -> None:
-    missing = str(tmp_path / 'ttyACM7')
-    assert same(bus('slcan', missing), bus('slcan', missing))
-    before = set(identity_of(bus('slcan', missing)).names)
-    near, far = os.openpty()
-    try:
-        Path(missing).symlink_to(os.ttyname(far))
-        assert before & set(identity_of(bus('slcan', missing)).names)
-    finally:
-        os.close(near)
-        os.close(far)
+def test_a_port_that_is_not_plugged_in_goes_by_its_name(terminal: str, tmp_path: Path) -> None:
+    missing = tmp_path / 'ttyACM7'
+    before = set(identity_of(bus('slcan', str(missing))).names)
+    assert before
+    missing.symlink_to(terminal)
+    assert before & set(identity_of(bus('slcan', str(missing))).names)
 
 
 def test_the_number_of_a_terminal_that_has_gone_belongs_to_another() -> None:
-    near, far = os.openpty()
-    name = os.ttyname(far)
-    before = identity_of(bus('slcan', name)).names
-    os.write(near, b'x')
-    assert identity_of(bus('slcan', name)).names == before
-    os.close(near)
-    os.close(far)
+    with opened() as (near, name):
+        before = identity_of(bus('slcan', name)).names
+        os.write(near, b'x')
+        assert identity_of(bus('slcan', name)).names == before
 
     def is_another() -> bool:
-        near, far = os.openpty()
-        try:    # the clock of the kernel has to have ticked
-            return os.ttyname(far) == name and set(
+        with opened() as (_, other):    # the clock of the kernel has to have ticked
+            return other == name and set(
                 identity_of(bus('slcan', name)).names).isdisjoint(before)
-        finally:
-            os.close(near)
-            os.close(far)
     wait_for(is_another, 'another terminal of that number')
 
 

@@ -14,6 +14,7 @@ from drive_can_bridge.transport.error_frames import decode_error_frame
 ALONE = ('no other node acknowledges: check that one is switched on, cable, termination and bit '
          'rate')
 DISTURBED = 'check cable, shield, termination and bit rate'
+WIRES = 'check the wires between transceiver and bus'
 OVERFLOW = 'frames were lost: less traffic, or a faster machine'
 
 FROM_DRIVERS = [
@@ -63,19 +64,13 @@ BY_HAND = [
     (0x008, '0000810A', ('bit error in the data while sending', None, DISTURBED)),
     (0x008, '00000019', ('no acknowledgement', None, ALONE)),
     (0x008, '00000000', ('protocol violation', None, DISTURBED)),
-    (0x010, '0000000004', ('CAN_H not connected', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '0000000074', ('CAN_H not connected and CAN_L shorted to ground', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '0000000046', ('CAN_H shorted to supply and CAN_L not connected', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '0000000057', ('CAN_H shorted to ground and CAN_L shorted to battery', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '0000000065', ('CAN_H shorted to battery and CAN_L shorted to supply', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '0000000080', ('CAN_L shorted to CAN_H', None,
-                           'check the wires between transceiver and bus')),
-    (0x010, '', ('transceiver fault', None, 'check the wires between transceiver and bus')),
+    (0x010, '0000000004', ('CAN_H not connected', None, WIRES)),
+    (0x010, '0000000074', ('CAN_H not connected and CAN_L shorted to ground', None, WIRES)),
+    (0x010, '0000000046', ('CAN_H shorted to supply and CAN_L not connected', None, WIRES)),
+    (0x010, '0000000057', ('CAN_H shorted to ground and CAN_L shorted to battery', None, WIRES)),
+    (0x010, '0000000065', ('CAN_H shorted to battery and CAN_L shorted to supply', None, WIRES)),
+    (0x010, '0000000080', ('CAN_L shorted to CAN_H', None, WIRES)),
+    (0x010, '', ('transceiver fault', None, WIRES)),
     (0x020, '', ('no acknowledgement', None, ALONE)),
     (0x080, '', ('bus error', None, DISTURBED)),
     # SJA1000 with berr-reporting: a bus error that says where

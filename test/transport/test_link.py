@@ -260,30 +260,20 @@ def test_adapter_that_opens_and_fails_when_it_is_read(make: Callable[..., Bench]
     assert bench.link.counts.bus_off == len(dead)
 
 
-def test_frame_that_is_there_before_the_bus_counts_as_open(make: Callable[..., Bench],
-                                                           ) -> None:
-    class ReadyPort(FakePort):
-        def __init__(self) -> None:
-            super().__init__()
-            self.coming.append(ANSWER)
-    bench = make(ReadyPort)
-    wait_for(lambda: bench.listener.frames == [ANSWER])
-
-
-def test_such_a_frame_is_older_than_what_is_asked_when_it_opens(
+def test_frame_that_is_there_before_the_bus_counts_as_open_is_older_than_what_is_asked_then(
         make: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
     class ReadyPort(FakePort):
         def __init__(self) -> None:
             super().__init__()
             self.age = 0.01
             self.coming.append(ANSWER)
-    ages: list[float] = []
+    heard: list[tuple[Frame, float]] = []
     monkeypatch.setattr(Listener, 'bus_opened', lambda listener: (
         listener.told.append('opened'), pause(0.02)))
-    monkeypatch.setattr(Listener, 'frame_received', lambda listener, frame, age: ages.append(age))
+    monkeypatch.setattr(Listener, 'frame_received', lambda listener, *frame: heard.append(frame))
     make(ReadyPort)
-    wait_for(lambda: ages)
-    assert ages[0] == pytest.approx(0.03)
+    wait_for(lambda: heard)
+    assert heard == [(ANSWER, pytest.approx(0.03))]
 
 
 def test_loss_seen_by_a_sender(make: Callable[..., Bench]) -> None:
@@ -373,11 +363,13 @@ def test_queue_that_is_full_for_a_moment(make: Callable[..., Bench]) -> None:
 
 def test_blocked_bus_is_down_but_its_queue_is_watched(make: Callable[..., Bench]) -> None:
     bench = make(QueuedPort)
+    begun = bench.clock.now()
     bench.block()
     assert bench.listener.told[1] == f'lost: {FULL}; {ALONE}'
     tried = len(bench.port.timeouts)
     assert not bench.link.send(FRAME)
-    wait_for(lambda: bench.port.looks >= 5)  # every reconnect_period
+    wait_for(lambda: bench.port.looks >= 6)
+    assert bench.clock.now() - begun >= 6 * BUS.reconnect_period
     assert len(bench.port.timeouts) == tried
     # a frame of that time is nobody's: the drives count as lost
     bench.port.coming.append(ANSWER)
@@ -417,14 +409,6 @@ def test_one_frame_after_a_loss_until_somebody_is_heard(make: Callable[..., Benc
     bench.port.full = True
     assert not bench.link.send(FRAME)
     assert not bench.link.is_open
-
-
-def test_full_queue_is_looked_at_once_in_a_reconnect_period(make: Callable[..., Bench]) -> None:
-    bench = make(QueuedPort)
-    begun = bench.clock.now()
-    bench.block()
-    wait_for(lambda: bench.port.looks >= 6)
-    assert bench.clock.now() - begun >= 6 * BUS.reconnect_period
 
 
 def test_adapter_that_does_not_tell_is_opened_anew(make: Callable[..., Bench]) -> None:
