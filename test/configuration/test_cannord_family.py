@@ -87,6 +87,8 @@ def test_a_good_file(tmp_path: Path) -> None:
     assert problems(tmp_path, FILE, PROFILE) == []
     assert warnings(tmp_path, FILE, PROFILE) == []
     assert problems(tmp_path, together(), PROFILE) == []
+    # process data are volatile
+    assert problems(tmp_path, FILE, f'{PROFILE}  passing: {{storage: ram}}\n') == []
 
 
 @pytest.mark.parametrize(('old', 'new', 'found'), [
@@ -115,11 +117,13 @@ def test_problems(tmp_path: Path, old: str, new: str, found: object) -> None:
     assert problems(tmp_path, changed(FILE, old, new), PROFILE) == [found]
 
 
+FIVE = '[speed, second, third, fourth, fifth]\n        extra_setpoints: true'
+
+
 def test_five_entries_with_extra_setpoints(tmp_path: Path) -> None:
-    text = changed(FILE, '[speed]', '[speed, second, third, fourth, fifth]\n'
-                                    '        extra_setpoints: true')
-    assert problems(tmp_path, text, PROFILE) == []
-    assert problems(tmp_path, changed(text, 'fifth]', 'fifth, sixth]'), PROFILE) == [
+    assert problems(tmp_path, changed(FILE, '[speed]', FIVE), PROFILE) == []
+    text = changed(FILE, '[speed]', FIVE.replace('fifth]', 'fifth, sixth]'))
+    assert problems(tmp_path, text, PROFILE) == [
         at('f.yaml:16: drives.lift.cyclic_request', 'too_many_parameters', count=6, most=5,
            more='')]
 
@@ -140,20 +144,16 @@ def test_stations_at_the_ends(tmp_path: Path) -> None:
     ('part: {subindex: 1}', at('table.yaml:13: parameters.part.subindex', 'subindex_alone')),
     ('kept: {storage: eeprom}', at('table.yaml:13: parameters.kept.storage',
                                    'process_data_stored')),
+    ('status_word: {type: int16}', at('table.yaml:13: parameters.status_word', 'built_in',
+                                      name='status_word', family='cannord')),
+    ('flags: {number: 5, bits: {status_word: 1}}', at(
+        'table.yaml:13: parameters.flags.bits.status_word', 'built_in', name='status_word',
+        family='cannord')),
+    (CANOPEN.strip().replace('index: 0x2000, subindex: 1', 'number: 5'),
+     at('table.yaml:14: control', 'control_built_in', family='cannord')),
 ])
 def test_problems_of_a_profile(tmp_path: Path, entry: str, found: object) -> None:
     assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [found]
-
-
-def test_process_data_are_volatile(tmp_path: Path) -> None:
-    profile = f'{PROFILE}  passing: {{storage: ram}}\n'
-    assert problems(tmp_path, FILE, profile) == []
-
-
-def test_control_is_built_in(tmp_path: Path) -> None:
-    with_control = PROFILE + CANOPEN.replace('index: 0x2000, subindex: 1', 'number: 5')
-    assert problems(tmp_path, FILE, with_control) == [
-        at('table.yaml:14: control', 'control_built_in', family='cannord')]
 
 
 def test_a_profile_for_several_protocols(tmp_path: Path) -> None:
@@ -239,14 +239,6 @@ def test_group_and_all_on_one_bus(tmp_path: Path, first: str, other: str) -> Non
     assert problems(tmp_path, second(text, other, 'none'), PROFILE) == []
 
 
-@pytest.mark.parametrize('entry', ['status_word: {type: int16}',
-                                   'flags: {number: 5, bits: {status_word: 1}}'])
-def test_status_word_is_built_in(tmp_path: Path, entry: str) -> None:
-    path = 'status_word' if entry[0] == 's' else 'flags.bits.status_word'
-    assert problems(tmp_path, FILE, f'{PROFILE}  {entry}\n') == [
-        at(f'table.yaml:13: parameters.{path}', 'built_in', name='status_word', family='cannord')]
-
-
 def test_a_wrong_station_makes_no_further_problems(tmp_path: Path) -> None:
     text = second(second(together(), 'station: 2', 'station: 300'), 'period: 0.02', 'period: 0.5')
     assert problems(tmp_path, text, PROFILE) == [
@@ -294,24 +286,18 @@ def test_a_group_shares_its_load(tmp_path: Path, capsys: pytest.CaptureFixture[s
 # -- raw names ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(('name', 'number', 'subindex'), [
-    ('p0', 0, None), ('p102', 102, None), ('p0102', 102, None), ('p2047', 2047, None),
-    ('p613.0', 613, 0), ('p613.21', 613, 21), ('p613.255', 613, 255)])
-def test_raw_names(tmp_path: Path, name: str, number: int, subindex: int | None) -> None:
+@pytest.mark.parametrize(('name', 'address'), [
+    ('p0', (0, None)), ('p102', (102, None)), ('p0102', (102, None)), ('p2047', (2047, None)),
+    ('p613.0', (613, 0)), ('p613.21', (613, 21)), ('p613.255', (613, 255)),
+    *((name, None) for name in (
+        'p', 'p2048', 'p99999', 'p1.256', 'p1.', 'p.1', 'p1.2.3', 'P1', 'x2000.1', 'p-1', 'p1 ',
+        'ramp'))])
+def test_raw_names(tmp_path: Path, name: str, address: tuple[int, int | None] | None) -> None:
     lift = load(tmp_path, FILE, PROFILE).drives['lift']
     found = FAMILY.raw_parameter(lift, name)
-    assert found is not None
-    assert (found.number, found.subindex, found.type, found.width_known, found.kind) == (
-        number, subindex, ParameterType.UINT32, False, ValueKind.INTEGER)
-    assert not found.listed
-
-
-@pytest.mark.parametrize('name', [
-    'p', 'p2048', 'p99999', 'p1.256', 'p1.', 'p.1', 'p1.2.3', 'P1', 'x2000.1', 'p-1', 'p1 ',
-    'ramp'])
-def test_no_raw_names(tmp_path: Path, name: str) -> None:
-    lift = load(tmp_path, FILE, PROFILE).drives['lift']
-    assert FAMILY.raw_parameter(lift, name) is None
+    assert (found and (found.number, found.subindex)) == address
+    assert found is None or (found.type, found.width_known, found.kind, found.listed) == (
+        ParameterType.UINT32, False, ValueKind.INTEGER, False)
 
 
 def test_broadcasts_that_an_inverter_may_obey_are_claimed_by_nobody(tmp_path: Path) -> None:

@@ -55,34 +55,20 @@ def test_load(drive: DriveConfiguration, period: float, mapping: str, bits: floa
     assert FAMILY.bits_per_second(drive) == pytest.approx(bits)
 
 
-@pytest.mark.parametrize(('name', 'number'), [
-    ('p0', 0), ('p30', 30), ('p030', 30), ('p65534', 65534)])
-def test_raw_names(drive: DriveConfiguration, name: str, number: int) -> None:
-    parameter = FAMILY.raw_parameter(drive, name)
-    assert parameter is not None
-    assert (parameter.name, parameter.number, parameter.type) == (
-        name, number, ParameterType.UINT16)
-    assert (parameter.scaled, parameter.storage, parameter.listed) == (False, None, False)
-    assert (parameter.access, parameter.kind) == (Access.READ_WRITE, ValueKind.INTEGER)
-
-
-@pytest.mark.parametrize('name', [
-    '', 'p', 'p65536', 'p123456', 'p-1', 'P30', 'p30.1', 'x1000.1', 'speed', 'p1 ', 'p٣', 'pp1'])
-def test_names_that_are_not_raw(drive: DriveConfiguration, name: str) -> None:
-    assert FAMILY.raw_parameter(drive, name) is None
-
-
-def test_raw_names_with_an_offset(drive: DriveConfiguration) -> None:
-    moved = with_options(drive, parameter_offset=-1)
-    assert FAMILY.raw_parameter(moved, 'p0') is None
-    assert FAMILY.raw_parameter(moved, 'p65536') is None
-    parameter = FAMILY.raw_parameter(moved, 'p1')
-    assert parameter is not None
-    assert parameter.number == 1
-    moved = with_options(drive, parameter_offset=1)
+@pytest.mark.parametrize(('offset', 'name', 'number'), [
+    (0, 'p0', 0), (0, 'p30', 30), (0, 'p030', 30), (0, 'p65534', 65534),
+    *((0, name, None) for name in (
+        '', 'p', 'p65536', 'p123456', 'p-1', 'P30', 'p30.1', 'x1000.1', 'speed', 'p1 ', 'p٣',
+        'pp1')),
+    (-1, 'p0', None), (-1, 'p65536', None), (-1, 'p1', 1),
     # on the wire it would be the number that marks cyclic telegrams
-    assert FAMILY.raw_parameter(moved, 'p65534') is None
-    assert FAMILY.raw_parameter(moved, 'p65533') is not None
+    (1, 'p65534', None), (1, 'p65533', 65533)])
+def test_raw_names(drive: DriveConfiguration, offset: int, name: str, number: int | None) -> None:
+    found = FAMILY.raw_parameter(with_options(drive, parameter_offset=offset), name)
+    assert (found and found.number) == number
+    assert found is None or (found.name, found.type, found.scaled, found.storage, found.listed,
+                             found.access, found.kind) == (
+        name, ParameterType.UINT16, False, None, False, Access.READ_WRITE, ValueKind.INTEGER)
 
 
 @pytest.mark.parametrize('offset', [-123, 65532])

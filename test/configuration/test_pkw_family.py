@@ -248,21 +248,15 @@ def test_setpoint_that_overwrites_the_control_word(tmp_path: Path) -> None:
     ('p455', (455, 0x2004, 6)), ('x2004.06', (455, 0x2004, 6)),
     # 32 bits are no register
     ('p500', (500, None, None)), ('p720', (720, None, None)),
-])
+    *((name, None) for name in (
+        '', 'p', 'p65536', 'p-1', 'P30', 'p30.1', 'x', 'x2004', 'x2004.', 'x.1', 'x20040.1',
+        'x2004.100', 'x2004.1.1', 'xg.1', 'speed', 'p1 ', 'p٣'))])
 def test_raw_names(drive: DriveConfiguration, name: str,
-                   address: tuple[int | None, int | None, int | None]) -> None:
-    parameter = FAMILY.raw_parameter(drive, name)
-    assert parameter is not None
-    assert (parameter.number, parameter.index, parameter.subindex) == address
-    assert (parameter.name, parameter.type) == (name, ParameterType.UINT16)
-    assert (parameter.scaled, parameter.listed) == (False, False)
-
-
-@pytest.mark.parametrize('name', [
-    '', 'p', 'p65536', 'p-1', 'P30', 'p30.1', 'x', 'x2004', 'x2004.', 'x.1', 'x20040.1',
-    'x2004.100', 'x2004.1.1', 'xg.1', 'speed', 'p1 ', 'p٣'])
-def test_names_that_are_not_raw(drive: DriveConfiguration, name: str) -> None:
-    assert FAMILY.raw_parameter(drive, name) is None
+                   address: tuple[int | None, int | None, int | None] | None) -> None:
+    found = FAMILY.raw_parameter(drive, name)
+    assert (found and (found.number, found.index, found.subindex)) == address
+    assert found is None or (found.name, found.type, found.scaled, found.listed) == (
+        name, ParameterType.UINT16, False, False)
 
 
 @pytest.mark.parametrize('keys, taken', [
