@@ -85,13 +85,6 @@ class Line:
         return self.sent()
 
 
-def test_procedure_that_wants_nothing_ends_at_once() -> None:
-    line = Line()
-    assert line.reads() == []
-    assert line.results == [[]]
-    assert line.channel.next_timer() == math.inf
-
-
 def test_lanes_take_turns_after_every_step() -> None:
     line = Line()
     assert line.reads(1, 2, 3, priority=Priority.USERS) == ['1?']
@@ -115,18 +108,6 @@ def test_lanes_take_turns_between_attempts() -> None:
     assert line.answer(0, 1.22) == ['1?']
     assert line.at(1.33) == []
     assert line.results == [[(0,)], [(0,)], [None]]
-
-
-def test_attempts_of_one_read_may_differ() -> None:
-    line = Line(attempts=3)
-
-    def once() -> Procedure:
-        return (yield Read(1, attempts=1))
-
-    line.channel.run(once(), line.results.append, 1.0)
-    assert line.sent() == ['1?']
-    assert line.at(1.1) == []
-    assert line.results == [None]
 
 
 def test_write_first_overtakes_and_replaces() -> None:
@@ -192,23 +173,6 @@ def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> Non
         left += [(frame.identifier, frame.data[0]) for frame in line.outbox.take()]
         line.outbox.left(now)
     assert left == [(52, 9), (52, 0), (50, 0)]
-
-
-def test_write_that_the_bus_refuses_was_not_sent() -> None:
-    line = Line()
-    found: list[object] = []
-
-    def writing() -> Procedure:
-        found.append((yield Write(30, (1,), eeprom=False)))
-        found.append((yield Write(31, (1,), eeprom=False)))
-    line.channel.run(writing(), found.append, 1.0)
-    assert [frame.identifier for frame in line.outbox.take()] == [30]
-    line.outbox.left(1.0, refused={0})
-    assert [frame.identifier for frame in line.outbox.take()] == []    # the spacing
-    line.channel.advance(1.001)
-    assert [frame.identifier for frame in line.outbox.take()] == [31]
-    line.outbox.left(1.001)
-    assert found == [None, (), None]
 
 
 def test_what_is_sent_called_back_may_write_again() -> None:

@@ -5,19 +5,20 @@ from dataclasses import replace
 from functools import partial
 
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, parameter,
-    RAMP, read, SILENT_CONTROL, SPEED, TABLE, WORD, write,
+    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, RAMP, read,
+    SILENT_CONTROL, SPEED, TABLE, WORD, write,
 )
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_WORD, checked, DISABLE, ENABLED, exchange, NEUTRAL, online,
-    SILENT, TICK, ZEROS,
+    TICK, ZEROS,
 )
 import pytest
 from saying import says
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import DriveState, FrameRejected, Noted, StationLost
+from drive_can_bridge.core.events import DriveState, FrameRejected, Noted
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 
@@ -26,6 +27,13 @@ ENABLE = '00300341#0001000000000000'
 QUICK_STOP = '00300341#0002000000000000'
 RESET = '00300341#0080000000000000'
 ASK_STATUS = f'00200D31#{ZEROS}'
+#: nobody said that it is RAM
+EEPROM_WORD = replace(WORD, storage=None)
+
+
+def table_with(word: Parameter) -> tuple[Parameter, ...]:
+    """Return the usual profile with another control word."""
+    return tuple(word if entry is WORD else entry for entry in TABLE)
 
 
 def inside(**options: object) -> Conversation:
@@ -48,18 +56,6 @@ def at_once(talk: Conversation, now: float, answer: str) -> list[str]:
 # -- in the cyclic request ------------------------------------------------------------------------
 
 
-def test_enable_in_the_cycle() -> None:
-    talk = inside()
-    assert talk.asks(ControlAction.ENABLE, 10.003) == []
-    assert exchange(talk, 10.02, READY) == '003FFFF0#0001000000000000'
-    assert exchange(talk, 10.04, ENABLED) == '003FFFF0#0001000000000000'
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert exchange(talk, 10.06, ENABLED) == '003FFFF0#0001000000000000'
-    talk.asks(ControlAction.DISABLE, 10.07)
-    assert exchange(talk, 10.08, READY) == NEUTRAL
-    assert talk.control_outcomes() == [('disable', True, 'ready')]
-
-
 def test_slot_in_the_middle() -> None:
     talk = online(control=CONTROL, request=(SPEED, WORD, LIMIT), mapping='assume',
                   rearm_immediate=True)
@@ -72,26 +68,11 @@ def test_slot_in_the_middle() -> None:
 
 
 def test_word_with_its_top_bit_set_in_a_signed_parameter() -> None:
-    signed = parameter('control_word', 52, type=INT16, storage=WORD.storage)
-    table = (*(entry for entry in TABLE if entry is not WORD), signed)
+    signed = replace(WORD, type=INT16)
     talk = online(control=replace(CONTROL, enable=0x8001), request=(signed,), mapping='assume',
-                  table=table)
+                  table=table_with(signed))
     talk.asks(ControlAction.ENABLE, 10.003)
     assert exchange(talk, 10.02, READY) == '003FFFF0#8001000000000000'
-
-
-def test_response_without_its_status_confirms_nothing() -> None:
-    talk = inside()
-    talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
-    talk.until(10.04 + TICK)
-    talk.hears('103FFFF0#03E800FA', 10.041)       # too short for the status word
-    assert len(talk.events(FrameRejected)) == 1
-    assert talk.session.control is not None
-    assert talk.session.control.state == 'unknown'
-    assert talk.control_outcomes() == []
-    exchange(talk, 10.06, ENABLED)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
 
 
 def cut(talk: Conversation, now: float) -> str:
@@ -104,7 +85,9 @@ def cut(talk: Conversation, now: float) -> str:
 def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
     talk = inside(rearm_immediate=True)
     talk.asks(ControlAction.ENABLE, 10.003)
-    exchange(talk, 10.02, READY)
+    assert cut(talk, 10.02) == '003FFFF0#0001000000000000'
+    assert len(talk.events(FrameRejected)) == 1
+    assert talk.control_outcomes() == [], 'it confirms nothing'
     exchange(talk, 10.04, ENABLED)
     talk.commands(0, 100.0, 10.043)
     runs = '003FFFF0#000103E800000000'
@@ -179,37 +162,8 @@ def test_word_that_got_lost_is_written_again() -> None:
     assert talk.control_outcomes() == [('disable', True, 'ready')]
 
 
-def test_disable_that_gets_lost_when_a_drive_comes_back_is_written_again() -> None:
-    talk = beside()
-    exchange(talk, 10.02, READY)
-    talk.asks(ControlAction.ENABLE, 10.025)
-    cycles(talk, 2, 3, ENABLED)
-    talk.until(10.16 + TICK)       # silence
-    assert talk.session.state is DriveState.OFFLINE
-    talk.events()
-    assert talk.hears(ENABLED, 10.162) == [DISABLE]                # lost
-    sent = cycles(talk, 9, 200, ENABLED)
-    # it was told to run, so that it is told to stop and asked for its word, three times at most
-    assert [text for number, text in sent if number < 30].count(ASK_WORD) <= 3
-    written = [number for number, text in sent if text == DISABLE]
-    # and as long as it goes on running: less and less often
-    assert written[-2:] == [78, 158]
-    assert talk.session.control is not None
-    text = ('still enabled (status word 0003h) although its control word is disable (0000h): stop '
-            'it by other means, or set a control_timeout longer than its ramp')
-    assert talk.session.control.disregard == text
-    assert [note.text for note in talk.events(Noted)] == [
-        says(
-            'may_still_be_running', why=says('stop_failed', what=[says('write_unanswered',
-            what='control_word (P52)')])), text]
-    assert cycles(talk, 201, 400, READY) == []
-    assert talk.session.control.disregard == ''
-
-
 def test_word_in_an_eeprom_is_written_again_three_times_only() -> None:
-    kept = parameter('control_word', 52)     # nobody said that it is RAM
-    table = (*(entry for entry in TABLE if entry is not WORD), kept)
-    talk = beside(table=table)
+    talk = beside(table=table_with(EEPROM_WORD))
     exchange(talk, 10.02, READY)
     talk.asks(ControlAction.ENABLE, 10.025)
     cycles(talk, 2, 3, ENABLED)
@@ -250,58 +204,22 @@ def test_stop_goes_before_everything_that_waits() -> None:
     assert talk.asks(ControlAction.DISABLE, 10.12) == [DISABLE]
 
 
-def test_word_does_not_wait_for_the_eeprom() -> None:
-    talk = beside(period=10.0)
+@pytest.mark.parametrize('word, told_at', [(WORD, 10.103), (EEPROM_WORD, 10.121)])
+def test_only_a_word_in_an_eeprom_waits_for_the_eeprom(word: Parameter, told_at: float) -> None:
+    talk = beside(period=10.0, table=table_with(word))
     talk.submits(write((RAMP, 5)), 10.1)
     talk.hears('102001E1#0004000000000000', 10.101)
-    assert talk.asks(ControlAction.QUICK_STOP, 10.103) == [QUICK_STOP]
-
-
-def test_word_in_an_eeprom_does() -> None:
-    slow = parameter('control_word', 52)
-    talk = beside(period=10.0, table=(*(entry for entry in TABLE if entry is not WORD), slow))
-    talk.submits(write((RAMP, 5)), 10.1)
-    talk.hears('102001E1#0004000000000000', 10.101)
-    assert talk.asks(ControlAction.QUICK_STOP, 10.103) == []
-    assert talk.until(10.122)[0] == (10.121, QUICK_STOP)
-
-
-def enable(talk: Conversation) -> None:
-    """Ask for it at 10.01 s; the last of three cycles is answered at 10.062 s."""
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle, answer in ((1, READY), (2, ENABLED), (3, ENABLED)):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(answer, 10.002 + 0.02 * cycle)
-
-
-def test_loss_writes_disable() -> None:
-    talk = beside()
-    enable(talk)
-    found = talk.until(10.16)
-    # disable at once when it is lost, and read back
-    assert [text for _, text in found if text != ASK_WORD] == (
-        [NEUTRAL] * 3 + [DISABLE, NEUTRAL, DISABLE, NEUTRAL])
-    assert talk.events(StationLost) == [StationLost(SILENT)]
-
-
-def test_differing_map_writes_disable() -> None:
-    talk = online(control=CONTROL, period=0.1)
-    talk.asks(ControlAction.ENABLE, 10.085)
-    for cycle in range(1, 10):
-        talk.until(10.0 + 0.1 * cycle + TICK)
-        talk.hears(ENABLED if cycle > 2 else READY, 10.002 + 0.1 * cycle)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert (11.0, ASK_REQUEST_MAP) in talk.until(11.0 + TICK)
-    assert talk.hears('102007A4#0000000000000000', 11.003) == [DISABLE]
+    sent = [(10.103, text) for text in talk.asks(ControlAction.QUICK_STOP, 10.103)]
+    assert (sent + talk.until(10.122))[0] == (told_at, QUICK_STOP)
 
 
 def test_drive_that_reports_nothing() -> None:
-    talk = beside(control=SILENT_CONTROL, period=10.0)
+    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
+    assert talk.until(10.009) == []     # nor is what it has not run behind written again
     talk.asks(ControlAction.ENABLE, 10.01)
     assert at_once(talk, 10.01, ANSWER) == [NEUTRAL, ENABLE]
-    (action, success, text), = talk.control_outcomes()
-    assert (action, success) == ('enable', True)
-    assert text == says('state_not_reported')
+    assert talk.control_outcomes() == [('enable', True, says('state_not_reported'))]
+    assert talk.until(19.0) == [], 'what starts it is written once'
 
 
 def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
@@ -329,24 +247,6 @@ def test_a_drive_that_reports_nothing_is_told_to_stop_more_than_once(
     assert ENABLE not in [text for _, text in sent]
 
 
-def test_what_starts_a_drive_that_reports_nothing_is_written_once() -> None:
-    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
-    assert [text for _, text in talk.until(10.009)] == []   # nor what it has not run behind
-    talk.asks(ControlAction.ENABLE, 10.01)
-    at_once(talk, 10.01, ANSWER)
-    assert [text for _, text in talk.until(19.0)] == []
-
-
-def test_a_stop_is_not_told_again_behind_a_new_enable() -> None:
-    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    at_once(talk, 10.01, ANSWER)
-    assert DISABLE in talk.asks(ControlAction.DISABLE, 10.5)
-    at_once(talk, 10.5, ANSWER)
-    talk.asks(ControlAction.ENABLE, 10.6)
-    assert ENABLE in at_once(talk, 10.6, ANSWER)
-    assert DISABLE not in [text for _, text in talk.until(19.0)]
-
 
 def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
     talk = beside(missed_limit=25)
@@ -365,18 +265,6 @@ def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
 def apart(**options: object) -> Conversation:
     """Return an online drive whose control and status words both have no slot."""
     return beside(response=(ACTUAL, CURRENT), **options)
-
-
-def test_status_is_read_when_the_drive_is_found() -> None:
-    talk = Conversation(drive(control=CONTROL, response=(ACTUAL, CURRENT), mapping='assume'))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    talk.at(10.0)
-    assert talk.hears(ANSWER, 10.002) == [DISABLE]
-    assert talk.until(10.01) == [(10.003, ASK_STATUS)]
-    talk.hears('10200D31#0001000000000000', 10.011)
-    assert talk.session.control is not None
-    assert talk.session.control.state == 'ready'
 
 
 def looks(talk: Conversation, end: float, status: str) -> list[float]:
@@ -433,17 +321,6 @@ def test_fault_is_seen_in_a_read_status() -> None:
     talk = apart()
     looks(talk, 10.6, '0008')
     assert talk.session.state is DriveState.FAULT
-
-
-def test_no_status_is_read_of_a_lost_drive() -> None:
-    talk = apart()
-    looks(talk, 10.6, '0001')
-    talk.bus_down(10.61)
-    assert talk.until(20.0) == []
-    talk = apart()
-    talk.until(10.5)                              # no answers: offline, but cycled on
-    assert not talk.session.online
-    assert ASK_STATUS not in [text for _, text in talk.until(12.0)]
 
 
 def test_no_status_is_read_behind_the_disable_of_a_lost_drive() -> None:

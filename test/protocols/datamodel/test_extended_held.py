@@ -176,29 +176,6 @@ def test_after_a_command_time_out_it_stays_where_it_was_sent() -> None:
     assert talk.commands(0, 8.2, 10.123) is CommandOutcome.ARMED
 
 
-def test_command_that_never_left_is_no_place_to_stay_at() -> None:
-    """The cycle came later than the command may be old: it is not sent, and leaves no trace."""
-    talk = enabled(70, command_timeout=0.01)
-    talk.commands(0, 7.1, 10.055)
-    assert cycle(talk, 3, 3, 70) == request(1, 71)
-    talk.commands(0, 7.1, 10.0625)
-    talk.commands(0, 9.0, 10.0630)
-    assert cycle(talk, 4, 3, 71) == request(1, 71)
-    assert cycle(talk, 5, 3, 71) == request(1, 71)
-
-
-def test_frame_that_the_bus_refused_was_not_sent() -> None:
-    talk = enabled(70, command_timeout=0.03)
-    talk.commands(0, 7.0, 10.055)
-    assert cycle(talk, 3, 3, 70) == request(1, 70)
-    talk.commands(0, 9.0, 10.079)
-    talk.refusing = lambda text: True
-    assert talk.until(10.08 + 1e-6) == []
-    talk.refusing = lambda text: False
-    talk.session.setpoints.expire(10.12)
-    assert talk.until(10.12)[0][1] == request(1, 70)
-
-
 @pytest.mark.parametrize(('action', 'word'), [
     (ControlAction.DISABLE, 0), (ControlAction.QUICK_STOP, 2)])
 def test_stop_keeps_what_was_sent_until_it_is_disabled(action: ControlAction, word: int) -> None:

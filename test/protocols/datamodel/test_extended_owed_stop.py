@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from builders import (
-    CONTROL, Conversation, drive, GAIN, LIMIT, parameter, SPEED, TABLE, WORD, write,
+    CONTROL, Conversation, drive, LIMIT, SPEED, TABLE, WORD,
 )
 from extended_builders import (
     ANSWER, ASK_LIMIT, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, ASK_SPEED, checked, DISABLE, ENABLED,
@@ -80,13 +80,6 @@ def test_stop_that_nobody_had_answered_before_a_stall_is_told_again() -> None:
     assert warnings(talk) == [UNHEARD]
 
 
-def test_stop_that_was_answered_before_a_stall_is_not() -> None:
-    talk = running()
-    talk.commands(0, 0.0, 10.03)
-    assert exchange(talk, 10.04) == NEUTRAL
-    assert talk.time_lost(11.5) == [ASK_REQUEST_MAP]
-
-
 # -- the bus went, and came back ------------------------------------------------------------------
 
 
@@ -109,16 +102,6 @@ def test_stop_that_a_lost_bus_cut_short_is_begun_anew() -> None:
     assert talk.bus_down(12.05) == []
     assert talk.bus_up(13.0) == [SPEED_ZERO]
     assert [text for _, text in talk.until(13.002)] == [LIMIT_ZERO, ASK_SPEED]
-
-
-def test_stop_while_the_maps_are_read_again() -> None:
-    talk = running()
-    talk.bus_down(10.03)
-    talk.bus_up(12.0)
-    talk.until(12.0021)
-    assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
-    assert talk.deactivate(12.05) == []     # it has confirmed to stand still
-    assert talk.session.stopped
 
 
 # -- the maps differ ------------------------------------------------------------------------------
@@ -193,44 +176,15 @@ def test_neutral_cycles_that_went_elsewhere_are_followed_by_writes() -> None:
     assert not talk.session.may_run
 
 
-def neutral_cycles_without_an_answer() -> Conversation:
-    """Return a drive whose response map differs, at 11.9 s."""
+def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
     talk = response_map_differs()
     assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
-    return talk
-
-
-def test_response_map_that_differs_and_a_drive_that_falls_silent() -> None:
-    talk = neutral_cycles_without_an_answer()
-    assert warnings(talk) == []
-    talk.bus_down(11.9)
-    assert warnings(talk) == [may_run('bus_lost_before_stop')]
-
-
-def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
-    talk = neutral_cycles_without_an_answer()
     assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
     assert talk.hears(REQUEST_MAP, 12.02) == [ASK_RESPONSE_MAP]
     sent = talk.hears(OTHER_RESPONSE, 12.03) + [text for _, text in talk.until(12.04)]
     assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
     assert confirmed(talk, 12.05) == []
     assert not talk.session.may_run
-
-
-def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() -> None:
-    talk = running()
-    look(talk)
-    talk.hears(REQUEST_MAP, 11.003)
-    before = talk.session.statistics.missed, talk.session.statistics.exchanges
-    talk.until(11.0209)     # a cycle is under way
-    talk.hears(OTHER_RESPONSE, 11.021)
-    after = talk.session.statistics.missed, talk.session.statistics.exchanges
-    assert after == before
-    talk.events()
-    talk.hears(ANSWER, 11.022)
-    assert talk.events() == []
-    assert (talk.session.statistics.missed, talk.session.statistics.exchanges) == before
-    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
 
 
 def test_response_map_that_differs_disables_too() -> None:
@@ -388,20 +342,6 @@ def test_written_disable_that_was_refused_is_written_again(
     assert DISABLE in [text for _, text in talk.until(10.09)]
 
 
-def test_many_writes_that_are_refused_end_with_the_first() -> None:
-    talk = online(verify_writes=False)
-    refused: list[str] = []
-
-    def refusing(text: str) -> bool:
-        refused.append(text)
-        return True
-    talk.refusing = refusing
-    others = [parameter(f'g{number}', number, storage=GAIN.storage) for number in range(300, 320)]
-    talk.submits(write(*((other, 1) for other in others)), 10.003)
-    assert talk.outcomes() == [[says('not_sent')] * 20]
-    assert len(refused) == 1
-
-
 # -- the drive falls silent -----------------------------------------------------------------------
 
 
@@ -506,23 +446,6 @@ def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
     assert not talk.session.duty.owed
     checked(talk, 10.164)
     assert {text for _, text in talk.until(10.22)} == {NEUTRAL}, 'and is looked for'
-    assert warnings(talk) == []
-
-
-def test_silent_drive_is_warned_about_once_and_stopped_when_it_shows_a_sign_of_life() -> None:
-    talk = left_alone()
-    assert {text for _, text in talk.until(12.0)} >= {ASK_REQUEST_MAP}
-    assert warnings(talk) == [UNHEARD]
-    assert talk.until(20.0)[-1][1] == ASK_REQUEST_MAP
-    assert warnings(talk) == [], 'once'
-    assert talk.session.duty.owed
-    now = talk.now
-    assert talk.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
-    assert talk.hears(RESPONSE_MAP, now + 0.002) == []
-    assert [text for _, text in talk.until(now + 0.011)] == [NEUTRAL], 'its request map agrees'
-    assert talk.session.duty.owed
-    assert talk.hears(ANSWER, now + 0.012) == []
-    assert talk.session.online and not talk.session.duty.owed
     assert warnings(talk) == []
 
 

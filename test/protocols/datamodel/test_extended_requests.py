@@ -2,10 +2,10 @@
 """Conversations about parameter requests: acyclic frames, their pace, and what became of them."""
 
 from builders import (
-    ACTUAL, BOOL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, MAXIMUM, ORDER, parameter, RAM,
+    BOOL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, MAXIMUM, ORDER, parameter, RAM,
     RAMP, read, SPEED, write,
 )
-from extended_builders import ANSWER, ASK_REQUEST_MAP, NEUTRAL, online, TICK, ZEROS
+from extended_builders import ANSWER, NEUTRAL, online, TICK, ZEROS
 import pytest
 from saying import says
 
@@ -24,14 +24,6 @@ def quiet(**options: object) -> Conversation:
 
 
 # -- reading --------------------------------------------------------------------------------------
-
-
-def test_read() -> None:
-    talk = quiet()
-    assert talk.submits(read(GAIN), 10.1) == [ASK_GAIN]
-    assert talk.hears('10200281#1234FFFFFFFFFFFF', 10.101) == []
-    assert talk.outcomes() == [[0x1234]]
-    assert talk.session.statistics.requests_ok == 1
 
 
 def test_consecutive_numbers_share_frames() -> None:
@@ -74,7 +66,8 @@ def test_answer_to_a_repeated_question() -> None:
     (1, 1.0, 'no answer in 1 s, 2 attempts'),
 ])
 def test_time_out(retries: int, timeout: float, text: str) -> None:
-    talk = quiet(parameter_retries=retries, parameter_timeout=timeout)
+    talk = quiet(parameter_retries=retries)
+    talk.session.reconfigure(parameter_timeout=timeout)
     talk.submits(read(GAIN), 10.1)
     end = 10.1 + (retries + 1) * timeout
     sent = talk.until(end - TICK)
@@ -82,24 +75,6 @@ def test_time_out(retries: int, timeout: float, text: str) -> None:
     assert talk.outcomes() == []
     talk.until(end + TICK)
     assert talk.outcomes() == [[text]]
-
-
-def test_timeout_that_is_changed_while_running() -> None:
-    talk = quiet(parameter_retries=0)
-    talk.session.reconfigure(parameter_timeout=0.3)
-    talk.submits(read(GAIN), 10.1)
-    talk.until(10.4 + TICK)
-    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.3)]]
-
-
-def test_offline_drive_is_asked_once_and_the_rest_fails_at_once() -> None:
-    talk = Conversation(drive(parameter_retries=0, mapping='assume', period=10.0))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    talk.at(10.0)
-    assert talk.submits(read(GAIN, RAMP, ACTUAL), 16.0) == [ASK_RAMP]
-    assert talk.until(16.2) == []
-    assert talk.outcomes() == [[says('no_answer_offline')] * 3]
 
 
 def test_offline_drive_that_answers_anyway() -> None:
@@ -113,51 +88,7 @@ def test_offline_drive_that_answers_anyway() -> None:
     assert talk.outcomes() == [[says('no_answer_offline'), 5]]
 
 
-def test_requests_in_a_row() -> None:
-    talk = quiet()
-    assert talk.submits(read(GAIN), 10.1) == [ASK_GAIN]
-    assert talk.submits(read(DAMPING), 10.1) == []
-    assert talk.submits(read(), 10.1) == []
-    assert talk.outcomes() == [[]]
-    assert talk.hears('10200281#0001000000000000', 10.101) == [ASK_DAMPING]
-    assert talk.hears('10200291#0002000000000000', 10.102) == []
-    assert talk.outcomes() == [[1], [2]]
-
-
-def test_look_at_the_maps_goes_between_two_reads_of_a_long_request() -> None:
-    talk = online()
-    single = [parameter(f'r{number}', number) for number in range(300, 340, 2)]
-    for cycle in range(1, 50):
-        now = 10.0 + 0.02 * cycle
-        talk.until(now + TICK)
-        talk.hears(ANSWER, now + 0.002)
-    talk.submits(read(*single), 10.99)
-    answered, now = 0, 10.991
-    looks = []
-    while now < 11.03:
-        for _, text in talk.until(now):
-            if text == ASK_REQUEST_MAP:
-                looks.append(answered)
-        outstanding = talk.session._side.transactor.outstanding
-        if outstanding is not None and outstanding.number >= 300:
-            sent = talk.hears(f'10{0x200001 | outstanding.number << 4:06X}#0001', now)
-            answered += 1
-            looks += [answered for text in sent if text == ASK_REQUEST_MAP]
-        now += 0.001
-    assert len(looks) == 1
-    assert 0 < looks[0] < 20
-
-
 # -- writing --------------------------------------------------------------------------------------
-
-
-def test_write_to_ram_is_read_back() -> None:
-    talk = quiet()
-    assert talk.submits(write((GAIN, 7)), 10.1) == ['00300281#0007000000000000']
-    assert talk.at(10.1009) == []
-    assert talk.at(10.1011) == [ASK_GAIN]           # a millisecond for its receive buffer
-    talk.hears('10200281#0007000000000000', 10.102)
-    assert talk.outcomes() == [['written']]
 
 
 def test_read_back_of_something_else() -> None:
@@ -275,17 +206,6 @@ def test_what_the_profile_does_not_say_is_eeprom() -> None:
     assert talk.until(10.13 + TICK) == [(10.13, f'00202581#{ZEROS}')]
 
 
-def test_eeprom_pace_outlives_a_deactivation_and_a_lost_bus() -> None:
-    talk = quiet(verify_writes=False)
-    talk.submits(write((RAMP, 5)), 10.1)
-    talk.hears('102001E1#0004000000000000', 10.11)
-    talk.bus_down(10.112)
-    talk.bus_up(10.113)
-    talk.at(10.113)
-    assert talk.submits(read(GAIN), 10.114) == []
-    assert talk.until(10.1299) == []
-
-
 # -- together -------------------------------------------------------------------------------------
 
 
@@ -296,13 +216,6 @@ def test_together_in_one_frame() -> None:
     assert talk.until(10.11) == [(10.101, ASK_BOTH)]
     talk.hears('10200282#0007000900000000', 10.12)
     assert talk.outcomes() == [[says('read_back_differs', found='9', wanted='8'), 'written']]
-
-
-def test_together_without_an_answer() -> None:
-    talk = quiet(parameter_retries=0)
-    talk.submits(write((GAIN, 7), (DAMPING, 8), atomic=True), 10.1)
-    talk.until(10.3)
-    assert talk.outcomes() == [[says('no_answer', attempts=1, timeout=0.1)] * 2]
 
 
 def test_together_unverified() -> None:
@@ -368,29 +281,12 @@ def test_acyclic_frames_wait_for_the_cyclic_response() -> None:
     assert talk.hears(ANSWER, 10.023) == [ASK_GAIN]
 
 
-def test_or_for_half_a_period() -> None:
-    talk = online(mapping='assume')
-    talk.at(10.02)
-    talk.submits(read(GAIN), 10.021)
-    assert talk.at(10.0299) == []
-    assert talk.until(10.03 + TICK) == [(10.03, ASK_GAIN)]
-
-
-def test_nor_longer_than_for_an_answer_however_long_the_period_is() -> None:
-    talk = quiet(parameter_timeout=0.25)
-    assert talk.until(20.0 + TICK) == [(20.0, NEUTRAL)]
-    talk.submits(read(GAIN), 20.1)
-    assert talk.until(20.25 - TICK) == []
-    assert talk.until(20.25 + TICK) == [(20.25, ASK_GAIN)]
-
-
-def test_cycles_do_not_wait_for_acyclic_answers() -> None:
-    talk = online(mapping='assume')
-    talk.submits(read(GAIN), 10.003)
-    times = []
-    for cycle in range(1, 30):
-        now = 10.0 + 0.02 * cycle
-        times += [when for when, text in talk.until(now + TICK) if text == NEUTRAL]
-        talk.hears(ANSWER, now + 0.002)
-    assert times == pytest.approx([10.0 + 0.02 * cycle for cycle in range(1, 30)])
-    assert talk.outcomes() == [[says('no_answer', attempts=3, timeout=0.1)]]
+@pytest.mark.parametrize('period, wait', [(0.02, 0.01), (10.0, 0.25)])
+def test_or_for_half_a_period_and_no_longer_than_for_an_answer(
+        period: float, wait: float) -> None:
+    talk = online(mapping='assume', period=period, parameter_timeout=0.25)
+    begin = 10.0 + period
+    assert talk.until(begin + TICK) == [(begin, NEUTRAL)]
+    talk.submits(read(GAIN), begin + 0.001)
+    assert talk.until(begin + wait - TICK) == []
+    assert talk.until(begin + wait + TICK) == [(begin + wait, ASK_GAIN)]

@@ -4,8 +4,7 @@
 import math
 
 from builders import (
-    CONTROL, Conversation, CURRENT, drive, GAIN, parameter, RAMP, read, SPEED, STATUS, TABLE, WORD,
-    write,
+    CONTROL, Conversation, CURRENT, drive, parameter, SPEED, TABLE, WORD,
 )
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_WORD, cycling, DISABLE, ENABLED, exchange, NEUTRAL, online, TICK,
@@ -14,7 +13,7 @@ import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted, StationLost
+from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted
 
 #: an EEPROM cell is the default where the profile does not say
 SLOW_WORD = parameter('control_word', 52)
@@ -28,24 +27,6 @@ def silent(talk: Conversation, now: float) -> None:
     assert talk.at(now) == []
     assert talk.at(now + 100.0) == []
     assert not talk.session.online
-
-
-def test_three_neutral_cycles_then_silence() -> None:
-    talk = online(rearm_immediate=True)
-    talk.commands(0, 100.0, 10.003)
-    assert exchange(talk, 10.02) != NEUTRAL
-    talk.events()
-
-    assert talk.deactivate(10.025) == []
-    assert not talk.session.stopped
-    assert not talk.session.active
-    assert exchange(talk, 10.04) == NEUTRAL
-    assert exchange(talk, 10.06) == NEUTRAL
-    assert talk.until(10.08 + TICK) == [(10.08, NEUTRAL)]
-
-    silent(talk, 10.09)
-    assert talk.events(StationLost) == [StationLost('deactivated')]
-    assert talk.session.offline_advice == 'deactivated'
 
 
 def test_answer_to_the_last_cycle_is_no_surprise() -> None:
@@ -94,16 +75,6 @@ def test_stop_while_the_drive_is_being_left() -> None:
     silent(talk, 11.0)
 
 
-def test_no_look_at_the_maps_while_stopping() -> None:
-    talk = online(period=0.1)
-    for cycle in range(1, 10):
-        exchange(talk, 10.0 + 0.1 * cycle)
-    talk.deactivate(10.95)
-    # a look was due at 11.0; what it might find must not keep the session from its end
-    assert talk.until(12.0) == [(10.95, NEUTRAL), (11.05, NEUTRAL), (11.15, NEUTRAL)]
-    silent(talk, 12.0)
-
-
 def test_look_that_is_under_way_when_the_stop_begins() -> None:
     talk = online(period=0.1)
     for cycle in range(1, 10):
@@ -115,14 +86,6 @@ def test_look_that_is_under_way_when_the_stop_begins() -> None:
     assert talk.until(12.0) == [(11.005, NEUTRAL), (11.105, NEUTRAL), (11.205, NEUTRAL)]
     assert talk.events(MappingDiffered) == []
     silent(talk, 12.0)
-
-
-def test_acyclic_frames_end_with_the_stop() -> None:
-    talk = online(verify_writes=False)
-    talk.submits(write((RAMP, 5), (GAIN, 7)), 10.003)
-    talk.submits(read(GAIN), 10.003)
-    talk.deactivate(10.004)
-    assert {text for _, text in talk.until(11.0)} == {NEUTRAL}
 
 
 # -- with a control word --------------------------------------------------------------------------
@@ -159,17 +122,6 @@ def test_confirmed_disable_stops_no_setpoint_of_the_cycle() -> None:
         says('may_still_be_running', why=says('stop_not_possible'))]
 
 
-def test_disable_goes_with_the_cycles() -> None:
-    talk = enabled(request=(WORD, SPEED), mapping='assume')
-    beat = talk.session.next_timer()
-    (_, request), = talk.until(beat)
-    assert request == '003FFFF0#0001000000000000'
-    talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
-    talk.deactivate(beat + 0.05)
-    assert [text for _, text in talk.until(beat + 5.0)] == [NEUTRAL] * 6     # nobody answers
-    silent(talk, beat + 6.0)
-
-
 def warnings(talk: Conversation) -> list[str]:
     return [note.text for note in talk.events(Noted) if note.warning]
 
@@ -182,29 +134,6 @@ def written_word() -> tuple[Conversation, float]:
     talk.hears('103FFFF0#03E800FA00030000', beat + 0.002)
     talk.events()
     return talk, beat + 0.05
-
-
-def test_disable_is_written_at_once_and_read_back() -> None:
-    talk, now = written_word()
-    assert talk.deactivate(now) == [DISABLE]
-    assert [text for _, text in talk.until(now + 0.001 + TICK)] == [NEUTRAL, ASK_WORD]
-    talk.hears('10200341#0000000000000000', now + 0.003)
-    assert [text for _, text in talk.until(now + 5.0)] == [NEUTRAL, NEUTRAL]
-    silent(talk, now + 6.0)
-    assert warnings(talk) == []
-
-
-def test_deactivated_again_while_only_the_word_is_not_confirmed() -> None:
-    talk, now = written_word()
-    talk.deactivate(now)
-    cycles, last = 0, now
-    while cycles < 3:
-        last = talk.session.next_timer()
-        cycles += talk.at(last).count(NEUTRAL)
-    assert not talk.session.stopped
-    talk.deactivate(last)
-    talk.until(now + 20.0)
-    silent(talk, now + 20.0)
 
 
 def test_disable_that_the_drive_does_not_have_is_written_again() -> None:
@@ -238,7 +167,9 @@ def test_disable_that_is_not_confirmed_is_told(answer: str, why: says) -> None:
     assert warnings(talk) == [may_run('stop_failed', what=[why])]
 
 
-@pytest.mark.parametrize('period, gap', [(0.02, 0.02), (0.005, 0.02), (0.02, 0.1)])
+@pytest.mark.parametrize('period, gap', [
+    (0.02, 0.02), (0.005, 0.02), (0.02, 0.1),
+    (0.02, 60.0)])      # a stop waits for none that takes a minute
 def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> None:
     talk = online(control=CONTROL, table=SLOW_TABLE, mapping='assume', period=period,
                   eeprom_write_gap=gap)
@@ -259,35 +190,17 @@ def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> 
     silent(talk, 13.0)
 
 
-def test_stop_does_not_wait_for_an_eeprom_that_takes_minutes() -> None:
-    talk = online(control=CONTROL, table=SLOW_TABLE, mapping='assume', eeprom_write_gap=60.0)
-    assert talk.until(10.019) == []
-    talk.deactivate(10.019)
-    found = [text for now, text in talk.until(12.0)]
-    assert found.count(NEUTRAL) == 3
-    assert found.count(DISABLE) == 3    # nobody confirms it
-    silent(talk, 13.0)
-
-
-def test_only_the_status_is_acyclic() -> None:
-    talk = online(control=CONTROL, request=(WORD, SPEED), response=(CURRENT,), mapping='assume',
-                  table=TABLE)
-    assert STATUS not in talk.session.configuration.cyclic_response
-    talk.deactivate(10.01)
-    assert [text for _, text in talk.until(12.0)] == [NEUTRAL] * 3
-    silent(talk, 13.0)
-
-
 @pytest.mark.parametrize('status, state, off', [(3, 'enabled', False), (1, 'ready', True)])
-def test_last_status_word_of_a_stop_is_known_after_it(status: int, state: str, off: bool) -> None:
-    """Also where the word that stops has no slot."""
+def test_disable_is_written_at_once_and_read_back(status: int, state: str, off: bool) -> None:
+    """And what the last status word said is known behind it."""
     talk, now = written_word()
     assert talk.deactivate(now) == [DISABLE]
     assert [text for _, text in talk.until(now + 0.001 + TICK)] == [NEUTRAL, ASK_WORD]
     talk.hears(f'103FFFF0#000000000{status:03X}0000', now + 0.002)
     talk.hears('10200341#0000000000000000', now + 0.003)
-    talk.until(now + 5.0)
-    assert talk.session.stopped
+    assert [text for _, text in talk.until(now + 5.0)] == [NEUTRAL, NEUTRAL]
+    silent(talk, now + 6.0)
+    assert warnings(talk) == []
     assert talk.session.control is not None
     assert (talk.session.control.state, talk.session.control.off) == (state, off)
 

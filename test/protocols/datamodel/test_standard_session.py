@@ -22,7 +22,6 @@ from drive_can_bridge.core.events import (
     StationFound, StationLost,
 )
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.setpoints import CommandOutcome
 
 FAR = parameter('heat', 220, access=RO)
 GAP = parameter('torque', 213, access=RO)
@@ -124,15 +123,6 @@ def test_a_round_is_published_with_the_time_of_its_last_answer() -> None:
     assert talk.session.statistics.latency.maximum == pytest.approx(0.002)
 
 
-def test_rounds_keep_the_period() -> None:
-    talk = online()
-    for cycle in range(1, 100):
-        assert set(round_of(talk, 10.0 + 0.02 * cycle)) <= {SPEED_ZERO, LIMIT_ZERO}
-        assert talk.samples() == [(1000, 250, 1)]
-    assert talk.session.statistics.missed == 0
-    assert talk.session.statistics.period_error.maximum == pytest.approx(0.0, abs=1e-9)
-
-
 def test_several_reads_are_one_sample() -> None:
     talk = polling(table=(*TABLE, FAR), response=(FAR, ACTUAL, CURRENT, STATUS))
     assert talk.hears(ANSWER, 10.002) == []
@@ -187,24 +177,6 @@ def test_one_failed_read_of_a_round_publishes_nothing() -> None:
     assert talk.samples() == []
     assert not talk.session.online
     assert talk.session.statistics.missed == 1
-
-
-def test_it_comes_back_neutral() -> None:
-    talk = online(rearm_immediate=True)
-    assert talk.commands(0, 150.0, 10.01) is CommandOutcome.ARMED
-    assert round_of(talk, 10.02) == ['3F1#063200DC05000000']
-    talk.until(10.9)
-    assert not talk.session.online
-    talk.events()
-    talk.until(11.2)            # the stop was told, and not confirmed
-    sent = talk.until(12.0)
-    assert {text for _, text in sent} == {ASK}
-    ask = 12.0
-    while not talk.at(ask):
-        ask = talk.session.next_timer()
-    assert talk.hears(ANSWER, ask + 0.002) == []
-    assert talk.session.online
-    assert [text for _, text in talk.until(ask + 0.006)] == [SPEED_ZERO, LIMIT_ZERO]
 
 
 ASK_SPEED, ASK_LIMIT = '3F1#0332000100000000', '3F1#0333000100000000'
@@ -442,48 +414,6 @@ def test_one_parameter_is_all_that_fits_a_frame() -> None:
     assert talk.submits(write((GAIN, 1), atomic=True), 10.005) == ['3F1#0628000100000000']
 
 
-def test_rounds_go_on_between_two_requests() -> None:
-    talk = online()
-    for _ in range(40):
-        talk.submits(read(GAIN), 10.01)
-    now, asked = 10.01, []
-    talk.hears('7F1#0100000000000000', 10.0105)
-    while now < 10.5:
-        for when, text in talk.until(now):
-            if text == ASK:
-                asked.append(when)
-                talk.hears(ANSWER, when + 0.002)
-            elif text.startswith('3F1#03'):
-                talk.hears('7F1#0100000000000000', when + 0.002)
-        now += 0.0001
-    assert len(talk.outcomes()) == 40
-    # a read of a user holds a round up for the time of that read, not more
-    assert max(abs(b - a - 0.02) for a, b in zip(asked, asked[1:])) < 0.0035
-
-
-def test_users_get_one_step_a_round_however_long_it_is() -> None:
-    many = tuple(parameter(f'p_{number}', number, access=RO) for number in range(300, 340, 2))
-    talk = Conversation(
-        drive('datamodel_standard', table=(*TABLE, *many), response=many, period=0.02))
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    now, order = 10.0, []
-    submitted = False
-    while now < 10.4:
-        for when, text in talk.until(now):
-            if text.startswith('3F1#03'):
-                order.append(int(text[8:10] + text[6:8], 16))
-                talk.hears('7F1#0100000000000000', when + 0.002)
-        if talk.session.online and not submitted:
-            submitted = True
-            for _ in range(3):
-                talk.submits(read(GAIN), now)
-        now += 0.0001
-    places = [place for place, number in enumerate(order) if number == 40]
-    assert len(places) == 3
-    assert all(b - a <= len(many) + 1 for a, b in zip(places, places[1:]))
-
-
 # -- stopping -------------------------------------------------------------------------------------
 
 
@@ -589,8 +519,17 @@ def enabled(**options: object) -> Conversation:
     return talk
 
 
-def disabled_while_its_status_is_asked_for(talk: Conversation) -> None:
-    """Have a drive that was told to enable report that it is, and tell it to disable."""
+@pytest.mark.parametrize('request_, first', [
+    ((SPEED, WORD), [DISABLE_WORD, SPEED_ZERO]), ((SPEED,), [SPEED_ZERO, DISABLE_WORD])])
+def test_a_status_asked_for_before_the_word_left_confirms_nothing(
+        request_: tuple[Parameter, ...], first: list[str]) -> None:
+    talk = polling(request=request_, control=CONTROL)
+    talk.hears(READY, 10.002)
+    assert talk.until(10.01) == list(zip((10.003, 10.004), first))
+    talk.asks(ControlAction.ENABLE, 10.01)
+    round_of(talk, 10.02, READY)
+    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)], 'no period later'
+    assert talk.control_outcomes() == []
     round_of(talk, 10.04, ENABLED)
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     assert talk.until(10.0605) == [(10.06, ASK)]
@@ -599,25 +538,6 @@ def disabled_while_its_status_is_asked_for(talk: Conversation) -> None:
     assert talk.control_outcomes() == []
     round_of(talk, 10.08, READY)
     assert talk.control_outcomes() == [('disable', True, 'ready')]
-
-
-def test_a_status_asked_for_before_the_word_left_confirms_nothing() -> None:
-    talk = controlled()
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)], 'no period later'
-    assert talk.control_outcomes() == []
-    disabled_while_its_status_is_asked_for(talk)
-
-
-def test_nor_does_it_where_the_word_is_written_by_hand() -> None:
-    talk = polling(request=(SPEED,), control=CONTROL)
-    talk.hears(READY, 10.002)
-    talk.until(10.01)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    talk.until(10.03)
-    disabled_while_its_status_is_asked_for(talk)
 
 
 def test_nor_does_it_where_the_status_is_read_by_hand() -> None:
@@ -675,17 +595,6 @@ def test_of_a_missed_round_only_a_word_that_stops_is_written_again() -> None:
     assert talk.until(10.5005) == [(10.483, DISABLE_WORD), (10.5, ASK)]
 
 
-def test_enable_with_the_word_by_hand() -> None:
-    talk = polling(request=(SPEED,), control=CONTROL)
-    assert talk.hears(READY, 10.002) == []
-    assert talk.until(10.01) == [(10.003, SPEED_ZERO), (10.004, DISABLE_WORD)]
-    talk.asks(ControlAction.ENABLE, 10.01)
-    round_of(talk, 10.02, READY)
-    assert talk.until(10.03) == [(10.025, SPEED_ZERO), (10.026, ENABLE_WORD)]
-    round_of(talk, 10.04, ENABLED)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    assert talk.until(10.0501) == [], 'once: it may be commanded from now on'
-
 
 @pytest.mark.parametrize('by_hand', [False, True])
 def test_enable_waits_for_setpoints_that_the_bus_refuses(by_hand: bool) -> None:
@@ -702,22 +611,6 @@ def test_enable_waits_for_setpoints_that_the_bus_refuses(by_hand: bool) -> None:
     talk.refusing = lambda text: False
     talk.hears(READY, 10.062)
     assert [text for _, text in talk.until(10.0835) if text != ASK] == [SPEED_ZERO, ENABLE_WORD]
-
-
-def test_a_word_by_hand_that_got_lost_is_written_again() -> None:
-    talk = polling(request=(SPEED,), control=CONTROL, refresh_interval=60.0)
-    talk.hears(READY, 10.002)
-    talk.until(10.01)
-    talk.asks(ControlAction.ENABLE, 10.01)
-    written = []
-    for number in range(1, 45):
-        begin = 10.0 + 0.02 * number
-        round_of(talk, begin, READY)
-        written += [number for _, text in talk.until(begin + 0.01) if text == ENABLE_WORD]
-    # lost; then after 0.2 s and 0.4 s
-    assert len(written) == 3
-    assert 10 <= written[1] - written[0] <= 11
-    assert 20 <= written[2] - written[1] <= 21
 
 
 @pytest.mark.parametrize(('period', 'rounds'), [(0.02, 5), (0.5, 3)])
@@ -744,18 +637,6 @@ def test_reset_is_a_pulse_of_three_writes(request_: tuple[Parameter, ...], perio
     assert talk.control_outcomes() == [('reset_fault', True, 'ready')]
 
 
-def test_nothing_is_left_of_a_pulse_that_the_bus_cut_short() -> None:
-    talk = polling(request=(SPEED, WORD), control=CONTROL, refresh_interval=60.0)
-    talk.hears(FAULT, 10.002)
-    talk.until(10.018)
-    talk.asks(ControlAction.RESET_FAULT, 10.019)
-    round_of(talk, 10.02, FAULT)
-    assert talk.until(10.026) == [(10.025, RESET_WORD)]
-    talk.bus_down(10.03)
-    assert talk.session.next_timer() == math.inf
-    assert talk.at(10.2) == []
-
-
 @pytest.mark.parametrize('answer, state, off', [
     ('7F1#0300000000000000', 'enabled', False), ('7F1#0100000000000000', 'ready', True),
     ('', 'enabled', False)])
@@ -777,27 +658,6 @@ def test_stop_ends_with_a_look_at_the_status(answer: str, state: str, off: bool)
     assert talk.session.control is not None
     assert (talk.session.control.state, talk.session.control.off) == (state, off)
     assert warnings(talk) == []
-
-
-def test_enable_is_not_repeated_before_the_status_was_read() -> None:
-    """A restart that nobody saw: one read goes unanswered, the device has forgotten its word."""
-    talk = enabled(refresh_interval=0.1)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
-    sent = []
-    for begin in (10.06, 10.08, 10.1):
-        sent += round_of(talk, begin, ENABLED)
-    assert ENABLE_WORD not in sent
-    # nobody answers the round of 10.12; the word is due since then
-    assert ENABLE_WORD not in [text for _, text in talk.until(10.3)]
-    assert talk.session.online
-    now = 10.32
-    sent = [text for _, text in talk.until(now + 0.0055)]
-    assert ASK in sent
-    assert ENABLE_WORD not in sent
-    found = talk.hears(READY, now + 0.006)      # not enabled any more
-    found += [text for _, text in talk.until(now + 0.1)]
-    assert DISABLE_WORD in found
-    assert ENABLE_WORD not in found
 
 
 @pytest.mark.parametrize('action, word', [
