@@ -175,31 +175,6 @@ def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> Non
     assert left == [(52, 9), (52, 0), (50, 0)]
 
 
-def test_what_is_sent_called_back_may_write_again() -> None:
-    line = Line()
-
-    def again(sent: bool, now: float) -> None:
-        assert sent
-        line.transactor.write_first(Write(53, (0,), False), nobody, now)
-
-    line.transactor.write_first(Write(52, (0,), False), again, 1.0)
-    assert line.sent() == ['52!']
-    assert line.at(1.001) == ['53!']
-
-
-def test_hold_and_release() -> None:
-    line = Line()
-    line.channel.hold(1.5)
-    assert line.reads(1) == []
-    assert line.channel.next_timer() == 1.5
-    line.channel.release(1.1)
-    assert line.sent() == ['1?']
-    line.answer(0, 1.2)
-    line.channel.hold(2.0)
-    line.channel.release(1.9)
-    assert line.reads(2, now=1.9) == ['2?']
-
-
 def test_clear_forgets_everything_but_the_eeprom() -> None:
     line = Line()
     line.writes((30, True))

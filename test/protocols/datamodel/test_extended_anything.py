@@ -34,7 +34,8 @@ def test_cyclic_telegrams(station: int, words: list[int]) -> None:
     assert extended.decode(response, count=len(words), strict=True) == extended.CyclicResponse(
         tuple(words))
     assert extended.station_of(request.identifier) == station
-    assert response.identifier == request.identifier + 0x10000000
+    assert response.identifier == codec.response_identifier == request.identifier + 0x10000000
+    assert codec.request_identifier == request.identifier
 
 
 @given(STATIONS, windows())

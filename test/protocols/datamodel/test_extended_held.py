@@ -29,6 +29,9 @@ POSITION = parameter(
     'position_setpoint', 60, type=INT16, scale=0.1, unit='deg', minimum=-10.0, maximum=10.0,
     storage=RAM, neutral_from='actual_position', arming_tolerance=0.5)
 MEASURED = parameter('actual_position', 212, type=INT16, scale=0.1, unit='deg', access=RO)
+#: why an axis that may be anywhere is not enabled
+UNKNOWN = says('would_jump', why=says(
+    'position_not_told', known=False, measured='actual_position', name='position_setpoint'))
 
 
 def axis(**options: Any) -> Conversation:
@@ -93,12 +96,12 @@ def test_axis_whose_position_is_missing_may_be_anywhere() -> None:
     talk = standing()
     assert short(talk, 2, 1) == request(0, 70)
     refusal = talk.session.services.control_refusal(ControlAction.ENABLE)
-    assert refusal == (says(
-        'would_jump', why=says('position_not_told', known=False, measured='actual_position',
-        name='position_setpoint')))
+    assert refusal == UNKNOWN
     # moved by hand meanwhile
     assert cycle(talk, 3, 1, 90) == request(0, 70), 'beside disable'
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == says('would_jump')
+    assert talk.session.services.control_refusal(ControlAction.ENABLE) == says(
+        'would_jump', why=says('position_not_told', known=True, measured='actual_position',
+                               name='position_setpoint'))
     assert cycle(talk, 4, 1, 90) == request(0, 90)
     assert talk.session.services.control_refusal(ControlAction.ENABLE) == ''
 
@@ -118,10 +121,7 @@ def test_no_cycle_without_a_position() -> None:
     assert talk.hears(MAPS[0], 10.36) == ASK_MAPS[1:]
     assert talk.hears(MAPS[1], 10.361) == []    # the read is in quarantine
     assert talk.until(10.5)[0][1] == ASK_POSITION
-    assert talk.session.offline_advice == (
-        says(
-            'would_jump', why=says('position_not_told', known=False, measured='actual_position',
-            name='position_setpoint')))
+    assert talk.session.offline_advice == UNKNOWN
 
 
 def test_limits_do_not_bound_where_the_axis_is() -> None:
@@ -209,20 +209,6 @@ def test_fault_reset_and_enabling_anew() -> None:
     assert cycle(talk, 12, 3, 54) == request(1, 55)
 
 
-def test_deactivation_repeats_it() -> None:
-    talk = enabled(70)
-    talk.commands(0, 7.0, 10.043)
-    talk.commands(0, 9.0, 10.043)
-    assert cycle(talk, 3, 3, 75) == request(1, 90)
-    assert talk.deactivate(10.07) == []
-    assert talk.until(10.08 + 1e-6)[-1][1] == request(0, 90)
-    talk.hears('103FFFF0#0003004D00000000', 10.082)         # still enabled
-    assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 90)
-    talk.hears('103FFFF0#0001004E00000000', 10.102)
-    assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 78)
-    assert talk.until(11.0) == []
-
-
 def test_lost_with_control_it_is_read_anew() -> None:
     talk = enabled(70)
     talk.commands(0, 7.0, 10.043)
@@ -302,33 +288,6 @@ def test_stall_reads_it_anew_and_believes_no_older_answer() -> None:
     assert talk.until(12.07) == []
     talk.hears('10200D41#0021000000000000', 12.08)
     assert talk.until(12.09)[0][1] == '003FFFF0#0021000000000000'
-
-
-def test_enable_waits_for_the_position() -> None:
-    """With maps that are not looked at, the drive can be online before its position is known."""
-    talk = axis(mapping='assume', response=(STATUS, ACTUAL, MEASURED))
-    assert talk.activate(9.992) == [ASK_POSITION]
-    talk.hears('10200D41#0046000000000000', 10.0)
-    assert talk.until(10.0 + 1e-6)[0][1] == request(0, 70)
-    talk.hears('103FFFF0#0001000000460000', 10.002)
-    for _ in range(4):      # lost: cycles go on, with what was known
-        assert talk.at(talk.session.next_timer()) == [request(0, 70)]
-    assert not talk.session.online
-    talk.hears('103FFFF0#00010000', 10.081)     # too short for the position
-    assert talk.session.online
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == (
-        says(
-            'would_jump', why=says('position_not_told', known=False, measured='actual_position',
-            name='position_setpoint')))
-    assert talk.until(10.1 + 1e-6)[-1][1] == request(0, 70)
-    talk.hears('103FFFF0#0001000000210000', 10.102)
-    assert talk.session.services.control_refusal(ControlAction.ENABLE) == (
-        says(
-            'would_jump', why=says('position_not_told', known=True, measured='actual_position',
-            name='position_setpoint')))
-    assert talk.until(10.12 + 1e-6)[-1][1] == request(0, 33)
-    talk.hears('103FFFF0#0001000000210000', 10.122)
-    assert talk.asks(ControlAction.ENABLE, 10.123) == []
 
 
 def coarse_axis() -> Conversation:

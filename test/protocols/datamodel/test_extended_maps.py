@@ -12,8 +12,7 @@ import pytest
 from saying import says
 
 from drive_can_bridge.core.events import (
-    DriveState, MappingDiffered, MappingWritten, Noted, ProcessDataReceived,
-    StationFound, StationLost)
+    DriveState, MappingDiffered, MappingWritten, Noted, StationFound, StationLost)
 
 OTHER_REQUEST_MAP = '102007A4#0033003200000000'
 
@@ -27,25 +26,6 @@ def asked(**options: object) -> Conversation:
 
 
 # -- verify ---------------------------------------------------------------------------------------
-
-
-def test_maps_agree() -> None:
-    talk = asked()
-    assert talk.at(10.0005) == []
-    assert talk.hears(REQUEST_MAP, 10.001) == [ASK_RESPONSE_MAP]
-    assert talk.hears(RESPONSE_MAP, 10.002) == []
-    assert talk.session.next_timer() == 10.002
-    assert talk.session.state is DriveState.OFFLINE
-    assert talk.at(10.002) == [NEUTRAL]
-    assert not talk.session.online
-
-    assert talk.hears(ANSWER, 10.004) == []
-
-    assert talk.events() == [StationFound(), ProcessDataReceived((1000, 250, 1), 10.004)]
-    assert talk.session.online
-    assert talk.session.ever_online
-    assert talk.session.offline_advice == ''
-    assert talk.session.state is DriveState.NOT_ARMED
 
 
 def test_looks_that_nobody_answers_are_told_while_cycling() -> None:
@@ -123,23 +103,6 @@ def test_a_drive_whose_maps_differ_and_which_falls_silent_is_offline() -> None:
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     assert talk.events(MappingDiffered) == [told]
     assert talk.session.offline_advice == f'mapping differs: {told.text}'
-
-
-def test_corrected_maps_are_seen_after_a_second() -> None:
-    talk = asked()
-    talk.hears(OTHER_REQUEST_MAP, 10.001)
-    talk.hears(RESPONSE_MAP, 10.002)
-    assert len(talk.events(MappingDiffered)) == 1
-
-    # still wrong: not reported again
-    assert talk.until(11.002) == [(11.002, ASK_REQUEST_MAP)]
-    talk.hears(OTHER_REQUEST_MAP, 11.003)
-    talk.hears(RESPONSE_MAP, 11.004)
-    assert talk.events() == []
-
-    assert talk.until(12.004) == [(12.004, ASK_REQUEST_MAP)]
-    checked(talk, 12.004)
-    assert talk.at(12.006) == [NEUTRAL]
 
 
 def test_parameter_services_work_while_maps_differ() -> None:

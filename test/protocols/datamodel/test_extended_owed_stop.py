@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from builders import (
-    CONTROL, Conversation, drive, LIMIT, SPEED, TABLE, WORD,
+    CONTROL, Conversation, LIMIT, SPEED, TABLE, WORD,
 )
 from extended_builders import (
     ANSWER, ASK_LIMIT, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, ASK_SPEED, checked, DISABLE, ENABLED,
@@ -47,6 +47,15 @@ def confirmed(talk: Conversation, now: float) -> list[str]:
     """Let a drive that has just been asked for its speed confirm the stop."""
     assert talk.hears(SPEED_IS_ZERO, now) == [ASK_LIMIT]
     return talk.hears(LIMIT_IS_ZERO, now + 0.001)
+
+
+def stopped_by_number(talk: Conversation, begun: list[str]) -> list[str]:
+    """See that the drive is told to stop, and have it confirm that; return what follows."""
+    assert begun + [text for _, text in talk.until(talk.now + 0.003)] == STOPPED_BY_NUMBER
+    assert talk.session.may_run
+    following = confirmed(talk, talk.now + 0.001)
+    assert not talk.session.may_run
+    return following
 
 
 # -- the process stood still ----------------------------------------------------------------------
@@ -87,9 +96,7 @@ def test_bus_that_comes_back_stops_the_drive_before_its_maps_are_read() -> None:
     talk = running()
     assert talk.bus_down(10.03) == []
     assert warnings(talk) == [may_run('bus_lost_before_stop')]
-    assert talk.bus_up(12.0) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(12.002)] == [LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 12.003) == [ASK_REQUEST_MAP]
+    assert stopped_by_number(talk, talk.bus_up(12.0)) == [ASK_REQUEST_MAP]
     checked(talk, 12.004)
     assert talk.at(12.006) == [NEUTRAL]
     assert warnings(talk) == []
@@ -141,9 +148,7 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     assert talk.samples() == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
     # whether the request map was still right then nobody has looked
-    sent = talk.deactivate(12.0) + [text for _, text in talk.until(12.004)]
-    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 12.005) == []
+    assert stopped_by_number(talk, talk.deactivate(12.0)) == []
     assert talk.session.stopped
     assert talk.session.state is DriveState.OFFLINE
 
@@ -169,11 +174,7 @@ def test_neutral_cycles_count_when_the_request_map_is_still_right() -> None:
 
 def test_neutral_cycles_that_went_elsewhere_are_followed_by_writes() -> None:
     talk = answered_neutral_cycles(OTHER_REQUEST)
-    assert talk.hears(OTHER_RESPONSE, 12.03) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(12.04)] == [LIMIT_ZERO, ASK_SPEED]
-    assert talk.session.may_run
-    assert confirmed(talk, 12.05) == []
-    assert not talk.session.may_run
+    assert stopped_by_number(talk, talk.hears(OTHER_RESPONSE, 12.03)) == []
 
 
 def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
@@ -181,25 +182,7 @@ def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
     assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
     assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
     assert talk.hears(REQUEST_MAP, 12.02) == [ASK_RESPONSE_MAP]
-    sent = talk.hears(OTHER_RESPONSE, 12.03) + [text for _, text in talk.until(12.04)]
-    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 12.05) == []
-    assert not talk.session.may_run
-
-
-def test_response_map_that_differs_disables_too() -> None:
-    talk = Conversation(drive(control=CONTROL, request=(WORD, SPEED)))
-    talk.bus_up(9.0)
-    assert talk.activate(9.998) == [ASK_REQUEST_MAP]
-    assert talk.hears('102007A4#0034003200000000', 9.999) == [ASK_RESPONSE_MAP]
-    assert talk.hears(RESPONSE_MAP, 10.0) == []
-    assert talk.at(10.0) == [NEUTRAL]
-    talk.hears(ANSWER, 10.002)
-    enabled_at_a_look(talk)
-    assert talk.hears('102007A4#0034003200000000', 11.003) == [ASK_RESPONSE_MAP]
-    assert talk.hears(OTHER_RESPONSE, 11.004) == []
-    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
-    assert not talk.session.duty.owed
+    assert stopped_by_number(talk, talk.hears(OTHER_RESPONSE, 12.03)) == []
 
 
 def enabled_at_a_look(talk: Conversation) -> Conversation:
@@ -219,11 +202,8 @@ def enabled_at_a_look(talk: Conversation) -> Conversation:
 def test_request_map_that_differs_ends_with_writes_by_number() -> None:
     talk = running()
     look(talk)
-    assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
+    assert stopped_by_number(talk, talk.hears(OTHER_REQUEST, 11.003)) == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
-    assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 11.007) == []
-    assert not talk.session.duty.owed
     assert warnings(talk) == []
 
 
@@ -244,10 +224,9 @@ def test_maps_are_rewritten_after_the_stop() -> None:
     talk = running(mapping='configure')
     look(talk)
     assert talk.hears(REQUEST_MAP, 11.003) == [ASK_RESPONSE_MAP]
-    assert talk.hears(OTHER_RESPONSE, 11.004) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(11.007)] == [LIMIT_ZERO, ASK_SPEED]
-    # the rewrite begins with map slot 0, and only now
-    assert confirmed(talk, 11.008) == ['002007A1#0000000000000000']
+    # the rewrite begins with map slot 0, and only then
+    assert stopped_by_number(talk, talk.hears(OTHER_RESPONSE, 11.004)) == [
+        '002007A1#0000000000000000']
 
 
 @pytest.mark.parametrize('maps', [(OTHER_REQUEST,), (REQUEST_MAP, OTHER_RESPONSE)])
@@ -267,9 +246,7 @@ def test_neutral_cycles_that_another_map_has_taken_were_no_stop() -> None:
     talk = running()
     look(talk, 0.0, NEUTRAL)     # with the map of somebody else, for who knows how long
     assert not talk.session.duty.owed
-    assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(11.006)] == [LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 11.007) == []
+    assert stopped_by_number(talk, talk.hears(OTHER_REQUEST, 11.003)) == []
 
 
 def test_neutral_cycles_that_a_look_has_backed_were_a_stop() -> None:
@@ -293,9 +270,7 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     assert last[-1] == ASK_REQUEST_MAP
     assert talk.session.duty.owed
     assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
-    assert talk.hears(RESPONSE_MAP, 12.002) == [SPEED_ZERO]
-    assert [text for _, text in talk.until(12.005)] == [LIMIT_ZERO, ASK_SPEED]
-    assert confirmed(talk, 12.006) == []
+    assert stopped_by_number(talk, talk.hears(RESPONSE_MAP, 12.002)) == []
     assert talk.session.state is DriveState.MAPPING_DIFFERS
 
 
@@ -330,16 +305,11 @@ def test_word_that_was_refused_confirms_nothing() -> None:
     lambda text: text == DISABLE, everything])
 def test_written_disable_that_was_refused_is_written_again(
         refuses: Callable[[str], bool]) -> None:
-    talk = online(control=CONTROL, mapping='assume')
-    talk.asks(ControlAction.ENABLE, 10.01)
-    for cycle, answer in ((1, ANSWER), (2, ENABLED), (3, ENABLED)):
-        talk.until(10.0 + 0.02 * cycle + TICK)
-        talk.hears(answer, 10.002 + 0.02 * cycle)
-    assert talk.control_outcomes() == [('enable', True, 'enabled')]
+    talk = enabled_by_number(mapping='assume')
     talk.refusing = refuses
-    assert talk.asks(ControlAction.DISABLE, 10.063) == []
+    assert talk.asks(ControlAction.DISABLE, 10.183) == []
     talk.refusing = lambda text: False
-    assert DISABLE in [text for _, text in talk.until(10.09)]
+    assert DISABLE in [text for _, text in talk.until(10.21)]
 
 
 # -- the drive falls silent -----------------------------------------------------------------------
@@ -431,17 +401,10 @@ def test_disable_that_was_read_back_is_owed_no_more() -> None:
     assert [note for note in talk.events(Noted) if note.danger] == []
 
 
-def left_alone() -> Conversation:
-    """Return a drive that was told to run, and has answered nothing since; 10.162 s."""
+def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
     talk = running()
     sent = talk.until(10.1621)
     assert [text for _, text in sent[-5:]] == [NEUTRAL, NEUTRAL, *STOPPED_BY_NUMBER]
-    assert not talk.session.online
-    return talk
-
-
-def test_drive_whose_cycles_alone_are_dead_is_stopped_by_number() -> None:
-    talk = left_alone()
     assert confirmed(talk, 10.163) == [ASK_REQUEST_MAP]
     assert not talk.session.duty.owed
     checked(talk, 10.164)

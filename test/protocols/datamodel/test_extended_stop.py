@@ -13,7 +13,7 @@ import pytest
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction
-from drive_can_bridge.core.events import FrameRejected, MappingDiffered, Noted
+from drive_can_bridge.core.events import MappingDiffered, Noted
 
 #: an EEPROM cell is the default where the profile does not say
 SLOW_WORD = parameter('control_word', 52)
@@ -27,17 +27,6 @@ def silent(talk: Conversation, now: float) -> None:
     assert talk.at(now) == []
     assert talk.at(now + 100.0) == []
     assert not talk.session.online
-
-
-def test_answer_to_the_last_cycle_is_no_surprise() -> None:
-    talk = online()
-    talk.deactivate(10.01)
-    talk.until(10.06 + TICK)
-    for at in (10.062, 10.063, 10.064):     # three of them went unanswered
-        talk.hears(ANSWER, at)
-    assert talk.events(FrameRejected) == []
-    talk.hears(ANSWER, 10.065)
-    assert len(talk.events(FrameRejected)) == 1
 
 
 @pytest.mark.parametrize('asked, first', [(10.01, 10.01), (10.003, 10.005), (14.98, 14.98)])

@@ -2,9 +2,6 @@
 """What the 29-bit codec does besides the telegrams of ``test_telegrams.py``."""
 
 from collections.abc import Sequence
-import json
-from pathlib import Path
-from typing import Any
 
 from builders import parameter
 import pytest
@@ -14,30 +11,11 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel import extended
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 
-VECTORS = json.loads((Path(__file__).parents[2] / 'vectors' / 'datamodel.json').read_text(
-    encoding='utf-8'))['vectors']
-CYCLIC = [pytest.param(row, id=f'{row["id"]}-{row["name"]}') for row in VECTORS
-          if row['kind'] in ('cyclic_request', 'cyclic_response') and row['expect'] == 'ok']
-
 
 def codec(station: int, words: Sequence[int]) -> CyclicCodec:
     """Return the codec of a drive that has so many unsigned words in both telegrams."""
     parameters = [parameter(f'word_{slot}', 10 + slot) for slot in range(len(words))]
     return CyclicCodec(station, parameters, parameters)
-
-
-@pytest.mark.parametrize('row', CYCLIC)
-def test_fast_path_says_the_same(row: dict[str, Any]) -> None:
-    frame = Frame(int(row['can_id_hex'], 16), bytes.fromhex(row['data_hex']), True)
-    words = tuple(row['words_u16'])
-    fast = codec(row['fields']['station'], words)
-    if row['kind'] == 'cyclic_response':
-        assert fast.response_identifier == frame.identifier
-        assert fast.decode_response(frame.data) == (words, '')
-        return
-    assert fast.request_identifier == frame.identifier
-    assert fast.decode_request(frame.data) == (words, '')
-    assert row['use'] == 'decode' or fast.encode_request(words) == frame
 
 
 def test_refuses_to_encode_cyclic_telegrams_that_do_not_fit() -> None:

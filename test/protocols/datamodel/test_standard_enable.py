@@ -71,18 +71,6 @@ class Enabled:
         assert says('dropped_out_for_good') in [note.text for note in self.talk.events(Noted)]
 
 
-@pytest.mark.parametrize('phase', some([0.001 * step for step in range(0, 560, 7)], 5))
-def test_what_was_off_unseen_is_not_started_by_a_refresh(phase: float) -> None:
-    """Off between two reads, it answers them all; only its status says that it has restarted."""
-    motor = Enabled(SPEED, LIMIT)
-    motor.line.live(10.72 + phase)
-    assert len(motor.line.when(ENABLE)) > 1, 'it is refreshed'
-    # what is on its way was true when it was said
-    motor.line.live(motor.line.when(ASK)[-1] + 0.011)
-    motor.enabled = False
-    motor.never_again()
-
-
 @pytest.mark.parametrize('phase', some([0.001 * step for step in range(0, 560, 28)], 5))
 def test_what_was_off_unseen_is_not_started_by_a_refresh_beside_the_round(phase: float) -> None:
     """Its status is no part of the round: it is read twice a second, and the word goes behind."""

@@ -12,6 +12,7 @@ import random
 from builders import Conversation, drive, parameter, RO, RW
 from extent import some
 import pytest
+from timeline import Timeline
 
 from drive_can_bridge.core.events import ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame
@@ -20,7 +21,6 @@ from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
 #: where the round reads, and where users read
 POLLED = tuple(parameter(f'polled_{number}', number, access=RO) for number in (200, 201, 210, 300))
 ASKED = tuple(parameter(f'asked_{number}', number, access=RW) for number in range(20, 60, 3))
-READS = 5_000
 
 
 class LateDrive:
@@ -137,21 +137,11 @@ def test_no_answer_is_ever_taken_for_another(
 
 
 def test_a_drive_that_is_always_150_ms_late_is_offline_and_nothing_is_published() -> None:
-    talk = Conversation(drive('datamodel_standard', table=(*POLLED, *ASKED), request=(),
-                              response=POLLED))
-    session, now, late = talk.session, 10.0, []
-    session.bus_up(now)
-    session.activate(now)
-    while now < 60.0:
-        due = session.next_timer()
-        if late and late[0][0] <= due:
-            now, frame = late.pop(0)
-            session.receive_frame(frame, now)
-        else:
-            now = max(now, due)
-            session.handle_timer(now)
-        late += [(now + 0.15, Frame(0x7F1, bytes(8), False)) for _ in session.take_frames()]
-        assert not [event for event in session.take_events()
-                    if isinstance(event, ProcessDataReceived)]
-    assert not session.online
-    assert session.statistics.missed > 100
+    talk = Conversation(drive('datamodel_standard', request=()))
+    line = Timeline(talk, lambda text: (0.15, '7F1#0000000000000000'))
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    line.live(60.0)
+    assert talk.samples() == []
+    assert not talk.session.online
+    assert talk.session.statistics.missed > 100

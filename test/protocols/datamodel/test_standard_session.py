@@ -18,7 +18,7 @@ from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
-    AnswerLate, DriveState, ForeignMasterSeen, FrameRejected, Noted, ProcessDataReceived,
+    AnswerLate, DriveState, ForeignMasterSeen, Noted, ProcessDataReceived,
     StationFound, StationLost,
 )
 from drive_can_bridge.core.parameters import Parameter
@@ -30,10 +30,16 @@ GAP = parameter('torque', 213, access=RO)
 # -- rounds ---------------------------------------------------------------------------------------
 
 
-def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.05)
+def running(**options: Any) -> Conversation:
+    """Return a drive that was told 100 rpm, and asked for its round at 10.021 s."""
+    talk = online(rearm_immediate=True, **options)
     talk.commands(0, 100.0, 10.01)
     assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    return talk
+
+
+def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None:
+    talk = running(command_timeout=0.05)
     assert talk.until(10.09) == [(10.06, SPEED_ZERO)]
     assert talk.hears(ANSWER, 10.091) == []
     assert talk.session.duty.unshown
@@ -43,9 +49,7 @@ def test_answer_to_an_older_question_does_not_show_that_a_stop_arrived() -> None
 
 
 def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.05)
-    talk.commands(0, 100.0, 10.01)
-    assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    talk = running(command_timeout=0.05)
     talk.until(12.0)
     assert not talk.session.online
     talk.events()
@@ -59,9 +63,7 @@ def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
 
 def deaf_for_a_round(**options: Any) -> Conversation:
     """Return one of a drive that runs, and misses its round of 10.04 s and what is sent then."""
-    talk = online(rearm_immediate=True, refresh_interval=0.0, **options)
-    talk.commands(0, 100.0, 10.01)
-    assert talk.until(10.0215) == [(10.02, '3F1#063200E803000000'), (10.021, ASK)]
+    talk = running(refresh_interval=0.0, **options)
     talk.hears(ANSWER, 10.023)
     assert talk.until(10.0405) == [(10.04, ASK)]
     return talk
@@ -191,17 +193,15 @@ def warnings(talk: Conversation) -> list[str]:
 
 
 def test_a_lost_drive_is_told_three_times_to_stand_still() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.0, refresh_interval=0.0)
-    talk.commands(0, 150.0, 10.01)
+    talk = running(command_timeout=0.0, refresh_interval=0.0)
     told = [text for _, text in talk.until(12.0) if text != ASK]
-    assert told == ['3F1#063200DC05000000', *[SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3]
+    assert told == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED] * 3
     assert warnings(talk) == [UNHEARD]
 
 
 def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
-    talk = online(rearm_immediate=True, command_timeout=0.0, refresh_interval=0.0)
-    talk.commands(0, 150.0, 10.01)
-    sent = []
+    talk = running(command_timeout=0.0, refresh_interval=0.0)
+    sent: list[str] = []
     while ASK_SPEED not in sent:
         now = talk.session.next_timer()
         sent += talk.at(now)
@@ -225,24 +225,6 @@ def test_setpoints_are_written_on_change_one_per_frame() -> None:
         (10.02, '3F1#063200DC05000000'), (10.021, '3F1#063300E803000000'), (10.022, ASK)]
     talk.hears(ANSWER, 10.024)
     assert round_of(talk, 10.04) == []
-
-
-def test_the_newest_command_wins_even_while_another_waits_for_its_turn() -> None:
-    talk = online(rearm_immediate=True)
-    talk.commands(0, 150.0, 10.011)
-    talk.commands(1, 100.0, 10.012)
-    assert talk.at(10.02) == ['3F1#063200DC05000000']
-    talk.commands(1, 50.0, 10.0205)
-    assert talk.until(10.0212) == [(10.021, '3F1#063300F401000000')]
-
-
-def test_unchanged_setpoints_are_refreshed() -> None:
-    talk = online()
-    refreshed = []
-    for cycle in range(1, 60):
-        refreshed += [(cycle, text) for text in round_of(talk, 10.0 + 0.02 * cycle)]
-    # written at 10.003 and 10.004, due again 0.5 s later: in the round of 10.52
-    assert refreshed == [(26, SPEED_ZERO), (26, LIMIT_ZERO), (51, SPEED_ZERO), (52, LIMIT_ZERO)]
 
 
 def test_setpoints_go_out_while_a_read_is_unanswered() -> None:
@@ -298,21 +280,6 @@ def test_a_second_answer_does_not_meet_the_next_read() -> None:
     assert talk.hears(ANSWER, 10.0025) == []
     assert talk.session.statistics.rejected == 1
     assert talk.samples() == []
-
-
-def test_quarantine_outlives_a_restart_of_the_exchange() -> None:
-    talk = online()
-    assert talk.until(10.0205) == [(10.02, ASK)]
-    talk.bus_down(10.03)
-    assert talk.session.stopped
-    talk.bus_up(10.1)
-    assert talk.until(10.219) == []
-    # what was on its way is no surprise, but nobody's answer
-    talk.events()
-    assert talk.hears(ANSWER, 10.1895) == []
-    assert talk.events(FrameRejected, ProcessDataReceived) == []
-    talk.until(10.28)
-    assert not talk.session.online
 
 
 def test_disturbance_without_end_is_offline() -> None:
@@ -390,22 +357,6 @@ def test_a_long_pause_after_an_eeprom_write_is_no_missed_round(gap: float) -> No
     assert talk.outcomes() == [['written']]
 
 
-def test_a_read_is_repeated_after_the_quarantine_only() -> None:
-    talk = online(parameter_retries=1, missed_limit=99)
-    talk.submits(read(GAIN), 10.005)
-    sent = []
-    now = 10.005
-    while now < 10.8 and not (done := talk.outcomes()):
-        for when, text in talk.until(now):
-            sent.append((when, text))
-            if text == ASK:
-                talk.hears(ANSWER, when + 0.001)
-        now += 0.0005
-    assert done == [[says('no_answer', attempts=2, timeout=0.1)]]
-    again, = [when for when, text in sent if text == '3F1#0328000100000000']
-    assert again >= 10.205
-
-
 def test_one_parameter_is_all_that_fits_a_frame() -> None:
     talk = online()
     assert talk.submits(write((GAIN, 1), (DAMPING, 2), atomic=True), 10.005) == []
@@ -457,14 +408,6 @@ def test_a_stop_that_does_not_take_is_repeated_and_told() -> None:
         says('write_read_back', what='speed_setpoint (P50)', found=1500, wanted=0)])]
 
 
-def test_a_stop_while_the_stop_after_a_stall_is_under_way() -> None:
-    talk = moving()
-    assert talk.time_lost(12.0) == [SPEED_ZERO]
-    assert talk.deactivate(12.0005) == []
-    assert talk.until(12.004) == [
-        (12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.003, ASK_SPEED)]
-
-
 def test_silence_before_a_stop_is_confirmed_after_a_stall() -> None:
     """The answer to the read before the stall must not be taken for what the stop wrote."""
     talk = moving()
@@ -474,18 +417,6 @@ def test_silence_before_a_stop_is_confirmed_after_a_stall() -> None:
     assert talk.deactivate(12.0005) == []
     sent = talk.until(12.101)
     assert sent == [(12.001, SPEED_ZERO), (12.002, LIMIT_ZERO), (12.1, ASK_SPEED)]
-
-
-def test_a_setpoint_that_the_bus_refused_is_written_again() -> None:
-    talk = moving(refresh_interval=0.0, command_timeout=0.0)
-    talk.refusing = lambda text: text == SPEED_ZERO
-    talk.commands(0, 0.0, 10.031)
-    round_of(talk, 10.04)
-    assert talk.session.duty.owed
-    talk.refusing = lambda text: False
-    assert round_of(talk, 10.06) == [SPEED_ZERO]
-    assert not talk.session.duty.owed
-    assert round_of(talk, 10.08) == []
 
 
 def test_a_drive_that_never_answered_gets_nothing_at_the_stop() -> None:

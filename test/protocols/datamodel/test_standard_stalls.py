@@ -82,11 +82,3 @@ def test_who_is_always_late_reads_all_the_same() -> None:
 def test_a_timer_in_time_loses_none() -> None:
     talk = quarantined()
     assert [when for when, _ in talk.until(10.3)] == [pytest.approx(10.22)]
-
-
-def test_setpoints_do_not_wait_for_that() -> None:
-    talk = online(rearm_immediate=True)
-    assert talk.until(10.0205) == [(10.02, ASK)]
-    talk.until(10.15)
-    talk.commands(0, 150.0, 10.4)
-    assert talk.at(10.42) == ['3F1#063200DC05000000']

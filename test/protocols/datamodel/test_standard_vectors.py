@@ -3,7 +3,7 @@
 
 import pytest
 
-from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
+from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.datamodel import standard
 
@@ -44,21 +44,3 @@ def test_writes_that_cannot_be_made(number: int, word: int) -> None:
 def test_answers_that_cannot_be_made(words: tuple[int, ...]) -> None:
     with pytest.raises(LocalProtocolError):
         standard.encode_read_response(0x7F1, words)
-
-
-def test_lengths() -> None:
-    short = Frame(0x7F1, b'\x22\x11\x33\x44', False)
-    assert standard.decode_read_response(short, 2) == (0x1122, 0x4433)
-    with pytest.raises(RemoteProtocolError, match='4 data bytes do not hold 3 words'):
-        standard.decode_read_response(short, 3)
-    with pytest.raises(RemoteProtocolError, match='4 data bytes instead of 8'):
-        standard.decode_read_response(short, 2, strict=True)
-    with pytest.raises(RemoteProtocolError, match='7 data bytes instead of 8'):
-        standard.decode_request(Frame(0x3F1, bytes([3, 1, 0, 1, 0, 0, 0]), False))
-
-
-def test_the_frame_format_counts() -> None:
-    with pytest.raises(RemoteProtocolError, match='000007F1#.*not an 11-bit identifier'):
-        standard.decode_read_response(Frame(0x7F1, bytes(8), True), 1)
-    with pytest.raises(RemoteProtocolError, match='not an 11-bit identifier'):
-        standard.decode_request(Frame(0x3F1, bytes([3, 1, 0, 1, 0, 0, 0, 0]), True))
