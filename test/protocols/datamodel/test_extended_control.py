@@ -269,19 +269,8 @@ def apart(**options: object) -> Conversation:
 
 def looks(talk: Conversation, end: float, status: str) -> list[float]:
     """Answer everything until ``end``; return when the status was read."""
-    times = []
-    while True:
-        now = talk.session.next_timer()
-        if now > end:
-            return times
-        sent = talk.at(now)
-        while sent:
-            text = sent.pop(0)
-            if text == NEUTRAL:
-                sent += talk.hears(ANSWER, now)
-            elif text == ASK_STATUS:
-                times.append(round(now, 3))
-                sent += talk.hears(f'10200D31#{status}000000000000', now)
+    answers = {NEUTRAL: ANSWER, ASK_STATUS: f'10200D31#{status}000000000000'}
+    return [now for now, text in talk.served(end, answers.get, 0.0) if text == ASK_STATUS]
 
 
 def test_status_is_read_twice_a_second_and_often_while_something_is_pending() -> None:
@@ -303,16 +292,8 @@ def test_drive_whose_status_is_not_read_any_more_is_not_driven_on() -> None:
     looks(talk, 11.0, '0003')
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
     talk.events()
-    sent = []
-    while not talk.session.control or talk.session.control.operating:
-        now = talk.session.next_timer()
-        assert now < 14.0
-        for text in talk.at(now):
-            sent.append(text)
-            if text == NEUTRAL:
-                sent += talk.hears(ANSWER, now)
-    assert sent.count(ASK_STATUS) == 3
-    assert DISABLE in sent + [text for _, text in talk.until(talk.now + 0.01)]
+    sent = [text for _, text in talk.served(13.0, {NEUTRAL: ANSWER}.get)]
+    assert sent[:sent.index(DISABLE)].count(ASK_STATUS) == 3
     assert [note.text for note in talk.events(Noted)] == [
         says('enable_withdrawn', reason=says('status_missing', answers=3), whom='the drive')]
 

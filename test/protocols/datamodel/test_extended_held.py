@@ -163,19 +163,6 @@ def test_rearm_immediate_never_moves_it() -> None:
     assert cycle(talk, 3, 3, 70) == request(1, 70)
 
 
-def test_after_a_command_time_out_it_stays_where_it_was_sent() -> None:
-    talk = enabled(70, command_timeout=0.05)
-    talk.commands(0, 7.0, 10.043)
-    talk.commands(0, 8.0, 10.043)
-    assert cycle(talk, 3, 3, 71) == request(1, 80)
-    assert cycle(talk, 4, 3, 73) == request(1, 80)
-    assert cycle(talk, 5, 3, 75) == request(1, 80)      # 57 ms: expired
-    assert not talk.session.setpoints.items[0].armed
-    assert cycle(talk, 6, 3, 77) == request(1, 80)
-    assert talk.commands(0, 7.0, 10.123) is CommandOutcome.NOT_ARMED
-    assert talk.commands(0, 8.2, 10.123) is CommandOutcome.ARMED
-
-
 @pytest.mark.parametrize(('action', 'word'), [
     (ControlAction.DISABLE, 0), (ControlAction.QUICK_STOP, 2)])
 def test_stop_keeps_what_was_sent_until_it_is_disabled(action: ControlAction, word: int) -> None:

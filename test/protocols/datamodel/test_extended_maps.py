@@ -6,7 +6,7 @@ import math
 from builders import ACTUAL, Conversation, drive, frame, GAIN, RAMP, read, SPEED, write
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
-    RESPONSE_MAP, TICK, ZEROS,
+    RESPONSE_MAP, ZEROS,
 )
 import pytest
 from saying import says
@@ -15,6 +15,8 @@ from drive_can_bridge.core.events import (
     DriveState, MappingDiffered, MappingWritten, Noted, StationFound, StationLost)
 
 OTHER_REQUEST_MAP = '102007A4#0033003200000000'
+#: what a drive answers that has the right maps
+WELL = {NEUTRAL: ANSWER, ASK_REQUEST_MAP: REQUEST_MAP, ASK_RESPONSE_MAP: RESPONSE_MAP}
 
 
 def asked(**options: object) -> Conversation:
@@ -30,26 +32,16 @@ def asked(**options: object) -> Conversation:
 
 def test_looks_that_nobody_answers_are_told_while_cycling() -> None:
     talk = online()
-    number = looks = 0
-
-    def cycle() -> list[str]:
-        nonlocal number
-        number += 1
-        sent = [text for _, text in talk.until(10.0 + 0.02 * number + TICK)]
-        return [text for text in sent + talk.hears(ANSWER, 10.002 + 0.02 * number)
-                if text != NEUTRAL]
-
-    while not talk.session.warning and number < 1000:
-        looks += cycle().count(ASK_REQUEST_MAP)
-    assert looks == 3
+    sent = talk.served(13.2, {NEUTRAL: ANSWER}.get)
+    assert talk.session.warning == ''
+    sent += talk.served(14.0, {NEUTRAL: ANSWER}.get)
+    assert [text for _, text in sent].count(ASK_REQUEST_MAP) == 3
     text = ('no answer to 3 mapping reads in a row, although cyclic requests are answered: nobody '
             'knows whether the maps are still right')
     assert talk.session.warning == text
     assert talk.events(Noted) == [Noted(text, warning=True)]
     assert talk.session.online, 'it drives on: it answers'
-    while cycle() != [ASK_REQUEST_MAP]:
-        assert number < 1000
-    checked(talk, 10.002 + 0.02 * number)
+    talk.served(15.0, WELL.get)
     assert talk.session.warning == ''
     assert talk.events(Noted) == []
 
@@ -132,19 +124,10 @@ def test_silent_drive_is_looked_for_again_and_again() -> None:
 
 def test_maps_are_looked_at_every_second_while_cycling() -> None:
     talk = online()
-    looks = []
-    for cycle in range(1, 151):
-        start = 10.0 + 0.02 * cycle
-        for now, text in [*talk.until(start + TICK),
-                          *((start + 0.002, text) for text in talk.hears(ANSWER, start + 0.002))]:
-            if text == ASK_REQUEST_MAP:
-                looks.append(round(now, 3))
-                assert talk.hears(REQUEST_MAP, now + 0.001) == [ASK_RESPONSE_MAP]
-                assert talk.hears(RESPONSE_MAP, now + 0.002) == []
-            else:
-                assert text == NEUTRAL
+    sent = talk.served(13.0, WELL.get)
     # each a second after the last one ended; the first had to wait for the answer of its cycle
-    assert looks == [11.002, 12.004]
+    assert [now for now, text in sent if text == ASK_REQUEST_MAP] == [11.002, 12.006]
+    assert {text for _, text in sent} == {*WELL}
     assert talk.session.online
 
 

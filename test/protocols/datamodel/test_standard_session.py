@@ -201,15 +201,10 @@ def test_a_lost_drive_is_told_three_times_to_stand_still() -> None:
 
 def test_a_lost_drive_that_says_it_stands_is_told_once() -> None:
     talk = running(command_timeout=0.0, refresh_interval=0.0)
-    sent: list[str] = []
-    while ASK_SPEED not in sent:
-        now = talk.session.next_timer()
-        sent += talk.at(now)
+    stands = dict.fromkeys((ASK_SPEED, ASK_LIMIT), '7F1#0000000000000000')
+    told = [text for _, text in talk.served(16.0, stands.get) if text != ASK]
     assert not talk.session.online
-    talk.hears('7F1#0000000000000000', now + 0.001)
-    assert [text for _, text in talk.until(now + 0.003)] == [ASK_LIMIT]
-    talk.hears('7F1#0000000000000000', now + 0.004)
-    assert {text for _, text in talk.until(now + 5.0)} == {ASK}
+    assert told == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED, ASK_LIMIT]
     assert warnings(talk) == []
     assert not talk.session.duty.owed
 
@@ -393,16 +388,11 @@ def test_the_stop_writes_neutral_and_reads_it_back() -> None:
 
 def test_a_stop_that_does_not_take_is_repeated_and_told() -> None:
     talk = moving()
-    sent = talk.deactivate(10.03)
-    for step in range(1, 1000):
-        now = 10.03 + 0.001 * step
-        found = [text for _, text in talk.until(now)]
-        sent += found
-        if ASK_SPEED in found:
-            talk.hears('7F1#DC05000000000000', now)     # still 150 rpm
-        elif ASK_LIMIT in found:
-            talk.hears('7F1#0000000000000000', now)
-    assert sent == [SPEED_ZERO, LIMIT_ZERO, ASK_SPEED, ASK_LIMIT, *[SPEED_ZERO, ASK_SPEED] * 2]
+    assert talk.deactivate(10.03) == [SPEED_ZERO]
+    sent = [text for _, text in talk.served(11.03, {
+        ASK_SPEED: '7F1#DC05000000000000',      # still 150 rpm
+        ASK_LIMIT: '7F1#0000000000000000'}.get)]
+    assert sent == [LIMIT_ZERO, ASK_SPEED, ASK_LIMIT, *[SPEED_ZERO, ASK_SPEED] * 2]
     assert talk.session.stopped
     assert warnings(talk) == [may_run('stop_failed', what=[
         says('write_read_back', what='speed_setpoint (P50)', found=1500, wanted=0)])]

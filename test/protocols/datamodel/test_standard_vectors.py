@@ -1,6 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What the 11-bit codec does besides the telegrams of ``test_telegrams.py``, and tables."""
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from drive_can_bridge.core.errors import LocalProtocolError
@@ -28,19 +31,12 @@ def test_sums_are_sums() -> None:
     assert standard.identifier(0x3F8, 9) == 0x401
 
 
-@pytest.mark.parametrize(('number', 'count'), [(0, 0), (0, 5), (-1, 1), (0xFFFF, 2), (70000, 1)])
-def test_reads_that_cannot_be_asked(number: int, count: int) -> None:
-    with pytest.raises(LocalProtocolError):
-        standard.encode_read_request(0x3F1, number, count)
-
-
-@pytest.mark.parametrize(('number', 'word'), [(-1, 0), (0x10000, 0), (50, -1), (50, 0x10000)])
-def test_writes_that_cannot_be_made(number: int, word: int) -> None:
-    with pytest.raises(LocalProtocolError):
-        standard.encode_write(0x3F1, number, word)
-
-
-@pytest.mark.parametrize('words', [(), (0,) * 5, (-1,), (0x10000,)])
-def test_answers_that_cannot_be_made(words: tuple[int, ...]) -> None:
-    with pytest.raises(LocalProtocolError):
-        standard.encode_read_response(0x7F1, words)
+@pytest.mark.parametrize(('encode', 'arguments'), [
+    (standard.encode_read_request, [(0, 0), (0, 5), (-1, 1), (0xFFFF, 2), (70000, 1)]),
+    (standard.encode_write, [(-1, 0), (0x10000, 0), (50, -1), (50, 0x10000)]),
+    (standard.encode_read_response, [((),), ((0,) * 5,), ((-1,),), ((0x10000,),)])])
+def test_what_cannot_be_encoded(
+        encode: Callable[..., Frame], arguments: list[tuple[Any, ...]]) -> None:
+    for each in arguments:
+        with pytest.raises(LocalProtocolError):
+            encode(0x3F1, *each)
