@@ -185,6 +185,22 @@ def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
     assert stopped_by_number(talk, talk.hears(OTHER_RESPONSE, 12.03)) == []
 
 
+def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() -> None:
+    talk = running()
+    look(talk)
+    talk.hears(REQUEST_MAP, 11.003)
+    before = talk.session.statistics.missed, talk.session.statistics.exchanges
+    talk.until(11.0209)     # a cycle is under way
+    talk.hears(OTHER_RESPONSE, 11.021)
+    after = talk.session.statistics.missed, talk.session.statistics.exchanges
+    assert after == before
+    talk.events()
+    talk.hears(ANSWER, 11.022)
+    assert talk.events() == []
+    assert (talk.session.statistics.missed, talk.session.statistics.exchanges) == before
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+
+
 def enabled_at_a_look(talk: Conversation) -> Conversation:
     """Have a drive enabled that was found at 10.002 s; its request map is asked for at 11.002."""
     talk.asks(ControlAction.ENABLE, 10.01)
