@@ -247,6 +247,16 @@ def test_a_drive_that_reports_nothing_is_told_to_stop_more_than_once(
     assert ENABLE not in [text for _, text in sent]
 
 
+def test_a_stop_is_not_told_again_behind_a_new_enable() -> None:
+    talk = beside(control=SILENT_CONTROL, period=10.0, command_timeout=0.0)
+    talk.asks(ControlAction.ENABLE, 10.01)
+    at_once(talk, 10.01, ANSWER)
+    assert DISABLE in talk.asks(ControlAction.DISABLE, 10.5)
+    at_once(talk, 10.5, ANSWER)
+    talk.asks(ControlAction.ENABLE, 10.6)
+    assert ENABLE in at_once(talk, 10.6, ANSWER)
+    assert DISABLE not in [text for _, text in talk.until(19.0)]
+
 
 def test_a_silent_drive_that_ran_is_told_again_after_as_many_cycles() -> None:
     talk = beside(missed_limit=25)
