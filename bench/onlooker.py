@@ -4,6 +4,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 import json
+import math
 import os
 from pathlib import Path
 import re
@@ -55,6 +56,7 @@ class Panel:
     @contextmanager
     def open(self, page: str) -> Iterator['Page']:
         """Have a page open."""
+        begun = time.monotonic()
         request = Request(f'http://{self._host}{page}', headers={'Cookie': self._cookie})
         with urlopen(request) as response:
             found = re.search(r"'client_id': '([0-9a-f-]{36})'", response.read().decode())
@@ -65,7 +67,7 @@ class Panel:
                 '&implicit_handshake=true',
                 origin=f'http://{self._host}', max_size=None,  # type: ignore[arg-type]
                 additional_headers={'Cookie': self._cookie}) as channel:
-            opened = Page(channel, found[1])
+            opened = Page(channel, found[1], begun)
             opened.start()
             yield opened
 
@@ -76,12 +78,19 @@ class Panel:
 
 
 class Page(threading.Thread):
-    """A page: reads what comes, and answers what a browser does."""
+    """
+    A page: reads what comes, and answers what a browser does.
 
-    def __init__(self, channel: object, client: str) -> None:
+    :param begun: when it was asked for.
+    :ivar live: s from then to the first message with content.
+    """
+
+    def __init__(self, channel: object, client: str, begun: float) -> None:
         super().__init__(daemon=True)
         self._channel: object = channel
         self._client = client
+        self._begun = begun
+        self.live = math.nan
         self.messages = self.bytes = 0
 
     def run(self) -> None:
@@ -94,6 +103,8 @@ class Page(threading.Thread):
                 elif text == '2':
                     channel.send('3')  # type: ignore[attr-defined]
                 elif text.startswith('42'):
+                    if not self.messages:
+                        self.live = time.monotonic() - self._begun
                     self.messages += 1
                     self.bytes += len(text)
                     message = json.loads(text[2:])[1]

@@ -165,6 +165,10 @@ def panel_figures(found: dict[str, Any]) -> list[Figure]:
         one = found[name]
         lines.append(Figure(f'CPU of the panel, of one core, {who}', f'{100 * one["cpu"]:.1f} %',
                             f'{one["messages"]:.1f} messages/s', one['cpu'], 0.05))
+    for name in ('overview', 'drive'):
+        seconds = found[name]['live']
+        lines.append(Figure(f'a page ({name}), asked for until it is live', f'{seconds:.2f} s', '',
+                            seconds, 2.0))
     resident, own = found['drive']['mb']
     return [*lines, Figure('memory of the panel', f'{resident:.0f} MB', f'its own {own:.0f} MB',
                            resident, 120.0)]

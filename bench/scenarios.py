@@ -390,7 +390,8 @@ def panel(load: Load, duration: float) -> dict[str, Any]:
                 if opened and not opened.is_alive():
                     raise SystemExit(f'the panel has closed {page}')
                 found[name] = {'cpu': (server.cpu() - cpu) / elapsed, 'mb': server.memory_mb(),
-                               'messages': (opened.messages - before) / elapsed if opened else 0.0}
+                               'messages': (opened.messages - before) / elapsed if opened else 0.0,
+                               'live': opened.live if opened else 0.0}
     return found
 
 

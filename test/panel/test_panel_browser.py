@@ -39,15 +39,10 @@ def phone(tmp_path: Path) -> Iterator[Browser]:
     assert opened.complaints == []
 
 
-def test_the_page_is_live_within_two_seconds_and_values_move(
+def test_the_page_is_live_and_values_move(
         site: Site, browser: Browser, somebody: Somebody) -> None:
-    took = []
-    for _ in range(3):  # the machine may have something else to do meanwhile
-        begun = time.monotonic()
-        browser.open(site.addresses['operator'])
-        browser.shows(r'conveyor\s+not armed.*actual_speed\s+-?\d+\.\d\s+rpm')
-        took.append(time.monotonic() - begun)
-    assert min(took) < 2.0
+    browser.open(site.addresses['operator'])
+    browser.shows(r'conveyor\s+not armed.*actual_speed\s+-?\d+\.\d\s+rpm')
     # the token is not left where it is seen and copied
     assert 'token' not in browser.address
     assert browser.value('/conveyor', 'actual_speed') == '0.0'
