@@ -88,7 +88,8 @@ def test_a_good_file(tmp_path: Path) -> None:
     assert warnings(tmp_path, FILE, PROFILE) == []
     assert problems(tmp_path, together(), PROFILE) == []
     # process data are volatile
-    assert problems(tmp_path, FILE, f'{PROFILE}  passing: {{storage: ram}}\n') == []
+    profile = f'{PROFILE}  passing: {{storage: ram}}\n'
+    assert problems(tmp_path, FILE, profile) == []
 
 
 @pytest.mark.parametrize(('old', 'new', 'found'), [

@@ -129,6 +129,7 @@ def test_candump_sees_the_right_frames_and_decode_reads_them(
               if later - sooner > 5.0 * PERIOD]
     cycles = (cyclic[-1][0] - cyclic[0][0]) / PERIOD
     assert 0.5 * (cycles - sum(stalls) / PERIOD) <= len(cyclic) <= cycles + 3
+    assert candump.running
 
     # what was recorded reads as what was heard live
     with stranger(CHANNEL) as raw:
@@ -224,8 +225,7 @@ def test_interface_taken_down_and_up_deleted_and_created(
         client.online(drive, wanted=False)
         # first the interface goes down, then there is none
         client.diagnostics(bus, state='^down$', message='is gone')
-        wait_for(lambda: any(re.search(r'bus main: adapter \w+ is gone', line)
-                             for line in bridge.errors[told:]), 'that it is gone')
+        bridge.error(r'bus main: adapter \w+ is gone', since=told)
         count = len(simulator.frames())
         make_own()
         rearm_and_move(client, drive, bridge, simulator, count)

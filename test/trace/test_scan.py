@@ -211,7 +211,7 @@ def test_whatever_others_say_in_whatever_order_a_file_can_be_written(
             question = scanner.take_question()
             if question is not None:
                 scanner.asked(question, 0.01 * turn)
-        seen = [each for scanner in scanners.values() for each in scanner.sightings.values()]
+    seen = [each for scanner in scanners.values() for each in scanner.sightings.values()]
     nodes = {node for scanner in scanners.values() for node in scanner.nodes}
     output = tmp_path / 'found.yaml'
     write_parameter_file(output, BusConfiguration('main', 'virtual', 'a', BITRATE), seen, [

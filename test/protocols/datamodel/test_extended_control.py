@@ -87,7 +87,7 @@ def test_drive_whose_status_is_missing_for_long_is_not_driven_on() -> None:
     talk.asks(ControlAction.ENABLE, 10.003)
     assert cut(talk, 10.02) == '003FFFF0#0001000000000000'
     assert len(talk.events(FrameRejected)) == 1
-    assert talk.control_outcomes() == [], 'it confirms nothing'
+    assert talk.control_outcomes() == []    # it confirms nothing
     exchange(talk, 10.04, ENABLED)
     talk.commands(0, 100.0, 10.043)
     runs = '003FFFF0#000103E800000000'
@@ -219,7 +219,7 @@ def test_drive_that_reports_nothing() -> None:
     talk.asks(ControlAction.ENABLE, 10.01)
     assert at_once(talk, 10.01, ANSWER) == [NEUTRAL, ENABLE]
     assert talk.control_outcomes() == [('enable', True, says('state_not_reported'))]
-    assert talk.until(19.0) == [], 'what starts it is written once'
+    assert talk.until(19.0) == []       # what starts it is written once
 
 
 def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
