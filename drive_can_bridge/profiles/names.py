@@ -84,7 +84,9 @@ class Unusable(ValueError):
 
 def one_line(text: str) -> str:
     """Return a text without line breaks, control characters and superfluous space."""
-    return ' '.join(''.join(each if each.isprintable() else ' ' for each in text).split())
+    if not text.isprintable():
+        text = ''.join(each if each.isprintable() else ' ' for each in text)
+    return ' '.join(text.split())
 
 
 def scalar(value: Any) -> str:
@@ -206,15 +208,19 @@ def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -
 
 def plain_words(text: str) -> list[str]:
     """Return the words of a text in small letters of ASCII."""
-    plain = ''
-    for part in unicodedata.normalize('NFKD', unicodedata.normalize('NFC', text).translate(
-            _LETTERS)):
-        if part.isascii():
-            plain += part
-        elif unicodedata.category(part) != 'Mn':
-            words = unicodedata.name(part, '').split()
-            plain += f' {words[3].lower() if words[:1] == ["GREEK"] and len(words) > 3 else ""} '
-    return re.findall('[a-z0-9]+', _BOUNDARY.sub(' ', plain).lower())
+    text = unicodedata.normalize('NFC', text).translate(_LETTERS)
+    if not text.isascii():
+        text = ''.join(map(_in_ascii, unicodedata.normalize('NFKD', text)))
+    return re.findall('[a-z0-9]+', _BOUNDARY.sub(' ', text).lower())
+
+
+def _in_ascii(part: str) -> str:
+    if part.isascii():
+        return part
+    if unicodedata.category(part) == 'Mn':
+        return ''
+    words = unicodedata.name(part, '').split()
+    return f' {words[3].lower() if words[:1] == ["GREEK"] and len(words) > 3 else ""} '
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:

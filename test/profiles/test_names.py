@@ -24,6 +24,7 @@ RAW = re.compile(r'p[0-9]+|x[0-9a-f]+')
     ('Größe Überstrom', 'groesse_ueberstrom'),
     ('Velocità', 'velocita'),
     ('cos φ', 'cos_phi'),
+    ("Motor's rated current", 'motors_rated_current'),
     ('Motor-FLC/ratio', 'motor_flc_ratio'),
     ('RampTime', 'ramp_time'),
     ('DCLinkVoltage', 'dc_link_voltage'),
