@@ -180,7 +180,7 @@ def test_two_bridges_on_one_bus(processes: Processes, client: Client, namespace:
     # one dies: the other one goes on as if nothing had been, and takes no notice of its drive
     bridges['neighbour'].kill()
     count = len(simulator.frames())
-    assert set(simulator.frame('^003FFFF0#.* R$', count, 20)) == {'003FFFF0#05DC03E800000000 R'}
+    assert set(simulator.frame('^003FFFF0#.* R$', count, 5)) == {'003FFFF0#05DC03E800000000 R'}
     assert client.get(conveyor, 'ramp_time') == [1.0]
     assert not bridges['conveyor'].losses()
     facts = client.diagnostics(f'{places["conveyor"]}/drive_can_bridge: drive conveyor')
