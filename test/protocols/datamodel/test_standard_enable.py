@@ -5,7 +5,7 @@ from builders import ACTUAL, CONTROL, Conversation, CURRENT, drive, LIMIT, SPEED
 from extent import some
 import pytest
 from saying import says
-from standard_builders import ANSWER, ASK
+from standard_builders import ANSWER, ASK, SPEED_ZERO
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
@@ -38,6 +38,45 @@ def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
     line.live(12.0)
     assert line.when(ENABLE) == [10.202], line.log
     assert [at for at in line.when(ASK) if at > 10.31] == [10.35, 11.45], 'one goes unanswered'
+
+
+def silent(until: float) -> Timeline:
+    """Return a drive that was found at 10 s, and answers nothing from 10.19 s on."""
+    talk = Conversation(drive(
+        'datamodel_standard', control=CONTROL, request=(SPEED, LIMIT, WORD), period=0.05,
+        refresh_interval=0.0, parameter_timeout=0.1))
+    line = Timeline(talk, {ASK: (0.002, ANSWER)}.get)
+    talk.bus_up(9.0)
+    talk.activate(10.0)
+    line.live(10.19)
+    line.answer = lambda text: None
+    line.live(until)
+    return line
+
+
+def test_enable_that_the_bus_refused_waits_for_the_answer_that_is_due() -> None:
+    line = silent(10.205)
+    line.talk.refusing = lambda text: text == ENABLE
+    line.took(line.talk.asks(ControlAction.ENABLE, 10.205))
+    line.live(10.24)
+    line.talk.refusing = lambda text: False
+    line.live(10.35)
+    assert line.when(ENABLE) == []
+
+
+def test_setpoints_that_left_in_a_missed_round_do_not_count_for_enable() -> None:
+    line = silent(10.31)
+    line.took(line.talk.asks(ControlAction.ENABLE, 10.31))
+    assert line.log[-1] == (10.31, SPEED_ZERO)
+    line.answer = {ASK: (0.002, ANSWER)}.get
+    line.live(10.35)
+    line.talk.refusing = lambda text: text == SPEED_ZERO
+    line.live(10.49)
+    assert line.when(ENABLE) == []
+    line.talk.refusing = lambda text: False
+    line.live(10.51)
+    assert line.when(ENABLE) == [10.501]
+    assert line.when(SPEED_ZERO)[-1] == 10.5
 
 
 class Enabled:

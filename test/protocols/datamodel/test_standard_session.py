@@ -61,6 +61,24 @@ def test_answer_that_finds_a_drive_does_not_show_that_a_stop_arrived() -> None:
         says('may_still_be_running', why=says('bus_lost_before_stop'))]
 
 
+def test_answer_that_finds_a_drive_behind_a_stall_does_not_show_that_either() -> None:
+    """It has just said that it does not have what stops it."""
+    talk = running()
+    talk.hears(ANSWER, 10.023)
+    talk.commands(0, 0.0, 10.03)
+    assert talk.until(10.0415) == [(10.04, SPEED_ZERO), (10.041, ASK)]
+    talk.time_lost(10.2)
+    told = talk.served(10.3145, {ASK_SPEED: '7F1#E803000000000000',
+                                 ASK_LIMIT: '7F1#0000000000000000'}.get)
+    assert told[-1] == (10.314, ASK)
+    talk.events()
+    talk.hears(ANSWER, 10.315)
+    assert talk.session.online
+    talk.bus_down(10.3151)
+    assert [note.text for note in talk.events(Noted) if note.warning] == [
+        may_run('bus_lost_before_stop')]
+
+
 def deaf_for_a_round(**options: Any) -> Conversation:
     """Return one of a drive that runs, and misses its round of 10.04 s and what is sent then."""
     talk = running(refresh_interval=0.0, **options)

@@ -24,6 +24,22 @@ def test_an_answer_from_before_the_question_is_none() -> None:
     assert talk.samples() == [(1000, 250, 1)]
 
 
+@pytest.mark.parametrize('stall', [False, True])
+def test_an_answer_that_a_gateway_has_held_is_no_strangers(stall: bool) -> None:
+    """Longer than any answer is late; but one was asked for, and no second one."""
+    talk = online()
+    assert talk.until(10.0205) == [(10.02, ASK)]
+    if stall:
+        talk.time_lost(10.5)
+    else:
+        talk.bus_down(10.03)
+        talk.bus_up(10.5)
+    talk.events()
+    for rejected in (0, 1):
+        talk.hears(ANSWER, 11.3)
+        assert talk.session.statistics.rejected == rejected
+
+
 def quarantined() -> Conversation:
     """Return a conversation at 10.15 s, with silence until 10.22 s and a user who waits."""
     talk = online()
