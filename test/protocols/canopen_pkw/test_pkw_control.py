@@ -4,9 +4,9 @@
 from dataclasses import replace
 
 from pkw_builders import (
-    ANSWER_0, ANSWER_1, CONTROL, denied, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1, driven,
-    echo, ENABLE_0, ENABLE_1, ENABLED_1, IDLE, IDLE_ANSWER, READ_0, READ_1, reading, ready,
-    running, RUNS_0, RUNS_1, START, STILL_0, TABLE, TRIPPED_0, WORD,
+    ANSWER_0, ANSWER_1, answered, CONTROL, denied, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1,
+    driven, echo, ENABLE_0, ENABLE_1, ENABLED_1, IDLE, IDLE_ANSWER, online, READ_0, READ_1,
+    reading, ready, running, RUNS_0, RUNS_1, SPEED, START, STILL_0, TABLE, TRIPPED_0, WORD,
 )
 import pytest
 from saying import says, status_word
@@ -15,6 +15,7 @@ from timeline import Timeline
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.parameters import Access
+from drive_can_bridge.core.setpoints import CommandOutcome
 
 
 def test_status_read_before_the_word_confirms_nothing() -> None:
@@ -28,6 +29,15 @@ def test_status_read_before_the_word_confirms_nothing() -> None:
     talk.until(10.1101)
     assert talk.hears(RUNS_0, 10.112) == []
     assert talk.control_outcomes() == [('enable', True, 'enabled')]
+
+
+def test_drive_that_reports_nothing_takes_commands_as_soon_as_enable_is_acknowledged() -> None:
+    talk = online(control=replace(CONTROL, status_parameter=None, ready=None, enabled=None,
+                                  fault=None), request=(SPEED,))
+    answered(talk, talk.asks(ControlAction.ENABLE, 10.06), 10.061)
+    assert talk.control_outcomes() == [
+        ('enable', True, says('state_not_reported', action='enable'))]
+    assert talk.commands(0, 0.0, talk.now) is CommandOutcome.ARMED
 
 
 def test_reset_of_a_trip() -> None:
