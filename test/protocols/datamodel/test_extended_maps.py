@@ -97,6 +97,16 @@ def test_a_drive_whose_maps_differ_and_which_falls_silent_is_offline() -> None:
     assert talk.session.offline_advice == f'mapping differs: {told.text}'
 
 
+def test_a_difference_that_comes_back_is_told_again() -> None:
+    talk = online()
+    for _ in range(2):
+        now = talk.served(talk.now + 1.5, {**WELL, ASK_REQUEST_MAP: OTHER_REQUEST_MAP}.get)[-1][0]
+        assert talk.events(MappingDiffered) == [
+            MappingDiffered('request map is 51, 50, configured 50, 51')]
+        talk.served(now + 1.5, WELL.get)
+        assert talk.session.online
+
+
 def test_parameter_services_work_while_maps_differ() -> None:
     talk = asked()
     talk.hears(OTHER_REQUEST_MAP, 10.001)
@@ -320,6 +330,24 @@ def test_rewrites_that_somebody_undoes_become_rare(
         assert min(after - before for before, after in zip(starts[-5:], starts[-4:])) >= 60.0
     assert talk.events(MappingDiffered)[0].text == says('maps_wait')
     assert talk.session.remedy('') == says('maps_not_kept')
+
+
+class Undone(MapKeeper):
+    """Somebody else has the maps as they were before, by the time that they are looked at."""
+
+    def serve(self, talk: Conversation, sent: list[str], now: float) -> None:
+        if ASK_REQUEST_MAP in sent:
+            self.registers[122] = 99
+        super().serve(talk, sent, now)
+
+
+def test_each_rewrite_that_is_undone_at_once_is_told() -> None:
+    """Also when the pause does not grow any more, so that the same is said of each."""
+    keeper = Undone(99, 51, 0, 0, 209, 0, 0, 0)
+    talk = configured(keeper)
+    keeper.live(talk, 300.0)
+    told = [type(event) for event in talk.events(MappingDiffered, MappingWritten)]
+    assert told == [MappingWritten, MappingDiffered] * 10
 
 
 def test_rewrites_after_a_quiet_minute_are_prompt_again() -> None:
