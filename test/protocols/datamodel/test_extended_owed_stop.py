@@ -111,6 +111,17 @@ def test_stop_that_a_lost_bus_cut_short_is_begun_anew() -> None:
     assert [text for _, text in talk.until(13.002)] == [LIMIT_ZERO, ASK_SPEED]
 
 
+def test_stop_under_way_is_begun_anew_by_the_end() -> None:
+    """Whoever hears it only then gets all attempts, and not what is left of them."""
+    talk = running()
+    talk.time_lost(12.0)
+    assert [text for _, text in talk.until(12.25)].count(SPEED_ZERO) == 2
+    assert talk.deactivate(12.25) == [SPEED_ZERO]
+    assert [text for _, text in talk.until(13.0)].count(SPEED_ZERO) == 2
+    assert talk.session.stopped
+    assert warnings(talk) == [UNHEARD]
+
+
 # -- the maps differ ------------------------------------------------------------------------------
 
 OTHER_RESPONSE = '102007E4#00D200D100D30000'
@@ -265,6 +276,22 @@ def test_neutral_cycles_that_another_map_has_taken_were_no_stop() -> None:
     assert stopped_by_number(talk, talk.hears(OTHER_REQUEST, 11.003)) == []
 
 
+def test_who_got_neutral_cycles_elsewhere_and_does_not_confirm_a_stop_is_named() -> None:
+    talk = running()
+    look(talk, 0.0, NEUTRAL)
+    talk.hears(OTHER_REQUEST, 11.003)
+    talk.until(12.0)
+    assert warnings(talk) == [UNHEARD]
+
+
+def test_who_got_neutral_cycles_elsewhere_is_named_when_the_bus_goes_in_its_stop() -> None:
+    talk = running()
+    look(talk, 0.0, NEUTRAL)
+    assert talk.hears(OTHER_REQUEST, 11.003) == [SPEED_ZERO]
+    talk.bus_down(11.0035)
+    assert warnings(talk) == [may_run('bus_lost_before_stop')]
+
+
 def test_neutral_cycles_that_a_look_has_backed_were_a_stop() -> None:
     talk = running()
     look(talk, 0.0, NEUTRAL)
@@ -305,6 +332,16 @@ def test_stop_of_a_lost_drive_counts_frames_that_were_taken() -> None:
     talk.refusing = lambda text: False
     found = talk.until(10.4)
     assert [text for _, text in found[:3]] == [NEUTRAL] * 3
+
+
+def test_maps_are_not_looked_at_again_before_the_last_cycles_have_left() -> None:
+    """Who starts over does that; the look that was due meanwhile was in vain."""
+    talk = running()
+    talk.until(10.04 + TICK)
+    talk.refusing = lambda text: text == NEUTRAL
+    assert [text for _, text in talk.until(14.0)].count(ASK_REQUEST_MAP) == 1
+    talk.refusing = lambda text: False
+    assert [text for _, text in talk.until(14.3)][:4] == [*[NEUTRAL] * 3, SPEED_ZERO]
 
 
 def test_word_that_was_refused_confirms_nothing() -> None:
@@ -351,6 +388,18 @@ def test_look_at_the_maps_shows_nothing_of_a_word_that_was_written_behind_it() -
     assert talk.asks(ControlAction.DISABLE, 11.005) == [DISABLE]
     talk.hears(RESPONSE_MAP, 11.006)
     assert talk.session.duty.unshown
+
+
+def test_nor_does_it_when_a_cycle_behind_that_word_was_answered() -> None:
+    """Cycles are heard, and what is told by number is not any more."""
+    talk = enabled_at_a_look(online(control=CONTROL))
+    assert talk.hears(REQUEST_MAP, 11.004) == [ASK_RESPONSE_MAP]
+    assert talk.asks(ControlAction.DISABLE, 11.005) == [DISABLE]
+    assert exchange(talk, 11.02) == NEUTRAL
+    talk.hears(RESPONSE_MAP, 11.023)
+    talk.until(13.0)
+    assert warnings(talk) == [
+        may_run('stop_failed', what=[says('write_unanswered', what='control_word (P52)')])]
 
 
 def test_drive_that_falls_silent_with_its_disable_by_number_is_named() -> None:

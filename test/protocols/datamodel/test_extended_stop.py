@@ -7,7 +7,8 @@ from builders import (
     CONTROL, Conversation, CURRENT, drive, parameter, SPEED, TABLE, WORD,
 )
 from extended_builders import (
-    ANSWER, ASK_REQUEST_MAP, ASK_WORD, cycling, DISABLE, ENABLED, exchange, NEUTRAL, online, TICK,
+    ANSWER, ASK_REQUEST_MAP, ASK_WORD, cycling, DISABLE, ENABLED, exchange, NEUTRAL, online,
+    REQUEST_MAP, TICK,
 )
 import pytest
 from saying import may_run, says
@@ -64,14 +65,15 @@ def test_stop_while_the_drive_is_being_left() -> None:
     silent(talk, 11.0)
 
 
-def test_look_that_is_under_way_when_the_stop_begins() -> None:
+@pytest.mark.parametrize('request_map', [REQUEST_MAP, '102007A4#0000000000000000'])
+def test_look_that_is_under_way_when_the_stop_begins(request_map: str) -> None:
     talk = online(period=0.1)
     for cycle in range(1, 10):
         exchange(talk, 10.0 + 0.1 * cycle)
     talk.at(11.0)
     assert talk.hears(ANSWER, 11.001) == [ASK_REQUEST_MAP]
     talk.deactivate(11.002)
-    assert talk.hears('102007A4#0000000000000000', 11.003) == []
+    assert talk.hears(request_map, 11.003) == []
     assert talk.until(12.0) == [(11.005, NEUTRAL), (11.105, NEUTRAL), (11.205, NEUTRAL)]
     assert talk.events(MappingDiffered) == []
     silent(talk, 12.0)
