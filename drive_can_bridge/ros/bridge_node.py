@@ -63,6 +63,8 @@ from drive_can_bridge.transport.end_point import EndPoint
 _OURS = ('drives.', 'buses.')
 _OURS_ALONE = ('diagnostics_period', 'autostart')
 NODE_NAME = 'drive_can_bridge'
+#: s until it is looked again whether the callers of a drive that leaves have their answers
+DISMISS_PAUSE = 0.005
 
 SUCCESS = TransitionCallbackReturn.SUCCESS
 FAILURE = TransitionCallbackReturn.FAILURE
@@ -406,7 +408,8 @@ class BridgeNode(LifecycleNode):
     def _dismiss(self, drives: Iterable[DriveNode] = ()) -> None:
         """Take drives out of the graph, each as soon as its last caller has an answer."""
         self._leaving = [drive for drive in (*self._leaving, *drives) if not _gone(drive)]
-        if self._leaving:
+        if self._leaving:   # who answers needs the interpreter meanwhile
+            self._steady.wait(self._steady.now() + DISMISS_PAUSE)
             self._spinner.later(self._dismiss)
 
     # -- from the outside -------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from waiting import clock, pause
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.ros.diagnostics import Attendance
+from drive_can_bridge.ros.drive_node import DriveNode
 
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
@@ -306,6 +307,23 @@ def test_any_order_during_traffic(bridge: StartBridge, client: Client) -> None:
     assert any(getattr(answer, 'success', False) for answer in answers)  # ~/enable
     assert any(values and values[0].type for values in (
         getattr(answer, 'values', None) for answer in answers))
+
+
+def test_a_drive_whose_caller_still_waits_is_looked_at_now_and_then(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever answers it has its turn meanwhile: nobody goes round in circles."""
+    bridge()
+    answered_at = clock().now() + 1.0
+    looks: list[float] = []
+
+    def answer_all(_: DriveNode) -> bool:
+        looks.append(clock().now())
+        return looks[-1] >= answered_at
+    monkeypatch.setattr(DriveNode, 'answer_all', answer_all)
+    assert client.transition(DEACTIVATE)
+    assert client.transition(CLEANUP)
+    wait_until(lambda: looks[-1] >= answered_at)
+    assert 10 < len(looks) < 500
 
 
 def test_dynamic_parameters_survive_a_new_configuration(bridge: StartBridge,
