@@ -19,22 +19,28 @@ RUNNING = '7F1#E803FA000300ADDE'
 ASK_STATUS = '3F1#03D3000100000000'
 
 
-def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
-    """Whoever asks again meanwhile only joins: the drive might have been off, unseen."""
+def found(until: float, *, parameter_timeout: float) -> Timeline:
+    """Return a drive that is found at 10 s, and answers each round."""
     talk = Conversation(drive(
         'datamodel_standard', control=CONTROL, request=(SPEED, LIMIT, WORD), period=0.05,
-        refresh_interval=0.0, parameter_timeout=1.0))
+        refresh_interval=0.0, parameter_timeout=parameter_timeout))
     line = Timeline(talk, {ASK: (0.002, ANSWER)}.get)
     talk.bus_up(9.0)
     talk.activate(10.0)
-    line.live(10.2)
-    line.took(talk.asks(ControlAction.ENABLE, 10.2))
+    line.live(until)
+    return line
+
+
+def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
+    """Whoever asks again meanwhile only joins: the drive might have been off, unseen."""
+    line = found(10.2, parameter_timeout=1.0)
+    line.took(line.talk.asks(ControlAction.ENABLE, 10.2))
     line.live(10.31)
     assert line.when(ENABLE) == [10.202]
     line.answer = lambda text: None
     for at in (10.552, 10.652, 10.752):
         line.live(at)
-        line.took(talk.asks(ControlAction.ENABLE, at))
+        line.took(line.talk.asks(ControlAction.ENABLE, at))
     line.live(12.0)
     assert line.when(ENABLE) == [10.202], line.log
     assert [at for at in line.when(ASK) if at > 10.31] == [10.35, 11.45], 'one goes unanswered'
@@ -42,13 +48,7 @@ def test_enable_is_not_repeated_while_a_read_goes_unanswered() -> None:
 
 def silent(until: float) -> Timeline:
     """Return a drive that was found at 10 s, and answers nothing from 10.19 s on."""
-    talk = Conversation(drive(
-        'datamodel_standard', control=CONTROL, request=(SPEED, LIMIT, WORD), period=0.05,
-        refresh_interval=0.0, parameter_timeout=0.1))
-    line = Timeline(talk, {ASK: (0.002, ANSWER)}.get)
-    talk.bus_up(9.0)
-    talk.activate(10.0)
-    line.live(10.19)
+    line = found(10.19, parameter_timeout=0.1)
     line.answer = lambda text: None
     line.live(until)
     return line
