@@ -13,7 +13,7 @@ import threading
 import time
 from typing import Any
 
-from child import serve
+from child import PATIENCE, serve
 from rcl_interfaces.srv import GetParameters
 import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
@@ -21,9 +21,6 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
 import topics  # noqa: F401  sets the environment of rclpy
-
-DISCOVERY_TIMEOUT = 10.0
-TRACE_TIMEOUT = 60.0
 
 
 class Caller:
@@ -48,7 +45,7 @@ class Caller:
         found: dict[str, list[float]] = {'drive': [], 'bare': []}
         clients = {'drive': self._drives[0], 'bare': self._bare}
         for client in clients.values():
-            if not client.wait_for_service(DISCOVERY_TIMEOUT):
+            if not client.wait_for_service(PATIENCE):
                 raise SystemExit('no service')
         for _ in range(int(count)):
             for name, client in clients.items():
@@ -56,7 +53,7 @@ class Caller:
                 future = client.call_async(self._request)
                 done = threading.Event()
                 future.add_done_callback(lambda _, done=done: done.set())
-                if not done.wait(5.0):
+                if not done.wait(PATIENCE):
                     raise SystemExit('a call was not answered')
                 found[name].append(time.monotonic() - begun)
                 time.sleep(0.002)
@@ -64,13 +61,13 @@ class Caller:
 
     def trace(self) -> dict[str, float]:
         """Have traces written; return how long that took, and how many frames they have."""
-        if not self._save.wait_for_service(DISCOVERY_TIMEOUT):
+        if not self._save.wait_for_service(PATIENCE):
             raise SystemExit('no service')
         begun = time.monotonic()
         future = self._save.call_async(Trigger.Request())
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
-        if not done.wait(TRACE_TIMEOUT) or not future.result().success:
+        if not done.wait(PATIENCE) or not future.result().success:
             raise SystemExit('no trace was written')
         elapsed = time.monotonic() - begun
         frames = 0
@@ -83,7 +80,7 @@ class Caller:
         """Keep so many calls to each drive under way."""
         self._flooding, self._answered = True, 0
         for client in self._drives:
-            if not client.wait_for_service(DISCOVERY_TIMEOUT):
+            if not client.wait_for_service(PATIENCE):
                 raise SystemExit('no service')
             for _ in range(int(under_way)):
                 self._call_on(client)
@@ -93,7 +90,7 @@ class Caller:
         """Keep so many calls to the first drive under way, and eight for unknown names."""
         self._flooding, self._answered = True, 0
         client = self._drives[0]
-        if not client.wait_for_service(DISCOVERY_TIMEOUT):
+        if not client.wait_for_service(PATIENCE):
             raise SystemExit('no service')
         for _ in range(int(under_way)):
             self._call_on(client)

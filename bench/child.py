@@ -21,7 +21,8 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '97')
 
 HERE = Path(__file__).resolve().parent
-ANSWER_TIMEOUT = 120.0
+#: s after which what has not happened never will, whoever else has the processors
+PATIENCE = 300.0
 
 
 class Child:
@@ -55,7 +56,7 @@ class Child:
         if self.process.stdin is not None:
             self.process.stdin.close()
         try:
-            self.process.wait(timeout=10.0)
+            self.process.wait(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

@@ -230,7 +230,7 @@ int main(int count, char * words[])
   strncpy(address.sun_path, words[2], sizeof(address.sun_path) - 1);
   line = socket(AF_UNIX, SOCK_SEQPACKET, 0);
   check(connect(line, (struct sockaddr *)&address, sizeof(address)) == 0, words[2]);
-  struct timeval timeout = {1, 0};
+  struct timeval timeout = {300, 0};     // PATIENCE of child.py
   setsockopt(line, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
   setvbuf(stdout, NULL, _IOLBF, 0);
   puts("true");

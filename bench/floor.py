@@ -14,7 +14,7 @@ import time
 from typing import Any
 
 import can
-from child import serve, sleep_until
+from child import PATIENCE, serve, sleep_until
 from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
 import rclpy  # isort: skip
 from rclpy.node import Node
@@ -122,7 +122,7 @@ class Floor:
                     arbitration_id=(number + 1) << 21 | CYCLIC, is_extended_id=True,
                     data=request(int(drive.setpoint * 10.0), 0, 0, 0)))
             for _ in drives:
-                message = bus.recv(1.0)
+                message = bus.recv(PATIENCE)
                 if message is None:
                     raise RuntimeError('a drive did not answer')
                 speed, current, position, inputs = response(message.data)

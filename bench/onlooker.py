@@ -15,7 +15,7 @@ import threading
 import time
 from urllib.request import Request, urlopen
 
-from child import cpu_of
+from child import cpu_of, PATIENCE
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -66,6 +66,7 @@ class Panel:
                 f'&client_id={found[1]}&tab_id=tab&document_id=document&next_message_id=0'
                 '&implicit_handshake=true',
                 origin=f'http://{self._host}', max_size=None,  # type: ignore[arg-type]
+                open_timeout=PATIENCE, ping_interval=None,
                 additional_headers={'Cookie': self._cookie}) as channel:
             opened = Page(channel, found[1], begun)
             opened.start()
@@ -74,7 +75,7 @@ class Panel:
     def close(self) -> None:
         """Let it end."""
         self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=10.0)
+        self.process.wait(timeout=PATIENCE)
 
 
 class Page(threading.Thread):

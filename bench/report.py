@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import math
 from typing import Any
 
-from scenarios import median, p99
+from scenarios import median, p99, ratio
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ def exchange_figures(found: dict[str, Any], name: str, goal: float,
     bridge, floor = found['bridge'], found['floor']
     cpu = _per_exchange(bridge, 'process_cpu')
     beside = [Figure(f'CPU of the process per exchange, {name}, beside {language}',
-                     f'{1e6 * cpu:.0f} µs', f'{1e6 * floor_cpu:.0f} µs', cpu / floor_cpu, each)
+                     f'{1e6 * cpu:.0f} µs', f'{1e6 * floor_cpu:.0f} µs',
+                     ratio(cpu, floor_cpu), each)
               for key, language, each in (('floor', 'Python', goal), ('c_floor', 'C', c_goal))
               if key in found for floor_cpu in [_per_exchange(found[key], 'cpu')]]
     parts = ', '.join(f'{thread} {1e6 * value / max(1, bridge["exchanges"]):.0f}'
@@ -52,7 +53,7 @@ def exchange_figures(found: dict[str, Any], name: str, goal: float,
                2990.0, at_least=True),
         Figure(f'period error p99, {name}', f'{1e3 * period:.3f} ms',
                f'sleeping {1e3 * sleeping:.3f} ms, bare loop '
-               f'{1e3 * p99(floor["period_errors"]):.3f} ms', period / sleeping, 2.0),
+               f'{1e3 * p99(floor["period_errors"]):.3f} ms', ratio(period, sleeping), 2.0),
     ]
 
 
@@ -66,7 +67,7 @@ def axes_figures(found: dict[str, Any]) -> list[Figure]:
     cpu, floor = (1e6 * each['process_cpu'] / max(1, each['exchanges']) for each in (axes, drives))
     return [
         Figure('CPU of the process per exchange, csp axes with SYNC', f'{cpu:.0f} µs',
-               f'29-bit drives {floor:.0f} µs', cpu / floor, 1.5),
+               f'29-bit drives {floor:.0f} µs', ratio(cpu, floor), 1.5),
         Figure('exchanges missed, csp axes with SYNC',
                f'{axes["missed"]} of {axes["exchanges"]}, period error p99 '
                f'{1e3 * p99(axes["period_errors"]):.2f} ms',
@@ -96,13 +97,13 @@ def diy_figures(found: dict[str, Any]) -> list[Figure]:
     bridge, diy = found['bridge'], found['diy']
     return [
         Figure('CPU of the process, do-it-yourself node / bridge', f'{100 * bridge["cpu"]:.0f} %',
-               f'{100 * diy["cpu"]:.0f} %', diy['cpu'] / bridge['cpu'], 3.5, at_least=True),
+               f'{100 * diy["cpu"]:.0f} %', ratio(diy['cpu'], bridge['cpu']), 3.5, at_least=True),
         Figure('period error p99 at the drive, bridge / do-it-yourself',
                f'{1e3 * p99(bridge["period_errors"]):.3f} ms '
                f'({bridge["requests_per_s"]:.0f} requests/s)',
                f'{1e3 * p99(diy["period_errors"]):.3f} ms '
                f'({diy["requests_per_s"]:.0f} requests/s)',
-               p99(bridge['period_errors']) / p99(diy['period_errors']), 1.0),
+               ratio(p99(bridge['period_errors']), p99(diy['period_errors'])), 1.0),
     ]
 
 
@@ -137,7 +138,7 @@ def flood_figures(found: dict[str, Any]) -> list[Figure]:
     return [Figure(f'period error p99 in a flood ({found["calls"]} calls answered)',
                    f'{1e3 * flood:.3f} ms ({found["flood"]["missed"]} missed)',
                    f'{1e3 * quiet:.3f} ms; sleeping {1e3 * sleeping[1]:.3f}, '
-                   f'{1e3 * sleeping[0]:.3f} ms', flood / quiet, 2.0)]
+                   f'{1e3 * sleeping[0]:.3f} ms', ratio(flood, quiet), 2.0)]
 
 
 def monitor_figures(found: dict[str, Any]) -> list[Figure]:
@@ -147,11 +148,11 @@ def monitor_figures(found: dict[str, Any]) -> list[Figure]:
     shares = [each['cpu'] / each['elapsed'] for each in (before, beside)]
     return [
         Figure('period error p99 with a monitor', f'{1e3 * periods[1]:.3f} ms',
-               f'without {1e3 * periods[0]:.3f} ms', periods[1] / periods[0], 1.1),
+               f'without {1e3 * periods[0]:.3f} ms', ratio(periods[1], periods[0]), 1.1),
         Figure('exchanges missed with a monitor', str(beside['missed']),
                f'without {before["missed"]}', beside['missed'], 0.0),
         Figure('CPU of the bridge with a monitor', f'{100 * shares[1]:.1f} %',
-               f'without {100 * shares[0]:.1f} %', shares[1] / shares[0], 1.25),
+               f'without {100 * shares[0]:.1f} %', ratio(shares[1], shares[0]), 1.25),
         Figure('CPU of the monitor, of one core', f'{100 * median(found["monitor"]):.1f} %', '',
                median(found['monitor']), 0.1),
     ]
@@ -231,7 +232,7 @@ def drives_figures(found: dict[str, dict[str, Any]]) -> list[Figure]:
     return [
         Figure('CPU per exchange by drives',
                ', '.join(f'{number}: {1e6 * cost:.0f} µs' for number, cost in costs.items()),
-               'linear: no more than with few', costs[most] / costs[sorted(costs)[1]], 1.1),
+               'linear: no more than with few', ratio(costs[most], costs[sorted(costs)[1]]), 1.1),
         Figure('service executor per drive',
                f'{1e3 * idle:.2f} ms/s', 'nothing', 1e2 * idle, 0.1),
     ]
@@ -289,7 +290,7 @@ def _beside_figure(name: str, pairs: list[tuple[float, float]], goal: float) -> 
     """Compare two bridges that ran at the same time."""
     with_it, without = (median([pair[place] for pair in pairs]) for place in (0, 1))
     return Figure(name, f'{100 * with_it:.1f} %', f'without {100 * without:.1f} %',
-                  median([one / other for one, other in pairs]), goal)
+                  median([one / other for one, other in pairs if other]), goal)
 
 
 def start_figures(found: dict[str, Any]) -> list[Figure]:

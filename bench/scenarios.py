@@ -18,14 +18,13 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
-from child import child, HERE
+from child import child, HERE, PATIENCE
 import native
 from unix_bus import INTERFACE
 from viewer import Viewer
 
 #: s until discovery and the first publishes are over
 SETTLE = 2.0
-ONLINE_TIMEOUT = 30.0
 #: the program that a user types
 DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
@@ -159,7 +158,7 @@ class Bridges:
         self.processes = [stack.enter_context(child('bridge.py', *load.how, *arguments))
                           for arguments in each or [(bus.file,)]]
         begun = min(process.ready for process in self.processes)
-        until = begun + ONLINE_TIMEOUT
+        until = begun + PATIENCE
         while True:
             asked = [at for drives in bus.drives for at in drives.ask('first')]
             if len(asked) == load.drives:
@@ -627,3 +626,8 @@ def p99(samples: list[float]) -> float:
 def median(samples: list[float]) -> float:
     """Return the median; NaN without samples."""
     return statistics.median(samples) if samples else float('nan')
+
+
+def ratio(measured: float, floor: float) -> float:
+    """Return a ratio; NaN where a floor took nothing that could be measured."""
+    return measured / floor if floor else float('nan')

@@ -11,16 +11,13 @@ import threading
 import time
 from typing import Any
 
-from child import serve
+from child import PATIENCE, serve
 import rclpy  # isort: skip
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 import topics  # noqa: F401  sets the environment of rclpy
-
-DISCOVERY_TIMEOUT = 20.0
-CALL_TIMEOUT = 10.0
 
 
 class Stopper:
@@ -35,7 +32,7 @@ class Stopper:
     def stop(self, count: float) -> dict[str, Any]:
         """Return the times of the calls (steady clock, s), and what was not answered well."""
         for client in (self._enable, self._quick_stop):
-            if not client.wait_for_service(DISCOVERY_TIMEOUT):
+            if not client.wait_for_service(PATIENCE):
                 raise SystemExit('no service')
         called: list[float] = []
         failures: list[str] = []
@@ -54,7 +51,7 @@ class Stopper:
 
     def enable(self) -> bool:
         """Enable the first drive; return whether it is."""
-        if not self._enable.wait_for_service(DISCOVERY_TIMEOUT):
+        if not self._enable.wait_for_service(PATIENCE):
             raise SystemExit('no service')
         answer = self._call(self._enable, SetBool.Request(data=True))
         return answer is not None and answer.success
@@ -64,7 +61,7 @@ class Stopper:
         future = client.call_async(request)
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
-        return future.result() if done.wait(CALL_TIMEOUT) else None
+        return future.result() if done.wait(PATIENCE) else None
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 
-from child import serve
+from child import PATIENCE, serve
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterEvent
 import rclpy  # isort: skip
@@ -26,9 +26,6 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from topics import TYPES
-
-#: s for a drive to appear in /diagnostics
-PATIENCE = 30.0
 
 
 class Listener:

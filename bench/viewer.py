@@ -11,7 +11,7 @@ import sys
 import termios
 import threading
 
-from child import cpu_of
+from child import cpu_of, PATIENCE
 
 #: columns and lines: all drives with everything that a line holds
 SIZE = (140, 50)
@@ -37,7 +37,7 @@ class Viewer:
     def close(self) -> None:
         """Let it end."""
         self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=10.0)
+        self.process.wait(timeout=PATIENCE)
 
     def _read(self) -> None:
         while True:
