@@ -9,7 +9,8 @@ seed always tells the same story: where several may go on, a random generator sa
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+import ctypes
 from heapq import heappop, heappush
 from itertools import count
 import math
@@ -23,8 +24,8 @@ BEGIN, EPOCH = 1000.0, 1_700_000_000_000_000_000
 LOOK, SELDOM = 0.001, 0.02
 #: turns without time that nobody needs who does not go round in circles
 TURNS_MAX = 100_000
-#: s of real time after which a thread does not only compute, but hangs
-HANG = 60.0
+#: s of real time after which a thread does not only compute, but hangs; and for it to end then
+HANG, END = 60.0, 1.0
 
 
 class Stuck(AssertionError):
@@ -44,6 +45,7 @@ class Task:
     A thread that runs when it is its turn.
 
     :ivar rung: somebody woke it, rather than the time for which it waited.
+    :ivar thread: what runs.
     """
 
     def __init__(self, clock: 'JumpingClock', run: Callable[[], object] | None, name: str) -> None:
@@ -54,13 +56,14 @@ class Task:
         self._run = run
         self._turn = threading.Lock()       # held until it is its turn
         self._turn.acquire()
+        self.thread = TurnThread(target=self._live, name=name, daemon=True)
         self._begun = self._ended = False
         self._joining: list[Task] = []
 
     def start(self) -> None:
         """Begin, when it is its turn."""
         self._begun = True
-        TurnThread(target=self._live, name=self.name, daemon=True).start()
+        self.thread.start()
         self._clock.tasks.append(self)
         self._clock.wake(self)
 
@@ -82,13 +85,30 @@ class Task:
 
     def rest(self) -> None:
         """Wait for its turn."""
-        before = self._clock.handed_over
-        while not self._turn.acquire(timeout=HANG):
-            if self._clock.handed_over == before:
-                raise Stuck(f'{self._clock.current.name} has not waited for {HANG:g} s')
-            before = self._clock.handed_over
-        if self._clock.over and self._run is not None:
+        self._turn.acquire()
+        if self._clock.over:
             raise _Over
+
+    def rest_as_the_story(self) -> None:
+        """Wait for the turn of who tells the story, can be interrupted, and sees who hangs."""
+        before = self._clock.handed_over
+        try:
+            while not self._turn.acquire(timeout=HANG):
+                if self._clock.handed_over == before:
+                    raise Stuck(f'{self._clock.current.name} has not waited for {HANG:g} s')
+                before = self._clock.handed_over
+        except BaseException:
+            self._clock.break_off()
+            raise
+
+    def end(self) -> None:
+        """End it, wherever it is: nobody has a turn any more."""
+        if self is not self._clock.current:
+            with suppress(RuntimeError):        # it is about to have its turn
+                self._turn.release()
+        elif self.thread.ident is not None:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(self.thread.ident), ctypes.py_object(_Over))
 
     def _live(self) -> None:
         assert self._run is not None
@@ -103,7 +123,8 @@ class Task:
         for task in self._joining:
             self._clock.wake(task)
         self._clock.tasks.remove(self)
-        self._clock.hand_over()
+        if not self._clock.broken:
+            self._clock.hand_over()
 
 
 class JumpingWakeEvent:
@@ -176,6 +197,7 @@ class JumpingClock:
     :param seed: says who goes first where several may.
     :ivar failures: what ended threads.
     :ivar handed_over: how often the turn has changed.
+    :ivar broken: the story was broken off in the turn of somebody else: nobody has one any more.
     """
 
     def __init__(self, seed: int = 0) -> None:
@@ -183,7 +205,7 @@ class JumpingClock:
         self.chance = random.Random(seed)
         self.tasks: list[Task] = []
         self.failures: list[BaseException] = []
-        self.over = False
+        self.over = self.broken = False
         self.handed_over = 0
         self._main = self.current = Task(self, None, 'the story')
         self._time = BEGIN
@@ -191,6 +213,7 @@ class JumpingClock:
         self._ready: list[Task] = []
         self._number = count()
         self._turns = 0
+        self._stuck: Stuck | None = None
 
     # -- what everybody is handed -----------------------------------------------------------------
 
@@ -253,7 +276,7 @@ class JumpingClock:
     def close(self) -> None:
         """End all threads that are left; return when they have."""
         self.over = True
-        while self.tasks:
+        while self.tasks and not self.broken:
             left = len(self.tasks)
             for task in list(self.tasks):
                 self.wake(task)
@@ -271,13 +294,30 @@ class JumpingClock:
 
     def block(self, until: float) -> None:
         """Wait until then, or until somebody wakes us. The caller looks which it was."""
+        if self.broken:
+            raise _Over if isinstance(threading.current_thread(), TurnThread) else Stuck(
+                'the story was broken off: nobody has a turn')
         me = self.current
         if until < math.inf:
             heappush(self._coming, (until, next(self._number), me, me.ticket))
         elif self.over and me is self._main:
             self._ready.append(me)
         self.hand_over()
-        me.rest()
+        if me is not self._main:
+            me.rest()
+            return
+        me.rest_as_the_story()
+        if self._stuck is not None:
+            stuck, self._stuck = self._stuck, None
+            raise stuck
+
+    def break_off(self) -> None:
+        """End all threads where they are, because somebody keeps his turn to himself."""
+        self.over = self.broken = True
+        for task in list(self.tasks):
+            task.end()
+        for task in list(self.tasks):
+            task.thread.join(END)
 
     def hand_over(self) -> None:
         """Let the next one go on."""
@@ -288,7 +328,7 @@ class JumpingClock:
         while not self._ready:
             if not self._coming:
                 self._fail('nobody waits for anything that can happen')
-                return
+                break
             until, _, task, ticket = heappop(self._coming)
             if ticket != task.ticket:
                 continue
@@ -309,9 +349,10 @@ class JumpingClock:
         self._ready.append(task)
 
     def _fail(self, why: str) -> None:
-        self.failures.append(Stuck(why))
+        self._stuck = Stuck(why)
         self._turns = 0
-        self._ready.append(self._main)
+        if self._main not in self._ready:
+            self.wake_at(self._main)
 
 
 @contextmanager
