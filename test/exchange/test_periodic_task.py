@@ -49,12 +49,12 @@ def test_no_thread_waits_for_another() -> None:
     def action(now: float) -> None:
         done.append(now)
         begun.set()
-        go_on.wait(10.0)
+        go_on.wait()
     periodic_task = PeriodicTask(action)
     periodic_task.begin(1.0, now=0.0)
     other = threading.Thread(target=periodic_task.run, args=(1.0,))
     other.start()
-    assert begun.wait(10.0)
+    assert begun.wait()
     assert periodic_task.run(2.0) == 3.0
     assert done == [1.0]
     ended = threading.Event()
@@ -66,8 +66,8 @@ def test_no_thread_waits_for_another() -> None:
     ending.start()
     assert not ended.wait(0.05), 'it waits for the call that is under way'
     go_on.set()
-    other.join(10.0)
-    ending.join(10.0)
+    other.join()
+    ending.join()
     assert ended.is_set()
     assert periodic_task.run(100.0) == math.inf
     assert done == [1.0]
