@@ -63,10 +63,12 @@ class Child:
 
     def _read(self) -> Any:
         assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        if not line:
-            raise SystemExit(f'{self.script} ended before its time')
-        return json.loads(line)
+        for line in self.process.stdout:
+            try:
+                return json.loads(line)
+            except ValueError:      # the middleware has something to say before serve() begins
+                print(f'{self.script}: {line}', end='', file=sys.stderr)
+        raise SystemExit(f'{self.script} ended before its time')
 
 
 def cpu_of(process: int) -> float:
