@@ -19,6 +19,8 @@ from typing import Any, NoReturn
 # before rclpy is imported: nothing leaves this machine
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '97')
+# and no command reaches another bridge of it
+os.environ.setdefault('DRIVE_CAN_LOCAL', 'off')
 
 HERE = Path(__file__).resolve().parent
 #: s after which what has not happened never will, whoever else has the processors

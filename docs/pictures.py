@@ -21,6 +21,7 @@ import time
 
 # before rclpy is imported: nothing leaves this machine, nor meets a demo that runs here
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+os.environ.setdefault('DRIVE_CAN_LOCAL', 'off')     # no other bridge of this machine is in them
 os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
 import panel_pictures
