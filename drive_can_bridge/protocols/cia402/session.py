@@ -41,11 +41,12 @@ from drive_can_bridge.protocols.canopen.node import (
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
-from drive_can_bridge.protocols.cia402.bring_up import BringUp, Found, LOOK_PERIOD, Outcome
+from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoTransactor
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.objects import Found, Outcome
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
     cells, MAP, SdoAccess, StopProcedure, write_until_answered)
@@ -184,7 +185,7 @@ class Cia402Session(Session):
         self._course.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
-            self.exchange.cycling or owes or self._bring_up.watch is not None)
+            self.exchange.cycling or owes or self._bring_up.watch.slot is not None)
 
     def begin_stop(self, now: float) -> bool:
         self._stop_until = now + self.configuration.control_timeout
@@ -610,7 +611,7 @@ class Cia402Session(Session):
         if self.owed or self._runs_on:      # then it is to stop by itself
             self.stop_left(why)
             return
-        self._channel.run(self._bring_up.release(self._stop.answer_time),
+        self._channel.run(self._bring_up.watch.release(self._stop.answer_time),
                           lambda _: self.stop_left(why), now, Priority.STOP)
 
     # -- state ------------------------------------------------------------------------------------

@@ -1,0 +1,128 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Objects of a drive as its set-up reads and writes them, and how the set-up ends.
+
+Whatever nobody answers ends it. A refusal says that there is no such object only where the drive
+says so (06020000h, 06090011h): it may be write only, or not to be had in this state.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.protocols.canopen import sdo
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+
+Procedure = Generator[Ask, Reply, Any]
+
+
+class Found(Enum):
+    """What the set-up has come to."""
+
+    READY = 'ready'
+    DIFFERS = 'differs'
+    RUNS = 'runs on'
+    SILENT = 'no answer any more'
+    ABSENT = 'no answer at all'
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """
+    The end of the set-up.
+
+    :param text: what differs, or how it runs on.
+    :param status: the last status word, where it is ready.
+    :param remedy: says what to do about what differs.
+    """
+
+    found: Found
+    text: Sentence = NOTHING
+    status: int = 0
+    remedy: Callable[[str], Sentence] = sentences.drive_to_correct
+
+
+class End(Exception):
+    """The set-up ends here."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__(outcome.text)
+        self.outcome = outcome
+
+
+class Objects:
+    """
+    Reads and writes numbers.
+
+    :param attempts: how often a write is tried: it stays the same.
+    :ivar abort: the code with which the last read was refused; None: it was not.
+    """
+
+    def __init__(self, attempts: int) -> None:
+        self.abort: int | None = None
+        self._attempts = attempts
+
+    @property
+    def absent(self) -> bool:
+        """The drive says that it has no such object as was read last."""
+        return self.abort in sdo.ABSENT
+
+    def transfer(self, ask: Ask) -> Generator[Ask, Reply, Reply]:
+        """Do one transfer. :raises End: nobody answers."""
+        reply = yield ask
+        if silent(reply):
+            raise End(Outcome(Found.SILENT))
+        return reply
+
+    def read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
+             ) -> Generator[Ask, Reply, 'int | None']:
+        """
+        Read a number; None: the drive refuses.
+
+        :param length: its bytes, where the drive does not tell.
+        :raises End: nobody answers.
+        """
+        reply = yield from self.transfer(Ask(index, subindex))
+        self.abort = reply.abort
+        if reply.data is None:
+            return None
+        data = reply.data if reply.sized else reply.data[:length]
+        return int.from_bytes(data, 'little', signed=signed)
+
+    def put(self, index: int, subindex: int, value: int, length: int,
+            ) -> Generator[Ask, Reply, Sentence]:
+        """Write a number; return the refusal. :raises End: nobody answers."""
+        data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
+        reply = yield from self.transfer(Ask(index, subindex, data, attempts=self._attempts))
+        return NOTHING if reply.abort is None else sentences.object_refused(
+            at_object(index, subindex), sdo.describe(reply.abort))
+
+    def must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
+        """Write a number. :raises End: nobody answers, or the drive refuses."""
+        refusal = yield from self.put(index, subindex, value, length)
+        if refusal:
+            raise differs(refusal)
+
+
+def silent(reply: Reply) -> bool:
+    """Tell whether nobody answered."""
+    return reply.data is None and reply.abort is None
+
+
+def differs(text: Sentence, remedy: Callable[[str], Sentence] = sentences.drive_to_correct,
+            ) -> End:
+    """Return what ends the set-up of a drive that does not fit."""
+    return End(Outcome(Found.DIFFERS, text, remedy=remedy))
+
+
+def at_object(index: int, subindex: int = 0) -> str:
+    """
+    Write where an object is.
+
+    >>> at_object(0x1600, 3)
+    '1600h.03h'
+    """
+    return f'{index:04X}h.{subindex:02X}h'

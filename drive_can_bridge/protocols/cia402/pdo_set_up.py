@@ -1,0 +1,197 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""PDOs of a drive as they are set up: compared, written where they differ, compared again."""
+
+from collections.abc import Callable, Generator, Iterable
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.protocols.cia402 import pdo
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
+from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
+
+
+class PdoSetUp:
+    """
+    The PDOs of one drive.
+
+    :param may_write: ends the set-up where what differs is not to be written.
+    :param tell: tells people once what the drive lacks.
+    """
+
+    def __init__(self, objects: Objects, drive: DriveConfiguration,
+                 may_write: Callable[[Sentence], None], tell: Callable[[Sentence], None]) -> None:
+        self._objects, self._drive, self._options = objects, drive, drive.options
+        self._received, self._sent = request_pdos(drive), response_pdos(drive)
+        self._synchronous: bool = drive.options.transmission == 'sync'
+        self._may_write, self._tell = may_write, tell
+
+    def set_up(self) -> Procedure:
+        """Compare them with the configuration, and write what differs, if that is wanted."""
+        for wanted in self._received:
+            yield from self._look_at(wanted, transmit=False)
+        for wanted in self._sent:
+            yield from self._look_at(wanted, transmit=True)
+        if self._options.mapping == 'configure':
+            yield from self._close(pdo.RPDO_COMMUNICATION, self._received)
+            yield from self._close(pdo.TPDO_COMMUNICATION, self._sent)
+
+    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Procedure:
+        """Compare one PDO; write it where it differs, and compare again."""
+        difference, identifier = yield from self._compare(wanted, transmit=transmit)
+        if difference:
+            self._may_write(difference)
+            refusal = yield from self._write(wanted, identifier, transmit=transmit)
+            difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
+            if refusal and difference:
+                raise differs(refusal)
+            if difference:
+                raise differs(difference, sentences.maps_not_kept)
+
+    def _types(self, *, transmit: bool) -> tuple[int, ...]:
+        event = pdo.EVENT_PROFILE, pdo.EVENT_MAKER
+        if not self._synchronous:
+            return event
+        return (pdo.SYNCHRONOUS,) if transmit else (pdo.SYNCHRONOUS, *event)
+
+    def _compare(self, wanted: Pdo, *, transmit: bool, written: bool = False,
+                 ) -> Generator[Ask, Reply, tuple[Sentence, int]]:
+        """
+        Return what differs, and the COB-ID as it is.
+
+        :param written: it was just written, and any of the types that are tried will do.
+        """
+        at = wanted.communication
+        identifier = yield from self._objects.read(at, pdo.COB_ID)
+        if identifier is None:
+            raise differs(sentences.no_such_pdo('TPDO' if transmit else 'RPDO', wanted.number))
+        if identifier & ~pdo.NO_REMOTE != wanted.identifier:
+            return _difference(at, pdo.COB_ID, identifier, wanted.identifier), identifier
+        kind = yield from self._objects.read(at, pdo.TRANSMISSION, 1)
+        types = self._types(transmit=transmit)
+        judged = transmit or self._options.mapping == 'configure'
+        if judged and kind not in (types if written or transmit else types[:1]):
+            return _difference(at, pdo.TRANSMISSION, kind or 0, types[0]), identifier
+        difference = yield from self._other_content(wanted)
+        if difference:
+            return difference, identifier
+        if transmit and self._options.mapping == 'configure' and not written:
+            for subindex, value in self._timers():
+                time = yield from self._objects.read(at, subindex, 2)
+                if time is not None and time != value:
+                    return _difference(at, subindex, time, value), identifier
+        return NOTHING, identifier
+
+    def _other_content(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
+        """Return in what a PDO holds something else."""
+        entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
+        count = yield from self._objects.read(mapping, 0, 1)
+        if count != len(entries):
+            return _difference(mapping, 0, count or 0, len(entries))
+        for place, entry in enumerate(entries, 1):
+            found = (yield from self._objects.read(mapping, place)) or 0
+            if found != entry:
+                return sentences.object_differs(
+                    at_object(mapping, place), pdo.entry_text(found), pdo.entry_text(entry))
+        return NOTHING
+
+    def _timers(self) -> list[tuple[int, int]]:
+        """Return inhibit time (0.1 ms) and event timer (ms) that a TPDO shall have."""
+        if self._synchronous:
+            return [(pdo.INHIBIT_TIME, 0)]
+        return [(pdo.INHIBIT_TIME, min(round(5000 * self._drive.period), 0xFFFF)),
+                (pdo.EVENT_TIMER, round(1000 * self._drive.period))]
+
+    def _write(self, wanted: Pdo, identifier: int, *, transmit: bool,
+               ) -> Generator[Ask, Reply, Sentence]:
+        """
+        Write one PDO, in the order that all devices take.
+
+        :return: the refusal of one that is fixed: it may fit as it is, but for type and times.
+        """
+        at = wanted.communication
+        kept = identifier & (pdo.NO_REMOTE | pdo.LONG_IDENTIFIER)
+        fixed = yield from self._objects.put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
+        undo: list[tuple[int, int]] = []
+        refusal = NOTHING if fixed else (yield from self._map(wanted, undo))
+        refusal = refusal or (yield from self._pace(at, fixed=bool(fixed), transmit=transmit))
+        if not fixed:
+            refusal = refusal or (yield from self._objects.put(
+                at, pdo.COB_ID, wanted.identifier | kept, 4))
+        if refusal and not fixed:       # as it was found
+            for place, content in reversed(undo):
+                if (yield from self._put_entry(at + pdo.MAPPING_OFFSET, place, content)):
+                    break       # it stays off, rather than with something else in it
+            else:
+                yield from self._objects.put(at, pdo.COB_ID, identifier, 4)
+        if refusal:
+            raise differs(refusal)
+        return fixed
+
+    def _map(self, wanted: Pdo, undo: list[tuple[int, int]]) -> Generator[Ask, Reply, Sentence]:
+        """
+        Write what a PDO holds, unless it holds that: it may be fixed.
+
+        :param undo: gets the sub-indices that were written, and what they held.
+        :return: the refusal.
+        """
+        entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
+        count = (yield from self._objects.read(mapping, 0, 1)) or 0
+        held = {0: count}
+        for place in range(1, min(count, len(entries)) + 1):
+            held[place] = (yield from self._objects.read(mapping, place)) or 0
+        if held == dict(enumerate((len(entries), *entries))):
+            return NOTHING
+        for place, content in (0, 0), *enumerate(entries, 1), (0, len(entries)):
+            refusal = yield from self._put_entry(mapping, place, content)
+            if refusal:
+                return refusal
+            if place in held:       # what was beyond the count was nothing
+                undo.append((place, held[place]))
+                held[place] = content
+        return NOTHING
+
+    def _put_entry(self, mapping: int, place: int, content: int,
+                   ) -> Generator[Ask, Reply, Sentence]:
+        return (yield from self._objects.put(mapping, place, content, 4 if place else 1))
+
+    def _pace(self, at: int, *, fixed: bool, transmit: bool) -> Generator[Ask, Reply, Sentence]:
+        """Write when a PDO is sent; return the refusal of what it cannot do without."""
+        types, refusal = self._types(transmit=transmit), NOTHING
+        for kind in types[:1] if fixed else types:
+            refusal = yield from self._objects.put(at, pdo.TRANSMISSION, kind, 1)
+            if not refusal:
+                break
+        if refusal and not fixed:
+            return refusal
+        for subindex, value in self._timers() if transmit else ():
+            found = yield from self._objects.read(at, subindex, 2)
+            if found == value or found is None and not value:
+                continue
+            refusal = yield from self._objects.put(at, subindex, value, 2)
+            if refusal and subindex == pdo.EVENT_TIMER:
+                return refusal
+            if refusal:
+                self._tell(refusal)
+        return NOTHING
+
+    def _close(self, first: int, used: Iterable[Pdo]) -> Procedure:
+        """Make PDOs invalid that are not needed."""
+        needed = {each.number for each in used}
+        for number in range(1, pdo.PDO_MAX + 1):
+            at = first + number - 1
+            if number in needed:
+                continue
+            identifier = yield from self._objects.read(at, pdo.COB_ID)
+            if identifier is not None and not identifier & pdo.INVALID:
+                self._may_write(_difference(at, pdo.COB_ID, identifier, identifier | pdo.INVALID))
+                refusal = yield from self._objects.put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
+                if refusal:
+                    self._tell(refusal)
+
+
+def _difference(index: int, subindex: int, found: int, wanted: int) -> Sentence:
+    width = 8 if subindex == pdo.COB_ID and index < 0x1A00 and not 0x1600 <= index < 0x1800 else 2
+    return sentences.object_differs(
+        at_object(index, subindex), f'{found:0{width}X}h', f'{wanted:0{width}X}h')
