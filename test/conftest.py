@@ -8,8 +8,8 @@ Puts this directory, ``clocked/`` and ``ros/`` on the path: every test may impor
 *Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
 domains of its own, before anything of ROS is imported. The tests of ``ros/`` have another one than
 all others, because they look at who is in the graph, and a process that was killed stays there for
-a while. The locks end with the process. The local way to bridges (DRIVE_CAN_LOCAL) knows no domains:
-it is switched off, but in the tests of ``local/``, which have a network of their own.
+a while. The locks end with the process. The local way to bridges (``DRIVE_CAN_LOCAL``) knows no
+domains: it is switched off, but in its own tests, which have a network of their own.
 
 *Logs* of ROS go to a directory of the run, not to the user's.
 
