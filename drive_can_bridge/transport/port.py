@@ -36,9 +36,7 @@ from drive_can_bridge.transport.failures import (
     in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, is_undefined,
     with_cause,
 )
-from drive_can_bridge.transport.serial_writer import (
-    AdapterAnswers, announcing, SerialWriter, watched,
-)
+from drive_can_bridge.transport.serial_writer import Below, watched
 
 # A frame's own time stamp is believed if it is that much older than now at most, or if the frame
 # may have waited for so long: adapters that count from power-up, and clocks that were set, fall
@@ -55,11 +53,9 @@ _LINE_MAX = 4096
 _UNFINISHED = '_buffer', '_rxbuffer'
 # Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
 _KERNEL_ERRORS = ('socketcan', 'socketcand')
-# Where python-can keeps the serial port of an interface. What is in ``serialPortOrig`` has text
-# protocols, and is watched.
+# Where python-can keeps the serial port of an interface.
 _PORTS = {'slcan': 'serialPortOrig', 'robotell': 'serialPortOrig', 'seeedstudio': 'ser',
           'serial': '_ser'}
-_WATCHED = 'serialPortOrig'
 
 
 class Port(EndPoint):
@@ -84,10 +80,9 @@ class Port(EndPoint):
         self._receive = bus._recv_internal
         self._matches = bus._matches_filters
         self._kernel_errors = kernel_errors
-        # the serial port below python-can's text protocols
-        self._serial = getattr(bus, 'serialPortOrig', None)
-        self._writer: SerialWriter | None = getattr(bus, 'drive_can_writer', None)
-        self._answers: AdapterAnswers | None = getattr(bus, 'drive_can_answers', None)
+        self._below: Below | None = getattr(bus, 'drive_can_below', None)
+        self._writer = None if self._below is None else self._below.writer
+        self._answers = None if self._below is None else self._below.answers
         self._socket = RawSocket.below(bus)
         # it waits by select(); other adapters poll, or set time-outs of a serial port
         self.punctual = isinstance(getattr(bus, 'socket', None), socket.socket)
@@ -101,7 +96,7 @@ class Port(EndPoint):
         try:
             message, filtered = self._receive(timeout)
         except Exception as error:  # whatever an adapter throws: the bus is lost
-            if self._serial is not None and is_malformed(error):
+            if self._below is not None and is_malformed(error):
                 self._malformed()
                 return None
             self._lost = True
@@ -188,14 +183,12 @@ class Port(EndPoint):
         steps: list[Callable[[], object]] = []
         if self._writer is not None:
             self._writer.timeout = _CLOSE_TIMEOUT
-        if self._lost and self._serial is not None:
-            steps.append(self._serial.reset_output_buffer)
-            # ends a line that was cut off: the C of the next command is a hexadecimal digit, too
-            steps.append(lambda: self._writer and self._writer.write(b'\r'))
+        if self._lost and self._below is not None:
+            steps.append(self._below.clear)
         steps.append(self._bus.shutdown)
-        if self._serial is not None:
+        if self._below is not None:
             # python-can's slcan leaves the port open when its last command cannot be written
-            steps.append(self._serial.close)
+            steps.append(self._below.port.close)
         if self._lock is not None:
             steps.append(self._lock.release)
         for step in steps:
@@ -319,11 +312,8 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
 
 def _open_serial(adapter: type[Any], bus: BusConfiguration, clock: Clock,
                  lock: DeviceLock | None, options: dict[str, Any]) -> can.BusABC:
-    attribute = _PORTS[bus.interface]
-    if attribute == _WATCHED:
-        adapter = watched(adapter, clock.now, slcan=bus.interface == 'slcan')
-    if lock is not None:    # before the first byte
-        adapter = announcing(adapter, attribute, lock.keep_out)
+    adapter = watched(adapter, bus.interface, _PORTS[bus.interface], clock.now,
+                      lock.keep_out if lock is not None else lambda: None)
     opened: can.BusABC = adapter(bus.channel, **options)
     return opened
 
@@ -355,9 +345,9 @@ def _abandon(error: BaseException) -> None:
         bus = traceback.tb_frame.f_locals.get('self')
         if isinstance(bus, can.BusABC):
             bus._is_shutdown = True
-            serial_port = getattr(bus, 'serialPortOrig', None)
-            if serial_port is not None:
-                serial_port.close()
+            below = getattr(bus, 'drive_can_below', None)
+            if below is not None:
+                below.port.close()
         traceback = traceback.tb_next
 
 

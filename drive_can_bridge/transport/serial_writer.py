@@ -1,10 +1,15 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Serial ports below python-can's text protocols: written to in a limited time, from the first byte.
+Serial ports below python-can's adapters: written to in a limited time, from the first byte.
 
 pyserial's ``write`` looks at the clock even after everything was written, and so takes a busy
 machine for a dead adapter; its ``flush`` waits without a limit for an adapter that has stopped to
 read. Both are replaced as soon as the port is there, because python-can's constructors write, too.
+
+Nothing is written that an adapter may take for "again". A CANable carries out the line before when
+it gets an empty one, also that of a process which has died; and a command of ours behind the half
+line of such a process would be taken for the rest of it. So the first that is written, and the
+first behind a loss, is a filler (:data:`FILLERS`), and an empty line is never sent.
 """
 
 from collections.abc import Callable
@@ -12,8 +17,26 @@ import errno
 import math
 import os
 import select
-from typing import Any
+from typing import Any, NamedTuple
 
+#: what ends a line or packet that was begun and never finished, whatever is lacking, so that
+#: nothing comes of it. On an adapter in which nothing was begun it is a question, or noise.
+#: On USBtin and LAWICEL a *whole* line that lacks only its end goes out all the same: they do not
+#: look at what follows the data.
+FILLERS = {
+    # So many characters that each firmware begins a new line: CANable (canable-fw 8ca5d39) after
+    # 30, ESP32-SLCAN after 32, CANable 2 (canable2-fw b158aa7) after 155. Fewer are dangerous
+    # there: ``t2018`` and V would be a frame, with 0F in each byte. USBtin refuses V as a digit.
+    'slcan': 160 * b'V' + b'\r',
+    # more than the 17 bytes of a packet, and its end
+    'robotell': bytes(18) + b'\x55\x55',
+    # the longest packet has 20 bytes; 00 is no end of one, and no beginning
+    'seeedstudio': bytes(20),
+    # 19, likewise
+    'serial': bytes(19),
+}
+#: s of silence behind the filler until commands are sent, and s that it is waited for at most
+_QUIET, _NOISE = 0.05, 0.3
 REFUSED = '\a'
 #: of lines that are data frames: where their length stands, one digit in front of the data
 _LENGTH_AT = {'t': 4, 'T': 9, 'x': 9}
@@ -121,33 +144,6 @@ class SerialWriter:
         return descriptor
 
 
-class _WatchedPort:
-    """
-    Mix-in for python-can's serial adapters: takes the port over the moment that it is opened.
-
-    ``serialPortOrig`` is the attribute into which they put it.
-    """
-
-    #: the steady time
-    drive_can_now: Callable[[], float]
-    _serial_port: Any = None
-    drive_can_writer: SerialWriter | None = None
-
-    @property
-    def serialPortOrig(self) -> Any:  # noqa: N802  python-can's name
-        return self._serial_port
-
-    @serialPortOrig.setter
-    def serialPortOrig(self, port: Any) -> None:  # noqa: N802  python-can's name
-        self._serial_port = port
-        self.drive_can_writer = SerialWriter.take_over(port, self.drive_can_now)
-        if self.drive_can_writer is not None:
-            # what the process before has left may not even leave room for a command
-            port.reset_output_buffer()
-            # of text protocols: what was cut off is no beginning of the first command
-            port.write(getattr(self, 'LINE_TERMINATOR', b''))
-
-
 def check_line(line: str) -> None:
     """
     Look whether a line of an SLCAN adapter is whole, as far as its length tells.
@@ -164,12 +160,20 @@ def check_line(line: str) -> None:
             raise ValueError(f'{line!r}: bytes are missing')
 
 
-class _WatchedSlcan(_WatchedPort):
-    """The same for SLCAN, whose lines python-can throws away where they are no frame."""
+class _SlcanLines:
+    """
+    Mix-in for python-can's SLCAN: listens to answers, and sends no empty line.
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        self.drive_can_answers = AdapterAnswers()
-        super().__init__(*args, **options)
+    python-can sends one where no data bit rate is given.
+    """
+
+    #: the steady time
+    drive_can_now: Callable[[], float]
+    drive_can_answers: AdapterAnswers
+
+    def _write(self, string: str) -> None:
+        if string:
+            super()._write(string)  # type: ignore[misc]
 
     def _read(self, timeout: float | None) -> str | None:
         line: str | None = super()._read(timeout)  # type: ignore[misc]
@@ -179,28 +183,63 @@ class _WatchedSlcan(_WatchedPort):
         return line
 
 
-#: the class of an interface with the mix-in, by that class and the clock
-_WATCHED: dict[tuple[type, Callable[[], float]], type] = {}
+class Below(NamedTuple):
+    """
+    What is below an opened serial adapter.
+
+    :param port: of pyserial.
+    :param writer: None: the port is not one of a POSIX system.
+    :param answers: None: its answers are not listened to.
+    """
+
+    port: Any
+    writer: SerialWriter | None
+    filler: bytes
+    answers: AdapterAnswers | None
+
+    def clear(self) -> None:
+        """Throw away what the adapter has not taken, and end what it has taken a part of."""
+        self.port.reset_output_buffer()
+        self.port.write(self.filler)
 
 
-def announcing(adapter: type[Any], attribute: str, opened: Callable[[], object]) -> type[Any]:
-    """Return a serial adapter's class that tells when it has a port, before it writes to it."""
+def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[], float],
+            opened: Callable[[], object]) -> type[Any]:
+    """
+    Return a serial adapter's class that takes its port over the moment that it is opened.
+
+    What is below is in its attribute ``drive_can_below``.
+
+    :param interface: a key of :data:`FILLERS`.
+    :param attribute: into which python-can puts the port.
+    :param now: the steady time.
+    :param opened: called when it has a port, before it writes to it.
+    """
     def set_attribute(self: Any, name: str, value: Any) -> None:
         if name == attribute and value is not None:
             opened()
+            answers = AdapterAnswers() if slcan else None
+            object.__setattr__(self, 'drive_can_answers', answers)
+            below = Below(value, SerialWriter.take_over(value, now), FILLERS[interface], answers)
+            object.__setattr__(self, 'drive_can_below', below)
+            if below.writer is None:
+                value.write_timeout = OPEN_TIMEOUT
+            # what the process before has left may not even leave room for a command
+            below.clear()
+            if slcan:
+                _await_quiet(value, now)
         object.__setattr__(self, name, value)
-    return type(adapter.__name__, (adapter,), {'__setattr__': set_attribute})
+
+    slcan = interface == 'slcan'
+    return type(adapter.__name__, (_SlcanLines, adapter) if slcan else (adapter,), {
+        '__setattr__': set_attribute, 'drive_can_now': staticmethod(now)})
 
 
-def watched(adapter: type[Any], now: Callable[[], float], *, slcan: bool) -> type[Any]:
-    """
-    Return a serial adapter's class, made so that opening it cannot hang.
-
-    :param now: the steady time.
-    :param slcan: what it says to frames is listened to.
-    """
-    if (adapter, now) not in _WATCHED:
-        mix_in = _WatchedSlcan if slcan else _WatchedPort
-        _WATCHED[adapter, now] = type(adapter.__name__, (mix_in, adapter),
-                                      {'drive_can_now': staticmethod(now)})
-    return _WATCHED[adapter, now]
+def _await_quiet(port: Any, now: Callable[[], float]) -> None:
+    """Close the channel; let go by what the adapter has to say: none of it answers a command."""
+    port.write(b'C\r')
+    patience, port.timeout = port.timeout, _QUIET
+    until = now() + _NOISE
+    while now() < until and port.read(1):
+        port.reset_input_buffer()
+    port.timeout = patience

@@ -474,9 +474,9 @@ def test_garbage_without_an_end_does_not_fill_the_memory(bus: FakeBus, kept: str
 
 def test_a_port_that_was_closed_writes_to_no_other(adapter: Adapter) -> None:
     # the reader closes it while a sender is about to write; the next thing opened has its number
-    number = adapter.port._serial.fd
+    number = adapter.port._below.port.fd
     other, far_end = os.pipe()
-    adapter.port._serial.close()
+    adapter.port._below.port.close()
     try:
         os.dup2(far_end, number)
         with pytest.raises(BusUnavailable):
