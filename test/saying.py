@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What is said, compared by code and fields: wording is the golden file's business."""
+"""What is said, compared by code and fields: wording is the business of the catalogue."""
 
 from typing import Any
 

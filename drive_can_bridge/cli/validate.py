@@ -11,8 +11,8 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.text import printable
 
 

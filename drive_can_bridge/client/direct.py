@@ -25,12 +25,13 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
 from drive_can_bridge.core.events import Event, RequestCompleted
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
     ABSENT, Failure, is_answer, Outcome, ReadRequest, ReadValue, Request, SILENT, WriteRequest,
     Written)
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import no_answer_offline, no_result, Sentence
+from drive_can_bridge.core.sentences import no_answer_offline, no_result
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.exchange.exchange import BusExchange

@@ -16,13 +16,14 @@ from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
-from drive_can_bridge.core.complaints import hint, says, suggestion
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
     JointConfiguration, Quantity, si_factor)
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.text import nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
@@ -105,12 +106,11 @@ def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str
         slip = nearest(key, ours, cutoff=_SLIP)
         if slip is not None:
             set_by_us = 'not' in ours[slip]
-            tree.wrong((*path, key), says('unknown_key_of_bridge', word=slip) if set_by_us else
-                       says('unknown_key', hint=says('did_you_mean', word=slip)))
+            tree.wrong((*path, key), complaints.unknown_key_of_bridge(word=slip) if set_by_us else
+                       complaints.unknown_key(hint=complaints.did_you_mean(word=slip)))
         elif keywords is not None:
-            tree.suspicious((*path, key), says('adapter_does_not_name',
-                                               interface=entry['interface'],
-                                               near=hint(key, keywords)))
+            tree.suspicious((*path, key), complaints.adapter_does_not_name(
+                interface=entry['interface'], near=hint(key, keywords)))
 
 
 def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> None:
@@ -120,7 +120,7 @@ def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> No
             pathlib.Path(values['trace_directory']).expanduser()
         except RuntimeError:
             tree.wrong((*path, 'trace_directory'),
-                       says('no_home', value=values['trace_directory']))
+                       complaints.no_home(value=values['trace_directory']))
 
 
 def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration],
@@ -130,11 +130,11 @@ def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfi
     port = set(adapters.serial_port(bus)) if adapters is not None else set()
     for other in others.values():
         if adapters is not None and not port.isdisjoint(adapters.serial_port(other)):
-            tree.wrong(path, says('port_of_other_bus', channel=bus.channel, bus=other.name))
+            tree.wrong(path, complaints.port_of_other_bus(channel=bus.channel, bus=other.name))
             return
         if (bus.interface, str(bus.channel)) == (other.interface, str(other.channel)):
             tree.suspicious(
-                path, says('channel_of_other_bus', channel=bus.channel, bus=other.name))
+                path, complaints.channel_of_other_bus(channel=bus.channel, bus=other.name))
             return
 
 
@@ -145,7 +145,7 @@ def _look_for_channels_of_others(tree: Tree, buses: Iterable[BusConfiguration]) 
         named = names.get(str(other.channel), other)
         if named is not other:
             tree.suspicious(
-                ('buses', named.name), says('name_of_other_channel', bus=other.name))
+                ('buses', named.name), complaints.name_of_other_channel(bus=other.name))
 
 
 #: share of the bus above which a configuration is refused, and warned about
@@ -193,15 +193,15 @@ def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
                 f'one identifier, {mine.purpose} here and {claim.purpose} there'
             tree.wrong(
                 ('drives', drive.name, 'station'),
-                says('collides', station=drive.station, other=other.name,
-                     other_station=other.station, bus=other.bus, purpose=what))
+                complaints.collides(
+                    station=drive.station, other=other.name, other_station=other.station,
+                    bus=other.bus, purpose=what))
         rival = next(((claim, other) for mine in own for claim, other in on_bus
                       if other.bus != drive.bus and mine.rivals(claim)), None)
         if rival is not None:
             claim, other = rival
-            tree.wrong(('drives', drive.name, 'bus'), says(
-                'told_by_two_buses', bus=drive.bus, other=other.name, other_bus=other.bus,
-                what=claim.shared))
+            tree.wrong(('drives', drive.name, 'bus'), complaints.told_by_two_buses(
+                bus=drive.bus, other=other.name, other_bus=other.bus, what=claim.shared))
         on_bus.extend((claim, drive) for claim in own)
 
 
@@ -213,12 +213,11 @@ def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigur
         return
     parts = ', '.join(f'{name} {100 * share:.1f} %' for name, share in shares.items())
     if total > LOAD_MAX:
-        tree.wrong(('buses', bus.name), says(
-            'overload', load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_MAX))
+        tree.wrong(('buses', bus.name), complaints.overload(
+            load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_MAX))
     else:
-        tree.suspicious(('buses', bus.name), says(
-            'high_load', load=100 * total, bitrate=bus.bitrate, parts=parts,
-            most=100 * LOAD_WARNING))
+        tree.suspicious(('buses', bus.name), complaints.high_load(
+            load=100 * total, bitrate=bus.bitrate, parts=parts, most=100 * LOAD_WARNING))
 
 
 def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:
@@ -230,7 +229,8 @@ def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfig
         if drive.period < min(shortest, allowed):
             tree.wrong(
                 ('drives', drive.name, 'period'),
-                says('period_too_short', period=drive.period, bitrate=bus.bitrate, least=allowed))
+                complaints.period_too_short(
+                    period=drive.period, bitrate=bus.bitrate, least=allowed))
 
 
 def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
@@ -261,8 +261,8 @@ def check_topics(tree: Tree, drives: Iterable[DriveConfiguration], namespace: st
         longest = max(topics, key=len)
         length = len(f'{namespace}/{drive.name}/{longest}')
         if length > _TOPIC_MAX:
-            tree.wrong(('drives', drive.name), says('topic_too_long', topic=f'~/{longest}',
-                                                    length=length, most=_TOPIC_MAX))
+            tree.wrong(('drives', drive.name), complaints.topic_too_long(
+                topic=f'~/{longest}', length=length, most=_TOPIC_MAX))
 
 
 def check_joint(tree: Tree, drive: DriveConfiguration) -> JointConfiguration | None:
@@ -278,8 +278,8 @@ def check_joint_names(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
         if drive.joint is not None and owners.setdefault(
                 drive.joint.name, drive.name) != drive.name:
             tree.wrong(('drives', drive.name, 'joint', 'name'),
-                       says('joint_of_other', name=drive.joint.name,
-                            owner=owners[drive.joint.name]))
+                       complaints.joint_of_other(
+                           name=drive.joint.name, owner=owners[drive.joint.name]))
 
 
 class _JointChecker:
@@ -300,7 +300,7 @@ class _JointChecker:
         values = complete('joint', entry)
         named = {key: entry[key] for key in _KEYS if key in entry}
         if not named and not any((*self._path, key) in self._tree.damaged for key in _KEYS):
-            self._tree.wrong(self._path, says('no_quantity', allowed=', '.join(_KEYS)))
+            self._tree.wrong(self._path, complaints.no_quantity(allowed=', '.join(_KEYS)))
         factors: dict[str, float] = {}
         used: dict[str, str] = {}
         units = set()
@@ -310,7 +310,7 @@ class _JointChecker:
                 continue
             quantity = key.removesuffix(_COMMAND)
             if used.setdefault(name, quantity) != quantity:
-                self._wrong(key, says('quantity_already', name=name, quantity=used[name]))
+                self._wrong(key, complaints.quantity_already(name=name, quantity=used[name]))
                 continue
             factor = self._factor(key, parameter, values)
             if factor is not None:
@@ -318,15 +318,15 @@ class _JointChecker:
                 units.add(parameter.unit)
             if key == 'position_command' and not parameter.neutral_from:
                 self._tree.suspicious(
-                    (*self._path, key), says(
-                        'no_neutral_from', name=name, unit=parameter.unit,
+                    (*self._path, key), complaints.no_neutral_from(
+                        name=name, unit=parameter.unit,
                         neutral=parameter.value_from_raw(parameter.neutral_raw)))
         if not self._tree.is_sound(self._path):
             return None
         if values['pole_pairs'] != 1 and ELECTRICAL_FREQUENCY not in units:
             self._tree.suspicious(
                 (*self._path, 'pole_pairs'),
-                says('no_effect', unit=ELECTRICAL_FREQUENCY))
+                complaints.no_effect(unit=ELECTRICAL_FREQUENCY))
         return JointConfiguration(factors=factors, **values)
 
     def _wrong(self, key: str, message: Sentence) -> None:
@@ -345,22 +345,22 @@ class _JointChecker:
             if nearest(name, misspelt, cutoff=0.8):
                 return None
             hint = (suggestion(name, exchanged) if exchanged
-                    else says('list_empty', listed=listed_in))
-            self._wrong(key, says('not_in_list', name=name, listed=listed_in, hint=hint))
+                    else complaints.list_empty(listed=listed_in))
+            self._wrong(key, complaints.not_in_list(name=name, listed=listed_in, hint=hint))
             return None
         if not parameter.listed:
             return None
         control = self._drive.profile.control
         if control is not None and name == control.parameter and key.endswith(_COMMAND):
-            self._wrong(key, says('control_word', name=name))
+            self._wrong(key, complaints.control_word(name=name))
             return None
         if parameter.limit and key == f'effort{_COMMAND}':
-            self._tree.suspicious((*self._path, key), says('joint_bounds', name=name))
+            self._tree.suspicious((*self._path, key), complaints.joint_bounds(name=name))
         elif parameter.limit and key.endswith(_COMMAND):
-            self._wrong(key, says('joint_commands_limit', name=name))
+            self._wrong(key, complaints.joint_commands_limit(name=name))
             return None
         if parameter.kind is ValueKind.BOOL:
-            self._wrong(key, says('is_bool', name=name))
+            self._wrong(key, complaints.is_bool(name=name))
             return None
         return parameter
 
@@ -370,8 +370,8 @@ class _JointChecker:
                            pole_pairs=values['pole_pairs'])
         if factor is None:
             unit = f'the unit {show(parameter.unit)}' if parameter.unit else 'no unit'
-            self._wrong(key, says('does_not_convert', name=parameter.name, unit=unit,
-                                  allowed=', '.join(convertible_units(quantity))))
+            self._wrong(key, complaints.does_not_convert(
+                name=parameter.name, unit=unit, allowed=', '.join(convertible_units(quantity))))
         return factor
 
 
@@ -404,10 +404,10 @@ class DriveChecker:
     def check(self) -> DriveConfiguration | None:
         """Return the drive as far as it is known; None where not even the protocol is."""
         if self._name == BRIDGE_NAME:
-            self._wrong((), says('name_of_bridge', name=self._name))
+            self._wrong((), complaints.name_of_bridge(name=self._name))
         bus = self._entry.get('bus')
         if bus is not None and self._buses and bus not in self._buses:
-            self._wrong(('bus',), says('unknown', name=bus, hint=suggestion(bus, self._buses)))
+            self._wrong(('bus',), complaints.unknown(name=bus, hint=suggestion(bus, self._buses)))
         family = FAMILIES.get(self._entry.get('protocol', ''))
         self._load_profile(family)
         lists = {key: self._list(key) for key in LISTS}
@@ -418,11 +418,10 @@ class DriveChecker:
         self._check_setpoints(drive)
         self._check_status(drive)
         if not family.cyclic and not drive.cyclic_response and not self._is_damaged(LISTS[1]):
-            self._wrong((LISTS[1],), says('empty_list', family=family.name))
+            self._wrong((LISTS[1],), complaints.empty_list(family=family.name))
         if drive.period >= _LONG_PERIOD:
-            self._tree.suspicious((*self._path, 'period'), says('period_in_seconds',
-                                                                period=drive.period,
-                                                                shorter=drive.period / 1000))
+            self._tree.suspicious((*self._path, 'period'), complaints.period_in_seconds(
+                period=drive.period, shorter=drive.period / 1000))
         self._place(family.check_widths(drive), Tree.wrong)
         self._place(family.check(drive), Tree.wrong)
         self._place(family.warnings(drive), Tree.suspicious)
@@ -455,8 +454,8 @@ class DriveChecker:
         protocols = loaded.profile.protocols
         if family is not None and protocols and family.name not in protocols:
             # nothing of it fits, and nothing is wrong with it
-            self._wrong(('profile',), says('profile_for_others', name=name,
-                                           protocols=', '.join(protocols), family=family.name))
+            self._wrong(('profile',), complaints.profile_for_others(
+                name=name, protocols=', '.join(protocols), family=family.name))
             return
         self._loaded = loaded
 
@@ -467,13 +466,13 @@ class DriveChecker:
         for position, name in enumerate(self._entry.get(key, [])):
             at = (*path, position)
             if any(parameter.name == name for parameter in found):
-                self._wrong((key,), says('twice', name=name), at=at)
+                self._wrong((key,), complaints.twice(name=name), at=at)
                 continue
             parameter = Parameter(name=name, listed=False)
             if self._loaded is not None:
                 if name not in self._loaded.names:
-                    self._wrong((key,), says('not_in_profile', name=name,
-                                             hint=suggestion(name, self._loaded.names)), at=at)
+                    self._wrong((key,), complaints.not_in_profile(
+                        name=name, hint=suggestion(name, self._loaded.names)), at=at)
                 parameter = self._loaded.profile.parameters.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
@@ -503,7 +502,7 @@ class DriveChecker:
             return
         others = [name for name in self._loaded.profile.protocols if name != family.name]
         if self._loaded.profile.control is not None and not others:
-            self._loaded.tree.wrong(('control',), says('control_built_in', family=family.name))
+            self._loaded.tree.wrong(('control',), complaints.control_built_in(family=family.name))
 
     def _check_setpoints(self, drive: DriveConfiguration) -> None:
         """Check that what is sent without a command lies in the limits."""
@@ -511,7 +510,8 @@ class DriveChecker:
         for position, parameter in enumerate(drive.cyclic_request):
             is_word = control is not None and control.parameter == parameter.name
             if parameter.limit and is_word:
-                self._wrong(('cyclic_request',), says('control_word_limit', name=parameter.name),
+                self._wrong(('cyclic_request',), complaints.control_word_limit(
+                    name=parameter.name),
                             at=(*self._path, 'cyclic_request', position))
             if parameter.neutral_from:
                 self._check_held(drive, parameter, is_word=is_word, at=(
@@ -523,8 +523,8 @@ class DriveChecker:
                 continue
             low, high = parameter.raw_limits
             if not low <= 0 <= high:
-                self._wrong(('cyclic_request',), says('no_neutral', name=parameter.name,
-                                                      allowed=parameter.range_text),
+                self._wrong(('cyclic_request',), complaints.no_neutral(
+                    name=parameter.name, allowed=parameter.range_text),
                             at=(*self._path, 'cyclic_request', position))
 
     def _look_for_limits(self, drive: DriveConfiguration) -> None:
@@ -540,8 +540,8 @@ class DriveChecker:
             rest = parameter.neutral_from or show(parameter.value_from_raw(parameter.neutral_raw))
             self._tree.suspicious(
                 (*self._path, 'cyclic_request'),
-                says('looks_like_limit', name=parameter.name, rest=rest,
-                     unit=parameter.unit and ' ' + parameter.unit),
+                complaints.looks_like_limit(
+                    name=parameter.name, rest=rest, unit=parameter.unit and ' ' + parameter.unit),
                 at=(*self._path, 'cyclic_request', position))
 
     def _check_held(self, drive: DriveConfiguration, parameter: Parameter, *, is_word: bool,
@@ -549,16 +549,16 @@ class DriveChecker:
         """Check what an axis needs that has to stay where it is (``neutral_from``)."""
         name, measured = parameter.name, parameter.neutral_from
         if is_word:
-            self._wrong(('cyclic_request',), says('control_word_held', name=name), at=at)
+            self._wrong(('cyclic_request',), complaints.control_word_held(name=name), at=at)
         if not self._is_damaged('cyclic_response') and all(
                 other.name != parameter.neutral_from for other in drive.cyclic_response):
-            self._wrong(('cyclic_request',), says('measured_not_listed', name=name,
-                                                  measured=measured), at=at)
+            self._wrong(('cyclic_request',), complaints.measured_not_listed(
+                name=name, measured=measured), at=at)
         if drive.rearm_immediate:
-            self._wrong(('rearm',), says('immediate_jumps', name=name, measured=measured))
+            self._wrong(('rearm',), complaints.immediate_jumps(name=name, measured=measured))
         if getattr(drive.options, 'broadcast', 'none') != 'none':
-            self._wrong(('broadcast',), says('broadcast_held', broadcast=drive.options.broadcast,
-                                             name=name))
+            self._wrong(('broadcast',), complaints.broadcast_held(
+                broadcast=drive.options.broadcast, name=name))
 
     def _check_status(self, drive: DriveConfiguration) -> None:
         control = drive.profile.control
@@ -568,7 +568,7 @@ class DriveChecker:
         if all(parameter.name != control.status_parameter for parameter in drive.cyclic_response):
             self._tree.suspicious(
                 (*self._path, 'cyclic_response'),
-                says('status_missing', name=control.status_parameter))
+                complaints.status_missing(name=control.status_parameter))
 
     def _place(self, complaints: Iterator[Complaint],
                note: Callable[[Tree, Path, Sentence], None]) -> None:
@@ -587,9 +587,10 @@ def _direction_problem(key: str, parameter: Parameter) -> Sentence:
         return NOTHING
     name = parameter.name
     if key == 'cyclic_response':
-        return says('write_only', name=name) if parameter.access is Access.WRITE_ONLY else NOTHING
+        return complaints.write_only(
+            name=name) if parameter.access is Access.WRITE_ONLY else NOTHING
     if parameter.access is Access.READ_ONLY:
-        return says('read_only', name=name)
+        return complaints.read_only(name=name)
     if parameter.storage is Storage.EEPROM:
-        return says('kept_in_eeprom', name=name)
+        return complaints.kept_in_eeprom(name=name)
     return NOTHING

@@ -30,13 +30,14 @@ from drive_can_bridge.configuration.schema import (
     ALL_OPTIONS, check_schema, check_value, checked_bridge, complete, definition,
 )
 from drive_can_bridge.configuration.yaml_nodes import read_scalar, STRING_TAG
-from drive_can_bridge.core.complaints import hint, says, suggestion
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import RestoreTable
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overrides',
@@ -66,7 +67,7 @@ def tree_from_overrides(overrides: Mapping[str, object]) -> Tree:
         else:
             target[path[-1]] = _plain(overrides[name])
     for path, below in holders.items():
-        tree.wrong(path, says('value_and_below', below=below))
+        tree.wrong(path, complaints.value_and_below(below=below))
     return tree
 
 
@@ -125,7 +126,7 @@ def check_dynamic(name: str, value: object) -> Sentence | None:
     elif len(parts) == 3 and parts[0] == 'drives' and parts[2] in DYNAMIC_DRIVE_KEYS:
         schema = definition('drive')['properties'][parts[2]]
     else:
-        return says('not_while_running', name=name)
+        return complaints.not_while_running(name=name)
     return check_value(value, schema)
 
 
@@ -224,12 +225,12 @@ def _configuration(tree: Tree, adapters: Adapters | None,
     _check_together(tree, buses, drives, checkers)
     check_topics(tree, drives.values(), namespace)
     if not _names(tree, 'drives') and not tree.is_damaged(('drives',)):
-        tree.suspicious(('drives',), says('no_drive'))
+        tree.suspicious(('drives',), complaints.no_drive())
     found = [tree, *store.trees]
     problems = [problem for part in found for problem in part.problems]
     for name in checkers:
         if name not in drives and not problems:  # whatever it is: no drive gets lost in silence
-            problems.append(tree.problem(('drives', name), says('nobody_knows')))
+            problems.append(tree.problem(('drives', name), complaints.nobody_knows()))
     if problems:
         raise ConfigurationError(report(problems))
     values.update(buses=buses, drives=drives,
@@ -282,7 +283,7 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
     path = ('profile_directories',)
     for position, entry in enumerate(directories):
         if entry and not os.path.isdir(entry):
-            tree.suspicious(path, says('no_directory', name=entry), at=(*path, position))
+            tree.suspicious(path, complaints.no_directory(name=entry), at=(*path, position))
 
 
 def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | None:
@@ -295,9 +296,9 @@ def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | No
             return NOTHING
         available = ', '.join(FAMILIES)
         if isinstance(value, str):
-            return says('unknown_protocol', value=value, near=hint(value, FAMILIES),
-                        allowed=available)
-        return says('no_protocol', value=value, allowed=available)
+            return complaints.unknown_protocol(
+                value=value, near=hint(value, FAMILIES), allowed=available)
+        return complaints.no_protocol(value=value, allowed=available)
     if keyword != 'additionalProperties':
         return None
     protocol = tree.data['drives'][path[1]].get('protocol')
@@ -305,7 +306,7 @@ def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | No
     if family is None and path[2] in ALL_OPTIONS:  # perhaps of the family that is meant
         return NOTHING
     known = [name for name in definition('drive')['properties'] if name not in ALL_OPTIONS]
-    return says('unknown_key', hint=suggestion(
+    return complaints.unknown_key(hint=suggestion(
         str(path[2]), [*known, *(family.options_schema if family else ())]))
 
 

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.yaml_nodes import (
     BrokenYaml, Kind, Node, read_documents, Rules, TreeReader)
-from drive_can_bridge.core.complaints import says, suggestion
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import suggestion
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.text import nearest
 
 PARAMETERS_KEY = 'ros__parameters'
@@ -67,11 +68,11 @@ class _FileReader:
         for _, root in documents:
             if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
                 # a line for everything in it would not help
-                self._note(root.line, (), says('is_profile', entry=PARAMETERS_KEY))
+                self._note(root.line, (), complaints.is_profile(entry=PARAMETERS_KEY))
             elif root.kind is Kind.MAPPING:
                 self._names(root, ())
             else:
-                self._note(root.line, (), says('no_mapping', entry=PARAMETERS_KEY))
+                self._note(root.line, (), complaints.no_mapping(entry=PARAMETERS_KEY))
 
     def sections_with(self, key: str) -> list[Section]:
         """Return the sections that have a key, or one that begins with it and a dot."""
@@ -87,13 +88,13 @@ class _FileReader:
         has_parameters = False
         for key, value in node.pairs:
             if key.kind is not Kind.SCALAR or not key.text:
-                self._note(key.line, path, says('key_no_node_name'))
+                self._note(key.line, path, complaints.key_no_node_name())
                 continue
             here = (*path, key.text)
             if has_parameters:
-                self._note(key.line, here, says('beside_parameters', entry=PARAMETERS_KEY))
+                self._note(key.line, here, complaints.beside_parameters(entry=PARAMETERS_KEY))
             if here in self._lines:
-                self._note(key.line, here, says('duplicate_key', first=self._lines[here]))
+                self._note(key.line, here, complaints.duplicate_key(first=self._lines[here]))
                 continue
             self._lines[here] = key.line
             if key.text == PARAMETERS_KEY:
@@ -102,24 +103,25 @@ class _FileReader:
             elif key.text.startswith(PARAMETERS_KEY) or path and nearest(
                     key.text, [PARAMETERS_KEY], cutoff=_SLIP) is not None:
                 # rcl compares the beginning only, and would take a longer one for the real one
-                self._note(key.line, here, says('misspelt', allowed=PARAMETERS_KEY))
+                self._note(key.line, here, complaints.misspelt(allowed=PARAMETERS_KEY))
             elif value.kind is Kind.MAPPING:
                 self._names(value, here)
             else:
                 hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
-                    says('allowed_below', entry=PARAMETERS_KEY)
-                self._note(key.line, here, says('no_mapping_refused', hint=hint))
+                    complaints.allowed_below(entry=PARAMETERS_KEY)
+                self._note(key.line, here, complaints.no_mapping_refused(hint=hint))
 
     def _parameters(self, node: Node, path: Path, line: int) -> None:
         name = ''
         for part in map(str, path):
             name += part if not name or name.endswith('/') else f'/{part}'
         if not path:
-            self._note(line, (PARAMETERS_KEY,), says('no_node_name_above', entry=PARAMETERS_KEY))
+            self._note(line, (PARAMETERS_KEY,), complaints.no_node_name_above(
+                entry=PARAMETERS_KEY))
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
-            self._note(line, path, says('no_node_name', name=name))
+            self._note(line, path, complaints.no_node_name(name=name))
         if node.kind is not Kind.MAPPING:
-            self._note(line, (*path, PARAMETERS_KEY), says('no_parameters'))
+            self._note(line, (*path, PARAMETERS_KEY), complaints.no_parameters())
             return
         reader = TreeReader(self._file, Rules.PARAMETERS)
         reader.read(node)
@@ -201,18 +203,18 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
         tree.problems[:0] = problems
         if ours[0].name.rpartition('/')[2] not in (_NODE, '*', '**'):
             tree.warnings.append(Problem(
-                str(path), tree.line(()), ours[0].name, says('other_node_name', usual=_NODE)))
+                str(path), tree.line(()), ours[0].name, complaints.other_node_name(usual=_NODE)))
         return tree, tree.problems
     for section in ours:
         problems.extend(section.tree.problems)
     for section in ours[1:]:
         problems.append(Problem(
-            str(path), section.tree.line((MARK,)), MARK, says(
-                'second_section', section=section.name, first=ours[0].name)))
+            str(path), section.tree.line((MARK,)), MARK, complaints.second_section(
+                section=section.name, first=ours[0].name)))
     if not problems:
         names = ', '.join(section.name for section in reader.sections)
         problems.append(Problem(str(path), 1, MARK, (
-            says('no_section_of', names=names) if names else says('no_section'))))
+            complaints.no_section_of(names=names) if names else complaints.no_section())))
     return None, problems
 
 
@@ -230,8 +232,8 @@ def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
         if _is_for(name, node):
             together.setdefault(name, []).append(tree)
         elif _is_for(own.name, other) and other.rpartition('/')[2] == node.rpartition('/')[2]:
-            elsewhere.append(Problem(tree.file, tree.line(()), name, says(
-                'other_namespace', node=node)))
+            elsewhere.append(Problem(tree.file, tree.line(()), name, complaints.other_namespace(
+                node=node)))
     merged, *later = (tree for found in together.values() for tree in found)
     for tree in later:
         _lay_over(merged, tree)
@@ -259,7 +261,7 @@ def _lay_over(below: Tree, above: Tree) -> None:
                 lay(here, there, value)
             elif key in under and isinstance(there, dict) != isinstance(value, dict):
                 # rcl keeps both
-                below.wrong(here, says('value_and_keys'))
+                below.wrong(here, complaints.value_and_keys())
             else:
                 under[key] = value
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Union
 
-from drive_can_bridge.core.complaints import says
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.text import printable
 
 Path = tuple[Union[str, int], ...]
@@ -128,5 +128,5 @@ def report(problems: Iterable[Problem]) -> list[Sentence]:
     unique.sort(key=lambda problem: (order[problem.file], problem.line))
     lines = [problem.text for problem in unique[:PROBLEMS_MAX]]
     if len(unique) > PROBLEMS_MAX:
-        lines.append(says('more', count=len(unique) - PROBLEMS_MAX))
+        lines.append(complaints.more(count=len(unique) - PROBLEMS_MAX))
     return lines

@@ -14,13 +14,14 @@ from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.schema import check_schema, checked_profile
-from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import (
     ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern)
-from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.text import show
 
 #: names that a drive's node uses itself
@@ -52,16 +53,15 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
                         names)
     if parameter is not None:
         if not parameter.writable:
-            tree.wrong(('control', 'parameter'), says('read_only_one', name=parameter.name))
+            tree.wrong(('control', 'parameter'), complaints.read_only_one(name=parameter.name))
         largest = _largest_word(parameter)
         for key, word in words.items():
             if word > largest:
-                tree.wrong(('control', 'words', key), says('word_too_large', word=word,
-                                                           name=parameter.name, largest=largest,
-                                                           type=parameter.type.value))
+                tree.wrong(('control', 'words', key), complaints.word_too_large(
+                    word=word, name=parameter.name, largest=largest, type=parameter.type.value))
     for key, word in words.items():     # nothing but ~/enable starts a drive
         if key != 'enable' and word == words.get('enable'):
-            tree.wrong(('control', 'words', 'enable'), says('word_twice', word=word, entry=key))
+            tree.wrong(('control', 'words', 'enable'), complaints.word_twice(word=word, entry=key))
     if isinstance(control.get('status'), dict):
         _check_status(tree, control['status'], parameters, names)
 
@@ -74,7 +74,7 @@ def look_up(tree: Tree, path: Path, name: str | None, parameters: dict[str, Para
     One with problems of its own is known.
     """
     if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        tree.wrong(path, says('unknown', name=name, hint=suggestion(name, names)), at=at)
+        tree.wrong(path, complaints.unknown(name=name, hint=suggestion(name, names)), at=at)
     return parameters.get(name or '')
 
 
@@ -83,19 +83,19 @@ def _check_status(tree: Tree, status: dict[str, Any], parameters: dict[str, Para
     path = ('control', 'status')
     parameter = look_up(tree, (*path, 'parameter'), status.get('parameter'), parameters, names)
     if parameter is not None and not parameter.readable:
-        tree.wrong((*path, 'parameter'), says('write_only_one', name=parameter.name))
+        tree.wrong((*path, 'parameter'), complaints.write_only_one(name=parameter.name))
     for key in ('ready', 'enabled', 'fault'):
         if key not in status:
             continue
         mask, value = status[key]
         if parameter is not None and mask > _largest_word(parameter):
-            tree.wrong((*path, key), says('mask_too_large', mask=mask, name=parameter.name,
-                                          largest=_largest_word(parameter),
-                                          type=parameter.type.value))
+            tree.wrong((*path, key), complaints.mask_too_large(
+                mask=mask, name=parameter.name, largest=_largest_word(parameter),
+                type=parameter.type.value))
         if mask == 0:
-            tree.wrong((*path, key), says('mask_of_nothing'))
+            tree.wrong((*path, key), complaints.mask_of_nothing())
         elif value & ~mask:
-            tree.wrong((*path, key), says('outside_mask', value=value, mask=mask))
+            tree.wrong((*path, key), complaints.outside_mask(value=value, mask=mask))
 
 
 def _largest_word(parameter: Parameter) -> int:
@@ -130,7 +130,7 @@ def check_values(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, 
         return
     if parameter.scaled or parameter.type is ParameterType.BOOL:
         kind = 'a bool' if parameter.type is ParameterType.BOOL else 'a number with a unit'
-        tree.wrong((*path, 'values'), says('no_value_names', name=parameter.name, kind=kind))
+        tree.wrong((*path, 'values'), complaints.no_value_names(name=parameter.name, kind=kind))
         return
     check_names(tree, (*path, 'values'), entry['values'], parameter)
 
@@ -148,20 +148,20 @@ def check_names(tree: Tree, path: Path, given: dict[str, Any],
         here, number = (*path, key), int(key, 0)
         low, high = (-2**31, 2**32 - 1) if parameter is None else parameter.type.raw_range
         if not low <= number <= high:
-            tree.wrong(here, says('does_not_fit', entry=key, low=low, high=high))
+            tree.wrong(here, complaints.does_not_fit(entry=key, low=low, high=high))
         elif number in numbers:
-            tree.wrong(here, says('number_twice', entry=key, other=numbers[number]))
+            tree.wrong(here, complaints.number_twice(entry=key, other=numbers[number]))
         numbers.setdefault(number, key)
         if isinstance(name, bool):
             word = 'true, on or yes' if name else 'false, off or no'
-            tree.wrong(here, says('word_is_bool', word=word))
+            tree.wrong(here, complaints.word_is_bool(word=word))
         elif not isinstance(name, str):
-            tree.wrong(here, says('is_number', name=name))
+            tree.wrong(here, complaints.is_number(name=name))
         elif (len(name) > NAME_MAX or not _NAME.fullmatch(name) or _NUMBER.fullmatch(name)
               or _NEXT.search(name)):
-            tree.wrong(here, says('no_name', name=name, longest=NAME_MAX))
+            tree.wrong(here, complaints.no_name(name=name, longest=NAME_MAX))
         elif name in names:
-            tree.wrong(here, says('name_of_other', name=name, other=names[name]))
+            tree.wrong(here, complaints.name_of_other(name=name, other=names[name]))
         else:
             names[name] = key
 
@@ -182,9 +182,9 @@ def check_fault(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, 
     path = ('fault', 'parameter')
     parameter = look_up(tree, path, section.get('parameter'), parameters, names)
     if parameter is not None and not parameter.readable:
-        tree.wrong(path, says('write_only_one', name=parameter.name))
+        tree.wrong(path, complaints.write_only_one(name=parameter.name))
     elif parameter is not None and parameter.type is ParameterType.BOOL:
-        tree.wrong(path, says('is_bool', name=parameter.name))
+        tree.wrong(path, complaints.is_bool(name=parameter.name))
     if isinstance(section.get('codes'), dict):
         check_names(tree, ('fault', 'codes'), section['codes'], parameter)
     if isinstance(section.get('bit'), str):
@@ -199,8 +199,8 @@ def _check_bit(tree: Tree, text: str, parameters: dict[str, Parameter],
         return
     bits = dict(parameter.bits)
     if bit not in bits:
-        tree.wrong(path, (says('no_bit', bit=bit, name=name, hint=suggestion(bit, bits)) if bits
-                          else says('no_named_bits', name=name)))
+        tree.wrong(path, (complaints.no_bit(bit=bit, name=name, hint=suggestion(bit, bits)) if bits
+                          else complaints.no_named_bits(name=name)))
 
 
 def fault_table(section: dict[str, Any], parameters: dict[str, Parameter]) -> FaultTable:
@@ -226,11 +226,11 @@ def check_identity(tree: Tree, parameters: dict[str, Parameter], names: tuple[st
     for position, name in enumerate(tree.data.get('identity', ())):
         at = ('identity', position)
         if name in seen:
-            tree.wrong(('identity',), says('twice', name=name), at=at)
+            tree.wrong(('identity',), complaints.twice(name=name), at=at)
             continue
         parameter = look_up(tree, ('identity',), name, parameters, names, at=at)
         if parameter is not None and not parameter.readable:
-            tree.wrong(('identity',), says('write_only', name=name), at=at)
+            tree.wrong(('identity',), complaints.write_only(name=name), at=at)
         seen.add(name)
 
 
@@ -242,7 +242,7 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
         if parameter is None:
             continue
         if not parameter.writable:
-            tree.wrong(path, says('read_only', name=name))
+            tree.wrong(path, complaints.read_only(name=name))
         elif isinstance(value, dict):
             _check_bits(tree, path, parameter, value)
         else:
@@ -251,7 +251,7 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
             except ValueRefused:
                 allowed = 'true or false' if parameter.type is ParameterType.BOOL \
                     else parameter.range_text
-                tree.wrong(path, says('cannot_be_written', value=value, allowed=allowed))
+                tree.wrong(path, complaints.cannot_be_written(value=value, allowed=allowed))
 
 
 def restore_table(tree: Tree, parameters: dict[str, Parameter]) -> RestoreTable:
@@ -282,10 +282,10 @@ def _check_bits(tree: Tree, path: Path, parameter: Parameter, value: dict[str, b
     known = [bit for bit, _ in parameter.bits]
     for bit in value:
         if bit not in known:
-            tree.wrong((*path, bit), says('no_bit', bit=bit, name=parameter.name,
-                                          hint=suggestion(bit, known)))
+            tree.wrong((*path, bit), complaints.no_bit(
+                bit=bit, name=parameter.name, hint=suggestion(bit, known)))
     if not parameter.readable:
-        tree.wrong(path, says('write_only_bits', name=parameter.name))
+        tree.wrong(path, complaints.write_only_bits(name=parameter.name))
 
 
 def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
@@ -355,7 +355,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
             built_in = {'cannord', 'cia402'} & {*tree.data.get('protocols', ())}
             if control is None and fault.bit is None and not built_in and not (
                     tree.is_damaged(('control',))):
-                tree.suspicious(('fault',), says('fault_without_bit'))
+                tree.suspicious(('fault',), complaints.fault_without_bit())
             _name_faults(parameters, fault)
     check_identity(tree, parameters, names)
     check_restore(tree, parameters, names)
@@ -400,9 +400,9 @@ def _check_names(tree: Tree, path: Path, parameter: Parameter) -> None:
     places += [((*path, 'bits', bit), bit) for bit, _ in parameter.bits]
     for place, name in places:
         if name in RESERVED:
-            tree.wrong(place, says('name_taken', name=name))
+            tree.wrong(place, complaints.name_taken(name=name))
         elif RAW_NAME.fullmatch(name):
-            tree.wrong(place, says('raw_name', name=name))
+            tree.wrong(place, complaints.raw_name(name=name))
 
 
 # -- parameters -----------------------------------------------------------------------------------
@@ -415,17 +415,17 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
         for key in ('scale', 'offset', 'unit', 'minimum', 'maximum', 'neutral_from',
                     'arming_tolerance'):
             if key in entry:
-                tree.wrong((*path, key), says('bool_has_no', entry=key))
+                tree.wrong((*path, key), complaints.bool_has_no(entry=key))
         if 'neutral' in entry and not isinstance(entry['neutral'], bool):
-            tree.wrong((*path, 'neutral'), says('no_bool', value=entry['neutral']))
+            tree.wrong((*path, 'neutral'), complaints.no_bool(value=entry['neutral']))
     else:
         _check_limits(tree, path, parameter, entry)
     for bit, position in parameter.bits:
         if position >= width:
-            tree.wrong((*path, 'bits', bit), says('no_such_bit', position=position,
-                                                  type=parameter.type.value, highest=width - 1))
+            tree.wrong((*path, 'bits', bit), complaints.no_such_bit(
+                position=position, type=parameter.type.value, highest=width - 1))
     if parameter.word_order is not None and parameter.type.bits != 32:
-        tree.wrong((*path, 'word_order'), says('one_word', type=parameter.type.value))
+        tree.wrong((*path, 'word_order'), complaints.one_word(type=parameter.type.value))
 
 
 def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
@@ -434,11 +434,11 @@ def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
     if not parameter.neutral_from or not tree.is_sound((*path, 'neutral_from')):
         return
     if 'neutral' in entry:
-        tree.wrong((*path, 'neutral'), says('beside_neutral_from'))
+        tree.wrong((*path, 'neutral'), complaints.beside_neutral_from())
     if 'arming_tolerance' not in entry and not tree.is_damaged((*path, 'arming_tolerance')):
-        tree.wrong((*path, 'neutral_from'), says('no_arming_tolerance'))
+        tree.wrong((*path, 'neutral_from'), complaints.no_arming_tolerance())
     if not parameter.writable:
-        tree.wrong((*path, 'neutral_from'), says('read_only_in', name=parameter.name))
+        tree.wrong((*path, 'neutral_from'), complaints.read_only_in(name=parameter.name))
 
 
 def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, Any]) -> None:
@@ -446,11 +446,11 @@ def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, 
     if not parameter.limit:
         return
     if 'neutral_from' in entry:
-        tree.wrong((*path, 'limit'), says('beside_neutral_from'))
+        tree.wrong((*path, 'limit'), complaints.beside_neutral_from())
     elif 'neutral' not in entry and not tree.is_damaged((*path, 'neutral')):
-        tree.wrong((*path, 'limit'), says('no_neutral_of_limit'))
+        tree.wrong((*path, 'limit'), complaints.no_neutral_of_limit())
     if not parameter.writable:
-        tree.wrong((*path, 'limit'), says('read_only_in', name=parameter.name))
+        tree.wrong((*path, 'limit'), complaints.read_only_in(name=parameter.name))
 
 
 def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
@@ -462,14 +462,15 @@ def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[s
             continue
         message = NOTHING
         if measured is None:
-            message = says('not_in_profile', name=name, hint=suggestion(name, names))
+            message = complaints.not_in_profile(name=name, hint=suggestion(name, names))
         elif measured is parameter or not measured.readable:
-            message = says('no_actual_value', name=name)
+            message = complaints.no_actual_value(name=name)
         elif measured.type is ParameterType.BOOL:
-            message = says('is_bool', name=name)
+            message = complaints.is_bool(name=name)
         elif measured.unit != parameter.unit:
-            message = says('other_unit', name=name, unit=_unit_text(measured),
-                           wanted=_unit_text(parameter), parameter=parameter.name)
+            message = complaints.other_unit(
+                name=name, unit=_unit_text(measured), wanted=_unit_text(parameter),
+                parameter=parameter.name)
         if message:
             tree.wrong(path, message)
             del parameters[parameter.name]
@@ -485,25 +486,25 @@ def _check_limits(tree: Tree, path: Path, parameter: Parameter, entry: dict[str,
     if not parameter.scaled:
         for key, limit in limits.items():
             if float(limit) != int(limit):
-                tree.wrong((*path, key), says('no_integer', limit=limit))
+                tree.wrong((*path, key), complaints.no_integer(limit=limit))
     low, high = parameter.raw_limits
     if len(limits) == 2 and limits['minimum'] > limits['maximum']:
-        tree.wrong((*path, 'minimum'), says('above_maximum', minimum=limits['minimum'],
-                                            maximum=limits['maximum']))
+        tree.wrong((*path, 'minimum'), complaints.above_maximum(
+            minimum=limits['minimum'], maximum=limits['maximum']))
     elif low > high and all(tree.is_sound((*path, key)) for key in limits):
         scale = f' with scale {parameter.scale:g}' if 'scale' in entry and low == high + 1 else ''
-        tree.wrong((*path, next(iter(limits))), says(
-            'no_value_between', type=parameter.type.value, scale=scale,
-            limits=parameter.range_text, nearest=_with_unit(parameter, _nearest(parameter))))
+        tree.wrong((*path, next(iter(limits))), complaints.no_value_between(
+            type=parameter.type.value, scale=scale, limits=parameter.range_text,
+            nearest=_with_unit(parameter, _nearest(parameter))))
     if isinstance(entry.get('neutral'), bool):
-        tree.wrong((*path, 'neutral'), says('is_bool', name=entry['neutral']))
+        tree.wrong((*path, 'neutral'), complaints.is_bool(name=entry['neutral']))
     elif parameter.neutral is not None and all(tree.is_sound((*path, key)) for key in limits):
         try:
             parameter.raw_from_value(parameter.neutral)
         except ValueRefused:
             kind = '' if parameter.scaled else 'an integer, '
-            tree.wrong((*path, 'neutral'), says('cannot_be_sent', name=parameter.neutral,
-                                                kind=kind, allowed=parameter.range_text))
+            tree.wrong((*path, 'neutral'), complaints.cannot_be_sent(
+                name=parameter.neutral, kind=kind, allowed=parameter.range_text))
 
 
 def _nearest(parameter: Parameter) -> Value:
@@ -526,8 +527,8 @@ def _narrowed(tree: Tree, path: Path, parameter: Parameter) -> Parameter:
         ends['maximum'] = high
     for key, end in ends.items():
         limit = tree.data['parameters'][parameter.name][key]
-        tree.suspicious((*path, key), says('narrowed', limit=limit, type=parameter.type.value,
-                                           end=_with_unit(parameter, end)))
+        tree.suspicious((*path, key), complaints.narrowed(
+            limit=limit, type=parameter.type.value, end=_with_unit(parameter, end)))
     return replace(parameter, **ends) if ends else parameter  # type: ignore[arg-type]
 
 

@@ -13,8 +13,9 @@ from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_
 from drive_can_bridge.configuration.yaml_nodes import (
     BrokenYaml, Kind, read_documents, Rules, TreeReader,
 )
-from drive_can_bridge.core.complaints import says, suggestion
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import suggestion
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.resources import profiles_directory
 
 SUFFIX = '.yaml'
@@ -55,28 +56,28 @@ class ProfileStore:
             try:
                 self._loaded[path] = _with_digest(read_profile(path), path)
             except OSError as error:
-                return says('cannot_be_read', path=path, why=error.strerror)
+                return complaints.cannot_be_read(path=path, why=error.strerror)
         return self._loaded[path]
 
     def _find(self, name: str) -> FilePath | Sentence:
         if '/' in name:
             path = FilePath(name)
             if not path.is_absolute():
-                return says('no_absolute_path', name=name)
-            return path if _is_file(path) else says('no_file', name=name)
+                return complaints.no_absolute_path(name=name)
+            return path if _is_file(path) else complaints.no_file(name=name)
         for directory in self._directories:
             path = directory / f'{name}{SUFFIX}'
             if _is_file(path):
                 return path
             if os.path.exists(path):    # a pipe, say: nobody waits for what comes out of it
-                return says('cannot_be_read', path=path, why='not a regular file')
+                return complaints.cannot_be_read(path=path, why='not a regular file')
         if name.endswith(SUFFIX):
-            return says('name_with_suffix', name=name, suffix=SUFFIX)
+            return complaints.name_with_suffix(name=name, suffix=SUFFIX)
         known = sorted({path.stem for directory in self._directories if os.path.isdir(directory)
                         for path in directory.glob(f'*{SUFFIX}')})
         places = ', '.join(map(str, self._directories)) or 'no directory'
-        hint = suggestion(name, known) if known else says('no_profile_at_all')
-        return says('unknown_profile', name=name, hint=hint, places=places)
+        hint = suggestion(name, known) if known else complaints.no_profile_at_all()
+        return complaints.unknown_profile(name=name, hint=hint, places=places)
 
 
 def _with_digest(loaded: LoadedProfile, path: FilePath) -> LoadedProfile:
@@ -103,16 +104,17 @@ def read_profile(path: FilePath) -> LoadedProfile:
     except BrokenYaml as error:
         return _unusable(file, error.line, error.why)
     if not documents or documents[0].root.kind is not Kind.MAPPING:
-        return _unusable(file, 1, says('no_profile'))
+        return _unusable(file, 1, complaints.no_profile())
     root = documents[0].root
     if any(below.text == PARAMETERS_KEY for _, value in root.pairs for below, _ in value.pairs):
-        return _unusable(file, root.line, says('is_parameter_file'))
+        return _unusable(file, root.line, complaints.is_parameter_file())
     reader = TreeReader(file, Rules.PROFILE)
     reader.read(root)
     tree = reader.tree
     tree.problems[:0] = reader.refused
     if len(documents) > 1:
-        tree.problems.append(Problem(file, documents[1].line, 'yaml', says('second_document')))
+        tree.problems.append(
+            Problem(file, documents[1].line, 'yaml', complaints.second_document()))
     return profile_from_tree(tree)
 
 

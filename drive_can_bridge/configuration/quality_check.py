@@ -12,7 +12,8 @@ from typing import Any
 
 from drive_can_bridge.configuration.problems import Path, Tree
 from drive_can_bridge.configuration.schema import check_value
-from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import suggestion
 
 _KEY = 'qos_overrides'
 _ENDS = ('publisher', 'subscription')
@@ -47,13 +48,13 @@ def _values(path: Path, value: Any) -> Iterator[tuple[Path, Any]]:
 def _check(tree: Tree, path: Path, value: Any) -> None:
     topic, *last = '.'.join(map(str, path)).rsplit('.', 2)
     if len(last) < 2 or '.' not in topic:
-        tree.wrong(path, says('wrong', value=value,
-                              allowed='TOPIC: {publisher: {POLICY: VALUE}}'))
+        tree.wrong(path, complaints.wrong(
+            value=value, allowed='TOPIC: {publisher: {POLICY: VALUE}}'))
         return
     end, policy = last
     for word, known in ((end.partition('_')[0], _ENDS), (policy, _POLICIES)):
         if word not in known:
-            tree.wrong(path, says('unknown_key', hint=suggestion(word, known)))
+            tree.wrong(path, complaints.unknown_key(hint=suggestion(word, known)))
             return
     schema = _POLICIES[policy]
     if isinstance(value, str) and value.lower() in schema.get('enum', ()):

@@ -25,8 +25,10 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from drive_can_bridge.configuration.problems import Path, Tree
-from drive_can_bridge.core.complaints import hint, says, suggestion
-from drive_can_bridge.core.sentences import NOTHING, Sentence, uncoded
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import hint, suggestion
+from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.core.text import describe_type, value_text
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
@@ -94,13 +96,13 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
             # Called once per missing key, with all keys each time: name only this one.
             if f"'{key}'" in error.message:
                 option = error.schema.get('properties', {}).get(key)
-                yield here, says('missing', allowed=allowed(option)), here
+                yield here, complaints.missing(allowed=allowed(option)), here
     elif error.validator == 'additionalProperties':
         known = error.schema.get('properties', {})
         patterns = error.schema.get('patternProperties', ())
         for key in error.instance:
             if key not in known and not any(re.search(pattern, key) for pattern in patterns):
-                what = says('unknown_key', hint=suggestion(str(key), known))
+                what = complaints.unknown_key(hint=suggestion(str(key), known))
                 yield (*path, key), what, (*path, key)
     elif 'propertyNames' in error.relative_schema_path:
         here = (*path, error.instance)
@@ -118,29 +120,29 @@ def _message(error: ValidationError) -> Sentence:
         return message if isinstance(message, Sentence) else uncoded(message)
     if error.validator == 'type':
         if isinstance(value, float) and not math.isfinite(value):
-            return says('not_finite', value=value, allowed=allowed(schema))
+            return complaints.not_finite(value=value, allowed=allowed(schema))
         kind = describe_type(value)
         if isinstance(value, (bool, int, float, str)):
-            return says('wrong_type', value=value, kind=kind, allowed=allowed(schema))
-        return says('wrong_kind', kind=kind, allowed=allowed(schema))
+            return complaints.wrong_type(value=value, kind=kind, allowed=allowed(schema))
+        return complaints.wrong_kind(kind=kind, allowed=allowed(schema))
     if error.validator == 'enum':
         near = hint(value, schema['enum']) if isinstance(value, str) else NOTHING
-        return says('unknown_word', value=value, near=near, allowed=allowed(schema))
+        return complaints.unknown_word(value=value, near=near, allowed=allowed(schema))
     if error.validator in ('minimum', 'maximum'):
-        return says('out_of_range', value=value, allowed=allowed(schema))
+        return complaints.out_of_range(value=value, allowed=allowed(schema))
     if error.validator == 'not':
-        return says('useless', value=value)
+        return complaints.useless(value=value)
     if error.validator == 'minLength':
-        return says('empty_string')
+        return complaints.empty_string()
     if error.validator in ('minItems', 'maxItems'):
         least, most = schema.get('minItems', 0), schema.get('maxItems')
         count = str(least) if least == most else f'at least {least}'
-        return says('number_of_values', count=len(value), allowed=count)
+        return complaints.number_of_values(count=len(value), allowed=count)
     if error.validator == 'minProperties':
-        return says('empty_mapping')
+        return complaints.empty_mapping()
     if error.validator == 'maxProperties':
-        return says('too_many_entries', count=len(value), allowed=schema['maxProperties'])
-    return says('wrong', value=value, allowed=allowed(schema))
+        return complaints.too_many_entries(count=len(value), allowed=schema['maxProperties'])
+    return complaints.wrong(value=value, allowed=allowed(schema))
 
 
 def allowed(schema: Any) -> str:
@@ -270,7 +272,7 @@ def compose(base: Schema, families: list[Family]) -> Schema:
 def _forbidden(key: str, family: Family, families: list[Family]) -> Schema:
     """Accept nothing. Not by ``false``: jsonschema forgets the path of what that refuses."""
     owners = ', '.join(other.name for other in families if key in other.options_schema)
-    message = says('key_of_others', owners=owners, family=family.name)
+    message = complaints.key_of_others(owners=owners, family=family.name)
     return {'not': {}, 'errorMessage': message}
 
 

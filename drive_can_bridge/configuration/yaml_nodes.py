@@ -24,8 +24,8 @@ from typing import Any, NamedTuple, Union
 import yaml
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
-from drive_can_bridge.core.complaints import says
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.text import describe_type
 
 Scalar = Union[bool, int, float, str]
@@ -151,7 +151,7 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 #: of what is read at all, in MiB and in levels
 SIZE_MAX = 4
 DEPTH_MAX = 32
-_TOO_DEEP = says('too_deep', levels=DEPTH_MAX)
+_TOO_DEEP = complaints.too_deep(levels=DEPTH_MAX)
 #: what is noticed to be wrong much later: where it begins is the line to look at
 _OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scanning a simple key')
 
@@ -255,12 +255,13 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     line = mark.line + 1 if mark is not None else line
     indentation = re.match(rb'\s*', b''.join(data.splitlines()[line - 1:line]))
     if indentation is not None and b'\t' in indentation[0]:
-        return BrokenYaml(line, says('tab'))
+        return BrokenYaml(line, complaints.tab())
     what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
     if 'nesting' in what:   # libyaml has a limit of its own since PyYAML 6.0.4
         return BrokenYaml(line, _TOO_DEEP)
-    return BrokenYaml(line, says('indented_like_no_key' if context.startswith(
-        'while parsing a block mapping') else 'not_yaml', what=what))
+    in_mapping = context.startswith('while parsing a block mapping')
+    return BrokenYaml(line, complaints.indented_like_no_key(what=what) if in_mapping else
+                      complaints.not_yaml(what=what))
 
 
 #: stands for a value that could not be read
@@ -312,14 +313,14 @@ class TreeReader:
             here = (*path, key.text)
             if here in lines:
                 self.tree.problems.append(self.tree.problem(
-                    here, says('duplicate_key', first=lines[here]),
+                    here, complaints.duplicate_key(first=lines[here]),
                 )._replace(line=key.line))
                 continue
             lines[here] = key.line
             # ROS itself reads topic names in QoS overrides, which may have dots.
             if self._parameters and '.' in key.text \
                     and str(here[0]).split('.')[0] != 'qos_overrides':
-                self.tree.wrong(here, says('dots'))
+                self.tree.wrong(here, complaints.dots())
                 self.tree.incomplete.add(path)
                 continue
             read = self._value(value, here)
@@ -332,9 +333,9 @@ class TreeReader:
         if node.kind is Kind.LIST:
             return self._list(node, path)
         if node.kind is Kind.ALIAS:
-            self._note(path, says('alias', why=self._why))
+            self._note(path, complaints.alias(why=self._why))
         elif self._parameters and not node.items:
-            self._note(path, says('garbling_mapping'))
+            self._note(path, complaints.garbling_mapping())
         else:
             value: dict[str, Any] = {}
             self._mapping(node, path, value)
@@ -343,9 +344,9 @@ class TreeReader:
 
     def _scalar(self, node: Node, path: Path) -> Any:
         if not node.text and not node.quoted:
-            self._note(path, says('no_value', why=self._why))
+            self._note(path, complaints.no_value(why=self._why))
         elif '\0' in node.text:
-            self._note(path, says('nul'))
+            self._note(path, complaints.nul())
         else:
             return node.scalar
         return _UNREADABLE
@@ -358,14 +359,15 @@ class TreeReader:
             plain = item.kind is Kind.SCALAR
             value = self._scalar(item, here) if plain else _UNREADABLE
             if item.kind is Kind.ALIAS:
-                self._note(path, says('alias', why=self._why), at=here)
+                self._note(path, complaints.alias(why=self._why), at=here)
             elif not plain:
-                self._note(path, says('nested_list'), at=here)
+                self._note(path, complaints.nested_list(), at=here)
             elif value is _UNREADABLE:
                 self.tree.damaged.add(path)
             elif self._parameters and items and type(value) is not type(items[0]):
-                self._note(path, says('mixed_list', value=value, kind=describe_type(value),
-                                      first=describe_type(items[0])), at=here)
+                self._note(path, complaints.mixed_list(
+                    value=value, kind=describe_type(value),
+                    first=describe_type(items[0])), at=here)
             else:
                 items.append(value)
         return _UNREADABLE if path in self.tree.damaged else items
@@ -375,7 +377,7 @@ def _key_problem(key: Node) -> Sentence:
     """Say why a key cannot be one; NOTHING if it can."""
     if key.kind is not Kind.SCALAR:
         kind = 'an alias' if key.kind is Kind.ALIAS else 'a list or mapping'
-        return says('no_key', kind=kind)
+        return complaints.no_key(kind=kind)
     if not key.text:
-        return says('empty_key')
-    return says('key_with_nul') if '\0' in key.text else NOTHING
+        return complaints.empty_key()
+    return complaints.key_with_nul() if '\0' in key.text else NOTHING

@@ -14,9 +14,9 @@ from typing import Protocol
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import DriveState, Noted
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 
 

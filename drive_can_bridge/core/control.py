@@ -63,8 +63,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import ControlTable
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 
 class ControlAction(Enum):

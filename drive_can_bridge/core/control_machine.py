@@ -15,8 +15,8 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import (
     ControlAction, ControlCompleted, ControlRequest, Meeting, MEETINGS, Seen, STEPS, TableRules,
     Then)
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.status_reports import (
     disregard_text, state_text, StatusReports, stuck_text, success_text, Wording)
 

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, ValueKind
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.text import nearest, printable
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.

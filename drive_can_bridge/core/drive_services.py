@@ -14,12 +14,12 @@ from drive_can_bridge.core.control import ControlAction, ControlCompleted, Contr
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import DriveState, RequestCompleted
 from drive_can_bridge.core.fault_watch import FaultWatch
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Failure, is_answer, Outcomes, Request
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 

@@ -22,7 +22,7 @@ Every message is a sentence for a user, without a trailing period, in the manual
 from collections.abc import Sequence
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 
 
 class DriveCanError(Exception):

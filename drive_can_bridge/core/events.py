@@ -10,8 +10,8 @@ from enum import Enum
 from typing import NamedTuple, Union
 
 from drive_can_bridge.core.control import ControlCompleted
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.requests import Outcome, Request
-from drive_can_bridge.core.sentences import Sentence
 
 
 class ProcessDataReceived(NamedTuple):

@@ -19,11 +19,11 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import (
     Event, Noted, ProcessDataReceived, RequestCompleted, StationLost,
 )
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 
 class Desk(Protocol):

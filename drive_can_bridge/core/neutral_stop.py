@@ -14,8 +14,8 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 
 

@@ -12,7 +12,8 @@ from drive_can_bridge.core.events import (
     AnswerLate, Event, FrameRejected, Noted, SetpointsExpired, StationFound, StationLost,
 )
 from drive_can_bridge.core.holding import Setpoint
-from drive_can_bridge.core.sentences import may_still_be_running, NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.sentences import may_still_be_running
 from drive_can_bridge.core.statistics import DriveStatistics
 
 #: s between two answers that are told to be late

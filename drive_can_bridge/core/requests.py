@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Union
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.sentences import Sentence
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from enum import Enum
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 #: what a parameter addresses; empty: nothing that acyclic frames reach
 Cells = frozenset[Hashable]

@@ -40,13 +40,13 @@ from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.events import DriveState, Event
 from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent, ProcessImage
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import Outcomes, Request, RetryPolicy
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty

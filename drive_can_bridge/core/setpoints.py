@@ -15,10 +15,10 @@ from enum import Enum
 import math
 
 from drive_can_bridge.core.holding import HeldSetpoint, Limit, make_setpoint, Setpoint
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.process_image import LastSent
-from drive_can_bridge.core.sentences import (
-    NOTHING, position_not_told, Sentence, together, would_jump)
+from drive_can_bridge.core.sentences import position_not_told, would_jump
 
 
 class CommandOutcome(Enum):

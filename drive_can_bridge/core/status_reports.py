@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 
 
 @dataclass(slots=True)

@@ -14,7 +14,8 @@ from typing import Protocol
 
 from drive_can_bridge.core.events import DriveFailed, Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.sentences import internal_error, partner_failed, Sentence
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.sentences import internal_error, partner_failed
 from drive_can_bridge.core.session import Session
 
 #: s that a stop may take beyond its neutral cycles

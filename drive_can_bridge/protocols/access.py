@@ -16,11 +16,11 @@ from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from typing import Any, Generic, TypeVar, Union
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import (
     Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request, RetryPolicy, WriteRequest)
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.transactor import ReplyT, StepT

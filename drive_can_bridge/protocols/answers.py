@@ -9,7 +9,7 @@ drive is lost. What it answers to cycles of before shows nothing (:mod:`.exchang
 import math
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook

@@ -16,11 +16,11 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, get_args, get_origin, Literal, NamedTuple
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.scanner import Prober, Scanner
@@ -95,8 +95,8 @@ def out_of_range(key: str, value: int, least: int, most: int,
                  remark: str = '') -> Iterator[Complaint]:
     """Yield what is wrong with a number that is not within its limits."""
     if not least <= value <= most:
-        yield Complaint(key, says('value_out_of_range', value=value, least=least, most=most,
-                                  remark=remark))
+        yield Complaint(key, complaints.value_out_of_range(
+            value=value, least=least, most=most, remark=remark))
 
 
 class Claim(NamedTuple):
@@ -182,8 +182,8 @@ class Family(ABC):
         for name, parameter in drive.profile.parameters.items():
             if parameter.type.bits not in self.widths:
                 yield Complaint(f'profile.parameters.{name}.type', (
-                    says('no_such_type', type=parameter.type.value, family=self.name,
-                         allowed=allowed)))
+                    complaints.no_such_type(
+                        type=parameter.type.value, family=self.name, allowed=allowed)))
 
     def check_names(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Yield what the profile calls like something that is built in."""
@@ -192,7 +192,7 @@ class Family(ABC):
             for key, taken in ((place, name), *(
                     (f'{place}.bits.{bit}', bit) for bit, _ in parameter.bits)):
                 if taken in self.builtin_names:
-                    yield Complaint(key, says('built_in', name=taken, family=self.name))
+                    yield Complaint(key, complaints.built_in(name=taken, family=self.name))
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import ProcessDataReceived
-from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.exchange_book import ExchangeBook

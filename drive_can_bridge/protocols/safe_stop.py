@@ -18,9 +18,9 @@ from typing import Any, Generic, NamedTuple, Union
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.channel import Channel, Priority

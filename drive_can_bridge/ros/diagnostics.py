@@ -18,7 +18,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
-from drive_can_bridge.core.sentences import NOTHING, Sentence, together
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable, value_text

@@ -23,10 +23,10 @@ from drive_can_bridge.core.events import (
     AnswerLate, DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered,
     MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
     StationLost)
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
-from drive_can_bridge.core.sentences import (
-    answer_late, bridge_inactive, internal_error, NOTHING, Sentence)
+from drive_can_bridge.core.sentences import answer_late, bridge_inactive, internal_error
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange

@@ -189,15 +189,15 @@ def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
 
 def _nothing_configured(bridge: 'BridgeNode', arguments: Sequence[str]) -> str:
     from drive_can_bridge.configuration.parameter_file import section_names
-    from drive_can_bridge.core.complaints import says
+    from drive_can_bridge.core import complaints
 
-    told = [says('nothing_configured', node=bridge.get_fully_qualified_name())]
+    told = [complaints.nothing_configured(node=bridge.get_fully_qualified_name())]
     for path in _parameter_files(arguments):
         try:
             names = section_names(Path(path))
         except OSError:
             continue
-        told.append(says('file_is_for', file=path, nodes=', '.join(names) or 'no node'))
+        told.append(complaints.file_is_for(file=path, nodes=', '.join(names) or 'no node'))
     return '; '.join(told)
 
 

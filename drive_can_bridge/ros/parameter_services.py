@@ -23,13 +23,14 @@ from rclpy.qos import qos_profile_parameter_events
 
 from drive_can_bridge.core.directory import contradictions, NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
     Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import bridge_inactive, nothing_written, Sentence
+from drive_can_bridge.core.sentences import bridge_inactive, nothing_written
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of

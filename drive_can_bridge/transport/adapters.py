@@ -17,9 +17,10 @@ from typing import Any
 import can
 import can.interfaces
 
-from drive_can_bridge.core.complaints import says, suggestion
+from drive_can_bridge.core import complaints
+from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
@@ -53,14 +54,14 @@ def check_interface(interface: str) -> Sentence | None:
     """Say why an interface can never be used on this machine; None: it may."""
     known = sorted(can.interfaces.BACKENDS)
     if interface not in can.interfaces.BACKENDS:
-        return says('no_interface', name=interface, hint=suggestion(interface, known))
+        return complaints.no_interface(name=interface, hint=suggestion(interface, known))
     try:
         adapter = _adapter_class(interface)
     except _Unusable as error:
-        return says('driver_missing', interface=interface, why=str(error))
+        return complaints.driver_missing(interface=interface, why=str(error))
     # python-can's serial adapters import without pyserial, and fail only when they are opened.
     if getattr(inspect.getmodule(adapter), 'serial', adapter) is None:
-        return says('driver_missing', interface=interface, why='Python module pyserial')
+        return complaints.driver_missing(interface=interface, why='Python module pyserial')
     return None
 
 
@@ -71,7 +72,7 @@ def check_channel(interface: str, channel: str | int) -> Sentence | None:
     text = str(channel)
     if isinstance(channel, str) and ('://' not in text or text.lower().startswith(_REMOTE)):
         return None
-    return says('no_serial_port', channel=channel)
+    return complaints.no_serial_port(channel=channel)
 
 
 def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
@@ -87,8 +88,9 @@ def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
         return None
     if not isinstance(rates, dict) or not rates or bitrate in rates:
         return None
-    return says('no_bitrate', bitrate=bitrate, interface=interface,
-                allowed=', '.join(str(rate) for rate in sorted(rates)))
+    return complaints.no_bitrate(
+        bitrate=bitrate, interface=interface,
+        allowed=', '.join(str(rate) for rate in sorted(rates)))
 
 
 def serial_port(bus: BusConfiguration) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from typing import Any
 import can
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
@@ -292,7 +292,7 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         _abandon(error)
         reason = in_words(error)
         if is_undefined(error):
-            reason = says('driver_missing', interface=bus.interface, why=reason)
+            reason = complaints.driver_missing(interface=bus.interface, why=reason)
         text = f'{where}: {reason}'
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error

@@ -10,7 +10,7 @@ from saying import says
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: the families as a sentence lists them

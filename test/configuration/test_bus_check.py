@@ -12,7 +12,8 @@ from saying import says
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import Sentence, uncoded
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.transport import adapters
 
 CASES = [

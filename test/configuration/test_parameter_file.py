@@ -12,7 +12,7 @@ from drive_can_bridge.configuration.parameter_file import read_parameter_file, u
 from drive_can_bridge.configuration.problems import PROBLEMS_MAX
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 
 HEAD = '/**/drive_can_bridge:\n  ros__parameters:\n'
 BUSES = '    buses: {m: {interface: virtual}}\n'

@@ -16,7 +16,7 @@ from drive_can_bridge.configuration import schema
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.configuration.problems import Tree
 from drive_can_bridge.configuration.schema import check_schema, resolved
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import share_directory
 

@@ -12,7 +12,7 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices, RequestServer
 from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange

@@ -14,6 +14,7 @@ pytest.importorskip('rclpy')
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import DriveState
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.ros.diagnostics import absence, Attendance
 
 
@@ -22,7 +23,7 @@ def drive(name: str = 'lift', **changes: Any) -> Any:
     facts: dict[str, Any] = {
         'bus_state': 'up', 'advice': sentences.maps_unread(), 'ever_online': False,
         'online': False, 'active': True, 'defect': '', 'state': DriveState.OFFLINE, 'lost_at': 0,
-        'lost_for': sentences.NOTHING, 'hangs': False, **changes}
+        'lost_for': NOTHING, 'hangs': False, **changes}
     exchange = SimpleNamespace(bus=SimpleNamespace(name='main'), bus_state=facts['bus_state'],
                                entered=lambda: nullcontext(not facts['hangs']))
     session = SimpleNamespace(offline_advice=facts['advice'], **{
@@ -53,7 +54,7 @@ def test_one_that_was_never_seen_is_told_what_to_correct() -> None:
     sentences.reads_unanswered(), sentences.rounds_unanswered(),
     sentences.silent('no answer', 'wrong station, bit rate or P509 not set')])
 def test_one_that_was_online_has_the_right_station_and_bit_rate(
-        advice: sentences.Sentence) -> None:
+        advice: Sentence) -> None:
     at = int(time.mktime((2026, 3, 4, 17, 4, 58, 0, 0, -1))) * 10**9
     why = sentences.silent_for_cycles('no cyclic response', 3)
     told = absence(drive(ever_online=True, advice=advice, lost_at=at, lost_for=why))

@@ -14,6 +14,7 @@ from waiting import clock
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
@@ -83,7 +84,7 @@ def reporters(one: Bridge) -> tuple[BusReporter, DriveReporter]:
     return diagnostics.buses[0], diagnostics.drives[0]
 
 
-def told(reporter: DriveReporter) -> list[sentences.Sentence]:
+def told(reporter: DriveReporter) -> list[Sentence]:
     """Return all that a report says."""
     message = reporter.report(clock().now()).message
     return list(message.fields.get('parts', [message]))
@@ -101,7 +102,7 @@ def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
     _, reporter = reporters(one)
     statistics = one.node.drives['conveyor'].session.statistics
 
-    def told_of_a_long_round() -> list[sentences.Sentence]:
+    def told_of_a_long_round() -> list[Sentence]:
         with one.node.exchanges['main'].lock:
             statistics.latency.add(100.0)
         return told(reporter)
@@ -192,7 +193,7 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
     one.online()
     drive, = one.node.drives.values()
     with drive.exchange.lock:
-        drive.session.report.unasked(sentences.NOTHING, 0.004, math.inf)
+        drive.session.report.unasked(NOTHING, 0.004, math.inf)
     client.wait_logged('conveyor: answer 4 ms after its period')
     status = client.diagnostics(DRIVE, lambda drive: int(drive['late_answers']) >= 1)
     assert int(status['frames_rejected']) == 0

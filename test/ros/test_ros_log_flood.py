@@ -9,8 +9,8 @@ import pytest
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted, StationFound, StationLost
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.canopen.network import Emergency, encode_emergency
 from drive_can_bridge.protocols.canopen.node import Node

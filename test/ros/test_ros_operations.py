@@ -14,10 +14,9 @@ from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool, Trigger
 from waiting import clock
 
+from drive_can_bridge.core.messages import together
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, together,
-    write_not_confirmed,
-)
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, write_not_confirmed)
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT

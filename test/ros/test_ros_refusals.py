@@ -19,7 +19,7 @@ from clients import wait_until
 import pytest
 import yaml
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.ros.main import _quiet_rcl, main
 
 #: how rclpy writes a line
@@ -107,7 +107,7 @@ def test_key_that_stands_twice(run: Run, tmp_path: Path) -> None:
     lines += ['other:\n', '  ros__parameters:\n', '    a: 1\n', '    a: 2\n']
     file.write_text(''.join(lines), encoding='utf-8')
     assert problem(run(*with_file(file))) == (
-        f'{file}:{place + 2}: drives.conveyor.period: {says("duplicate_key", first=place + 1)}')
+        f'{file}:{place + 2}: drives.conveyor.period: {complaints.duplicate_key(first=place + 1)}')
 
 
 def test_empty_mapping(run: Run, tmp_path: Path) -> None:
@@ -118,27 +118,27 @@ def test_empty_mapping(run: Run, tmp_path: Path) -> None:
     lines.insert(place, lines[place].replace('period: 0.02', 'joint: {}'))
     file.write_text(''.join(lines), encoding='utf-8')
     assert problem(run(*with_file(file))) == (
-        f'{file}:{place + 1}: drives.conveyor.joint: {says("garbling_mapping")}')
+        f'{file}:{place + 1}: drives.conveyor.joint: {complaints.garbling_mapping()}')
 
 
 def test_file_for_another_node(run: Run, tmp_path: Path) -> None:
     file = written(tmp_path, node='/other/can_bridge')
     assert problem(run(*with_file(file))) == '; '.join((
-        says('nothing_configured', node=NODE),
-        says('file_is_for', file=file, nodes='/other/can_bridge')))
+        complaints.nothing_configured(node=NODE),
+        complaints.file_is_for(file=file, nodes='/other/can_bridge')))
 
 
 def test_file_with_a_namespace_of_its_own(run: Run, tmp_path: Path) -> None:
     file = tmp_path / 'nested.yaml'
     file.write_text('cell:\n  can_bridge:\n    ros__parameters: {a: 1}\n'
                     'other: {ros__parameters: {b: 1}}\n', encoding='utf-8')
-    assert says('file_is_for', file=file, nodes='cell/can_bridge, other') in problem(
+    assert complaints.file_is_for(file=file, nodes='cell/can_bridge, other') in problem(
         run(*with_file(file)))
 
 
 def test_no_file_at_all(run: Run) -> None:
-    assert problem(run('--ros-args', '-r', '__ns:=/refused')) == says(
-        'nothing_configured', node=NODE)
+    assert problem(run('--ros-args', '-r', '__ns:=/refused')) == complaints.nothing_configured(
+        node=NODE)
 
 
 @pytest.mark.parametrize('content', [
@@ -174,7 +174,7 @@ def test_no_place_for_temporary_files_is_needed(run: Run, monkeypatch: pytest.Mo
     with monkeypatch.context() as patch:    # pytest does need one
         patch.setattr(tempfile, 'tempdir', str(tmp_path / 'read_only'))
         told = run('--ros-args', '-r', '__ns:=/refused')
-    assert problem(told) == says('nothing_configured', node=NODE)
+    assert problem(told) == complaints.nothing_configured(node=NODE)
 
 
 def test_what_rcl_itself_writes_is_shown_if_all_went_well(capfd: pytest.CaptureFixture[str],

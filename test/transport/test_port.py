@@ -267,8 +267,8 @@ def test_an_adapter_without_its_library(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr('can.interface._get_class_for_interface', lambda _: NoLibrary)
     with pytest.raises(BusMisconfigured) as caught:
         open_port(BusConfiguration('main', 'kvaser', 0), REAL)
-    assert str(caught.value) == 'kvaser 0: ' + complaints.says(
-        'driver_missing', interface='kvaser', why="name 'canGetNumberOfChannels' is not defined")
+    assert str(caught.value) == 'kvaser 0: ' + complaints.driver_missing(
+        interface='kvaser', why="name 'canGetNumberOfChannels' is not defined")
 
 
 # -- serial adapters ------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import re
 from typing import Literal
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
@@ -95,8 +95,8 @@ class Cannord(Family):
 
     def warnings(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         if drive.period < ANSWER_TIME:
-            yield Complaint('period', says('inverters_are_slow', period=drive.period,
-                                           answer=1000.0 * ANSWER_TIME, least=ANSWER_TIME))
+            yield Complaint('period', complaints.inverters_are_slow(
+                period=drive.period, answer=1000.0 * ANSWER_TIME, least=ANSWER_TIME))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         """Return all identifiers of the drive on its bus; a broadcast one is shared."""
@@ -189,7 +189,7 @@ class Cannord(Family):
             other = everyone[0].options.broadcast
             if mine != other:
                 yield drive, Complaint('broadcast', (
-                    says('both_broadcasts', mine=mine, drive=everyone[0].name, other=other)))
+                    complaints.both_broadcasts(mine=mine, drive=everyone[0].name, other=other)))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         extra = drive.options.extra_setpoints
@@ -198,12 +198,12 @@ class Cannord(Family):
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > largest:
-                yield Complaint(key, says('too_many_parameters', count=len(listed), most=largest,
-                                          more=more))
+                yield Complaint(key, complaints.too_many_parameters(
+                    count=len(listed), most=largest, more=more))
             for parameter in listed:
                 if parameter.type.bits == 32:
-                    yield Complaint(key, says('not_16_bits', name=parameter.name,
-                                              type=parameter.type.value))
+                    yield Complaint(key, complaints.not_16_bits(
+                        name=parameter.name, type=parameter.type.value))
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         foreign = any(protocol != self.name for protocol in drive.profile.protocols)
@@ -217,37 +217,37 @@ class Cannord(Family):
     def _check_unnumbered(self, place: str, parameter: Parameter) -> Iterator[Complaint]:
         """Check an entry that exists in process data only."""
         if parameter.subindex is not None:
-            yield Complaint(f'{place}.subindex', says('subindex_alone'))
+            yield Complaint(f'{place}.subindex', complaints.subindex_alone())
         if parameter.storage is Storage.EEPROM:
-            yield Complaint(f'{place}.storage', says('process_data_stored'))
+            yield Complaint(f'{place}.storage', complaints.process_data_stored())
         if parameter.type.bits == 32:
-            yield Complaint(f'{place}.type', says('no_process_word', type=parameter.type.value))
+            yield Complaint(f'{place}.type', complaints.no_process_word(type=parameter.type.value))
 
     def _differences(self, leader: DriveConfiguration, member: DriveConfiguration,
                      ) -> Iterator[Complaint]:
         led = f'drive {leader.name}, which leads its broadcast group'
         if [parameter.name for parameter in member.cyclic_request] != [
                 parameter.name for parameter in leader.cyclic_request]:
-            yield Complaint('cyclic_request', says('request_differs', leader=led))
+            yield Complaint('cyclic_request', complaints.request_differs(leader=led))
         else:
             for mine, other in zip(member.cyclic_request, leader.cyclic_request):
                 if any(getattr(mine, key) != getattr(other, key) for key in _COMMON_SCALES):
-                    yield Complaint('cyclic_request', says('type_differs', name=mine.name,
-                                                           leader=led))
+                    yield Complaint('cyclic_request', complaints.type_differs(
+                        name=mine.name, leader=led))
                 elif any(getattr(mine, key) != getattr(other, key) for key in _COMMON_WORDS):
-                    yield Complaint('cyclic_request', says('range_differs', name=mine.name,
-                                                           leader=led))
+                    yield Complaint('cyclic_request', complaints.range_differs(
+                        name=mine.name, leader=led))
                 elif mine.limit is not other.limit:
-                    yield Complaint('cyclic_request', says('limit_differs', name=mine.name,
-                                                           leader=led))
+                    yield Complaint('cyclic_request', complaints.limit_differs(
+                        name=mine.name, leader=led))
         if member.period != leader.period:
-            yield Complaint('period', says('period_differs', period=member.period,
-                                           other=leader.period, leader=led))
+            yield Complaint('period', complaints.period_differs(
+                period=member.period, other=leader.period, leader=led))
         for key in _COMMON_OPTIONS:
             mine, other = getattr(member.options, key), getattr(leader.options, key)
             if mine != other:
-                yield Complaint(key, says('option_differs', value=str(mine).lower(),
-                                          other=str(other).lower(), leader=led))
+                yield Complaint(key, complaints.option_differs(
+                    value=str(mine).lower(), other=str(other).lower(), leader=led))
         for key in _COMMANDS:
             if member.joint is not None and getattr(member.joint, key) is not None:
-                yield Complaint(f'joint.{key}', says('led_by_other', leader=led))
+                yield Complaint(f'joint.{key}', complaints.led_by_other(leader=led))

@@ -17,13 +17,13 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.requests import (
     Failure, Outcomes, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.cannord.procedures import TaskAccess
 from drive_can_bridge.protocols.channel import Priority
 

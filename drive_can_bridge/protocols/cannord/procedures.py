@@ -8,11 +8,11 @@ Every generator here is for :class:`.channel.TaskChannel`.
 from collections.abc import Generator, Iterable, Sequence
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
     Failure, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
 from drive_can_bridge.protocols.cannord.parameter_frame import (

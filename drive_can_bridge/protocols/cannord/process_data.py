@@ -31,7 +31,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.events import ProcessDataReceived
-from drive_can_bridge.core.sentences import NOTHING
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.session import Session
 
 #: values in the longest main frame

@@ -27,10 +27,10 @@ from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import Event, ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.roles import publish_it, Roles
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.answers import Answers

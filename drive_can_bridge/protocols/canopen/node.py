@@ -24,8 +24,8 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 

@@ -17,10 +17,10 @@ from typing import Literal, Union
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import ParameterPlacement
 from drive_can_bridge.protocols.canopen.addressing import object_of_name
 from drive_can_bridge.protocols.canopen_pkw import pkw

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter
@@ -81,8 +81,8 @@ class CanopenPkw(Family):
                              ('response_cob_id', network.RESPONSE_BASE + node)):
             identifier = getattr(drive.options, key)
             if identifier in taken and identifier != at_home:
-                yield Complaint(key, says('predefined_identifier', identifier=identifier,
-                                          taken=taken[identifier]))
+                yield Complaint(key, complaints.predefined_identifier(
+                    identifier=identifier, taken=taken[identifier]))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         node, options = drive.station, drive.options
@@ -150,28 +150,28 @@ class CanopenPkw(Family):
             purpose = next((purpose for purpose, other in taken.items()
                             if purpose != own and other == identifier), None)
             if purpose is not None:
-                yield Complaint(f'{own}_cob_id', says('identifier_of_node', identifier=identifier,
-                                                      purpose=purpose))
+                yield Complaint(f'{own}_cob_id', complaints.identifier_of_node(
+                    identifier=identifier, purpose=purpose))
 
     def _check_profile(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         placement = Placement.of(drive)
         for name, parameter in drive.profile.parameters.items():
             place = f'profile.parameters.{name}'
             if parameter.index is not None and parameter.subindex is None:
-                yield Complaint(f'{place}.subindex', says('subindex_missing',
-                                                          most=pkw.SUBINDEX_MAX))
+                yield Complaint(f'{place}.subindex', complaints.subindex_missing(
+                    most=pkw.SUBINDEX_MAX))
                 continue
             address = placement.address(parameter)
             if address is None:
                 key, what = ('number', 'a number') if placement.addressing == 'register' \
                     else ('index', 'an index with a subindex')
-                yield Complaint(f'{place}.{key}', says('address_missing', family=self.name,
-                                                       addressing=placement.addressing, what=what))
+                yield Complaint(f'{place}.{key}', complaints.address_missing(
+                    family=self.name, addressing=placement.addressing, what=what))
                 continue
             last = Span(address, parameter.type.bits // 16).addresses[-1]
             if last.word > pkw.WORD_MAX or (last.subindex or 0) > pkw.SUBINDEX_MAX:
-                yield Complaint(f'{place}.type', says('last_register', type=parameter.type.value,
-                                                      address=str(address)))
+                yield Complaint(f'{place}.type', complaints.last_register(
+                    type=parameter.type.value, address=str(address)))
 
     def _check_request(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         """Look for setpoints that would overwrite each other, or the control word."""
@@ -184,6 +184,6 @@ class CanopenPkw(Family):
             mine = addresses.keys(parameter) if parameter.listed else frozenset()
             other = next((taken[key] for key in mine if key in taken), None)
             if other is not None:
-                yield Complaint('cyclic_request', says('shared_register', name=parameter.name,
-                                                       other=other))
+                yield Complaint('cyclic_request', complaints.shared_register(
+                    name=parameter.name, other=other))
             taken.update(dict.fromkeys(mine, parameter.name))

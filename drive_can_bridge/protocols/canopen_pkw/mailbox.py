@@ -45,10 +45,10 @@ import math
 from typing import Any, NamedTuple, Union
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.requests import RetryPolicy
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span

@@ -8,8 +8,8 @@ Every generator here is for :class:`.mailbox.MailboxChannel`.
 from collections.abc import Generator, Hashable, Sequence
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span

@@ -38,10 +38,10 @@ from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.events import ForeignMasterSeen, Noted
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.access import SentWrites
@@ -441,7 +441,7 @@ class PkwSession(Session):
 
     @property
     def warning(self) -> Sentence:
-        return sentences.together((
+        return together((
             self._node.ailing, *self._rounds.warnings(), *self._writers.warnings(),
             self._node.missing))
 

@@ -24,9 +24,9 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.holding import Setpoint
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word, status_word
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput

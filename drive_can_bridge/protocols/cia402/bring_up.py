@@ -19,7 +19,7 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.canopen import network, sdo
@@ -136,7 +136,7 @@ class BringUp:
             found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
             if self._channel.now >= until:
                 runs = found if reacting else sentences.found_running(state.value)
-                raise End(Outcome(Found.RUNS, sentences.together((runs, refusal))))
+                raise End(Outcome(Found.RUNS, together((runs, refusal))))
             if not looks and found != self._found:
                 self._found = found
                 self._session.report.note(Noted(found, warning=True))

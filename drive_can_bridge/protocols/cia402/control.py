@@ -26,8 +26,8 @@ from typing import Any, Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, TableRules
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.states import PATTERNS, State
 
@@ -197,7 +197,7 @@ class DriveRules(TableRules):
     def remark(self, sending: ControlAction) -> Sentence:
         if sending is ControlAction.ENABLE or self.state not in (
                 State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-            return sentences.together((
+            return together((
                 sentences.word_sent_last(self._last), self.lacking, self._else_known.why))
         return sentences.still_braking()
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -103,13 +103,13 @@ class Cia402(Family):
         for parameter in drive.cyclic_request:
             place = parameter.index, parameter.subindex or 0
             if place in _SETPOINTS and place != (mode.index, mode.subindex):
-                yield Complaint('cyclic_request', says('setpoint_of_other_mode',
-                                                       name=parameter.name, mode=options.mode))
+                yield Complaint('cyclic_request', complaints.setpoint_of_other_mode(
+                    name=parameter.name, mode=options.mode))
         if not options.ramp_bits and options.mode != 'vl':
-            yield Complaint('ramp_bits', says('vl_only', mode=options.mode))
+            yield Complaint('ramp_bits', complaints.vl_only(mode=options.mode))
         if options.mode == 'pp' and drive.command_timeout > 0:
             yield Complaint('command_timeout', (
-                says('pp_halts', timeout=drive.command_timeout)))
+                complaints.pp_halts(timeout=drive.command_timeout)))
 
     def check_together(self, drives: Sequence[DriveConfiguration],
                        ) -> Iterator[tuple[DriveConfiguration, Complaint]]:
@@ -119,19 +119,19 @@ class Cia402(Family):
             first = in_step[0]
             if drive.period != first.period:
                 yield drive, Complaint('period', (
-                    says('period_of_sync', period=drive.period, other=first.period,
-                         drive=first.name)))
+                    complaints.period_of_sync(
+                        period=drive.period, other=first.period, drive=first.name)))
         stations = {drive.station: drive.name for drive in drives}
         beating = [drive for drive in drives if drive.options.bridge_heartbeat > 0]
         for drive in beating:
             node, first = drive.options.bridge_node, beating[0]
             if node != first.options.bridge_node:
                 yield drive, Complaint('bridge_node', (
-                    says('bridge_node_differs', node=node, other=first.options.bridge_node,
-                         drive=first.name)))
+                    complaints.bridge_node_differs(
+                        node=node, other=first.options.bridge_node, drive=first.name)))
             elif node in stations and drive is first:
                 yield drive, Complaint('bridge_node', (
-                    says('node_of_drive', node=node, drive=stations[node])))
+                    complaints.node_of_drive(node=node, drive=stations[node])))
 
     def claims(self, drive: DriveConfiguration) -> list[Claim]:
         node, options = drive.station, drive.options
@@ -209,9 +209,9 @@ class Cia402(Family):
             place = f'profile.parameters.{name}'
             if parameter.index is None:
                 if not foreign:
-                    yield Complaint(f'{place}.index', says('index_missing', family=self.name))
+                    yield Complaint(f'{place}.index', complaints.index_missing(family=self.name))
             elif parameter.number is not None and not foreign:
-                yield Complaint(f'{place}.number', says('no_numbers', family=self.name))
+                yield Complaint(f'{place}.number', complaints.no_numbers(family=self.name))
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         taken: dict[tuple[int, int], str] = {
@@ -221,31 +221,31 @@ class Cia402(Family):
             parameters: tuple[Parameter, ...] = getattr(drive, listed)
             for parameter in parameters:
                 if parameter.listed and parameter.index is None:
-                    yield Complaint(listed, says('no_index', name=parameter.name))
+                    yield Complaint(listed, complaints.no_index(name=parameter.name))
                 if key == 'request_pdos' and parameter.index is not None:
                     place = parameter.index, parameter.subindex or 0
                     if place in taken:
-                        yield Complaint(listed, says('mapped_already', name=parameter.name,
-                                                     taken=taken[place]))
+                        yield Complaint(listed, complaints.mapped_already(
+                            name=parameter.name, taken=taken[place]))
                     elif pdo.is_map(parameter.index):
-                        yield Complaint(listed, says('mapped_already', name=parameter.name,
-                                                     taken='a mapping parameter'))
+                        yield Complaint(listed, complaints.mapped_already(
+                            name=parameter.name, taken='a mapping parameter'))
                     taken.setdefault(place, f"the same object as '{parameter.name}'")
                 elif parameter.index == STATUS_WORD:
-                    yield Complaint(listed, says('status_word_mapped', name=parameter.name))
+                    yield Complaint(listed, complaints.status_word_mapped(name=parameter.name))
             numbers = getattr(drive.options, key)
             if len(set(numbers)) < len(numbers):
-                yield Complaint(key, says('pdo_twice'))
+                yield Complaint(key, complaints.pdo_twice())
             needed = len(pdo.distribute([pdo.width(each) for each in (first, *parameters)]))
             if needed > len(numbers):
-                yield Complaint(key, says('pdos_too_small', count=len(numbers),
-                                          plural='s' * (len(numbers) != 1), listed=listed,
-                                          needed=needed))
+                yield Complaint(key, complaints.pdos_too_small(
+                    count=len(numbers), plural='s' * (len(numbers) != 1), listed=listed,
+                    needed=needed))
 
     def _check_mode(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         name: str | None = drive.options.mode
         if name is None:
-            yield Complaint('mode', says('one_missing', allowed=', '.join(MODES)))
+            yield Complaint('mode', complaints.one_missing(allowed=', '.join(MODES)))
             return
         mode = MODES[name]
         setpoint = next((each for each in drive.cyclic_request if (
@@ -253,33 +253,35 @@ class Cia402(Family):
         if setpoint is None:
             if all(each.listed for each in drive.cyclic_request):
                 yield Complaint('cyclic_request', (
-                    says('setpoint_missing', name=name, index=mode.index, subindex=mode.subindex)))
+                    complaints.setpoint_missing(
+                        name=name, index=mode.index, subindex=mode.subindex)))
         elif setpoint.limit:
             yield Complaint(f'profile.parameters.{setpoint.name}.limit', (
-                says('setpoint_limit', name=setpoint.name, mode=name)))
+                complaints.setpoint_limit(name=setpoint.name, mode=name)))
         elif setpoint.type is not mode.type:
             yield Complaint(f'profile.parameters.{setpoint.name}.type', (
-                says('setpoint_type', type=setpoint.type.value, name=name,
-                     wanted=mode.type.value)))
+                complaints.setpoint_type(
+                    type=setpoint.type.value, name=name, wanted=mode.type.value)))
         elif mode.position and not setpoint.neutral_from:
             yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
-                says('no_neutral_position', name=name)))
+                complaints.no_neutral_position(name=name)))
         if mode.interpolated and not (
                 drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):
-            yield Complaint('mode', says('interpolated', name=name, most=INTERPOLATION_MAX))
+            yield Complaint('mode', complaints.interpolated(name=name, most=INTERPOLATION_MAX))
 
     def _check_times(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         options, milliseconds = drive.options, 1000 * drive.period
         if options.transmission == 'event' and (
                 abs(milliseconds - round(milliseconds)) > 1e-6 or drive.period > TIMER_MAX):
-            yield Complaint('period', says('no_event_timer', period=drive.period, most=TIMER_MAX))
+            yield Complaint('period', complaints.no_event_timer(
+                period=drive.period, most=TIMER_MAX))
         if 0 < options.heartbeat_timeout <= options.heartbeat_producer:
             yield Complaint('heartbeat_timeout', (
-                says('heartbeat_too_short', timeout=options.heartbeat_timeout,
-                     producer=options.heartbeat_producer)))
+                complaints.heartbeat_too_short(
+                    timeout=options.heartbeat_timeout, producer=options.heartbeat_producer)))
         for key in ('heartbeat_producer', 'bridge_heartbeat'):
             if 0 < getattr(options, key) < 0.001:
-                yield Complaint(key, says('time_too_short', seconds=getattr(options, key)))
+                yield Complaint(key, complaints.time_too_short(seconds=getattr(options, key)))
 
 
 def _shared(identifier: int, purpose: str, mark: str) -> Claim:

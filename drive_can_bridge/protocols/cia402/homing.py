@@ -16,7 +16,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlCompleted, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import Noted
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
@@ -109,7 +109,7 @@ class Homing:
             self._end(sentences.homing_timed_out(self._timeout, self._step.value))
             return
         self._deadline = math.inf
-        failure = sentences.together((
+        failure = together((
             self._failure, self._session.setpoints.untold_text or sentences.homing_moves_on()))
         self._machine.drop(failure)     # in its mode it would jump back
         self._answer(False, failure)

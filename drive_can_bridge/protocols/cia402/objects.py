@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Any
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.sentences import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure

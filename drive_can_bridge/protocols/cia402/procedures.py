@@ -10,10 +10,10 @@ takes segments; an object that is longer, which a raw name may find, is refused 
 from collections.abc import Generator, Sequence
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, RetryPolicy, Written
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX

@@ -25,11 +25,11 @@ from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import (
     DriveState, ForeignMasterSeen, MappingDiffered, Noted, ProcessDataReceived)
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.process_image import ProcessImage
 from drive_can_bridge.core.requests import Outcomes, Request, WriteRequest
 from drive_can_bridge.core.roles import Roles
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
@@ -501,7 +501,7 @@ class Cia402Session(Session):
         code, emergency = self._error_code, self._node.emergency
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
-        return sentences.together((self._homing.not_back, known, newest))
+        return together((self._homing.not_back, known, newest))
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         # also where the answer was lost: it may have been written
@@ -633,7 +633,7 @@ class Cia402Session(Session):
 
     @property
     def warning(self) -> Sentence:
-        return sentences.together((self._node.ailing, self._node.missing))
+        return together((self._node.ailing, self._node.missing))
 
     def facts(self) -> dict[str, str]:
         return {**self._node.facts(), 'stops_by': stops_by(self._bring_up.options)}

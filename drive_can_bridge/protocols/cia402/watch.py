@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure

@@ -14,10 +14,10 @@ from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.events import ForeignMasterSeen
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.core.process_image import control_word, status_word
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.core.sentences import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged

@@ -4,7 +4,7 @@
 from collections.abc import Iterator
 import re
 
-from drive_can_bridge.core.complaints import says
+from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter
@@ -41,21 +41,22 @@ def raw_parameter(drive: DriveConfiguration, name: str) -> Parameter | None:
 def check_period_and_maps(drive: DriveConfiguration) -> Iterator[Complaint]:
     """Look at how fast the drive is cycled, and at the place of its maps."""
     if drive.period < FASTEST_PERIOD and not drive.options.allow_fast_cycle:
-        yield Complaint('period', says('period_too_fast', period=drive.period,
-                                       least=FASTEST_PERIOD))
+        yield Complaint('period', complaints.period_too_fast(
+            period=drive.period, least=FASTEST_PERIOD))
     offset = drive.options.parameter_offset
     for key in ('request_map_base', 'response_map_base'):
         base = getattr(drive.options, key)
         if not 0 <= base + offset <= NUMBER_MAX - SLOTS:
-            yield Complaint(key, says('map_out_of_range', base=base, offset=offset,
-                                      most=NUMBER_MAX - SLOTS))
+            yield Complaint(key, complaints.map_out_of_range(
+                base=base, offset=offset, most=NUMBER_MAX - SLOTS))
     request = drive.options.request_map_base
     response = drive.options.response_map_base
     if abs(request - response) < SLOTS:
         # at the key that was given; the other one has its default
         moved = request != REQUEST_MAP_BASE and response == RESPONSE_MAP_BASE
         yield Complaint('request_map_base' if moved else 'response_map_base',
-                        says('maps_overlap', request=request, response=response, distance=SLOTS))
+                        complaints.maps_overlap(
+                            request=request, response=response, distance=SLOTS))
 
 
 def check_parameters(drive: DriveConfiguration, family: str) -> Iterator[Complaint]:
@@ -74,15 +75,17 @@ def _check_request(drive: DriveConfiguration) -> Iterator[Complaint]:
             continue
         if parameter.number in numbers:
             yield Complaint('cyclic_request',
-                            says('same_number', name=parameter.name,
-                                 other=numbers[parameter.number], address=parameter.address))
+                            complaints.same_number(
+                                name=parameter.name, other=numbers[parameter.number],
+                                address=parameter.address))
         numbers.setdefault(parameter.number, parameter.name)
         for key in ('request_map_base', 'response_map_base'):
             base = getattr(drive.options, key)
             if base <= parameter.number < base + SLOTS:
                 yield Complaint('cyclic_request',
-                                says('mapping_parameter', name=parameter.name,
-                                     address=parameter.address, base=base, last=base + SLOTS - 1))
+                                complaints.mapping_parameter(
+                                    name=parameter.name, address=parameter.address, base=base,
+                                    last=base + SLOTS - 1))
 
 
 def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint]:
@@ -91,18 +94,17 @@ def _check_profile(drive: DriveConfiguration, family: str) -> Iterator[Complaint
     for name, parameter in drive.profile.parameters.items():
         place = f'profile.parameters.{name}'
         if parameter.number is None:
-            yield Complaint(f'{place}.number', says('number_missing', family=family,
-                                                    most=NUMBER_MAX))
+            yield Complaint(f'{place}.number', complaints.number_missing(
+                family=family, most=NUMBER_MAX))
             continue
         if not 0 <= parameter.number + offset <= NUMBER_MAX:
-            yield Complaint('parameter_offset', says('moved_out', offset=offset, name=name,
-                                                     address=parameter.address, most=NUMBER_MAX))
+            yield Complaint('parameter_offset', complaints.moved_out(
+                offset=offset, name=name, address=parameter.address, most=NUMBER_MAX))
         elif parameter.writable and parameter.number + offset == CYCLIC_PARAMETER:
-            yield Complaint(f'{place}.access', says('access_impossible',
-                                                    access=parameter.access.value,
-                                                    name=CYCLIC_PARAMETER))
+            yield Complaint(f'{place}.access', complaints.access_impossible(
+                access=parameter.access.value, name=CYCLIC_PARAMETER))
         if parameter.subindex is not None and not shared:
-            yield Complaint(f'{place}.subindex', says('no_subindex', family=family))
+            yield Complaint(f'{place}.subindex', complaints.no_subindex(family=family))
 
 
 class DataModelStandard(Family):
@@ -147,18 +149,18 @@ class DataModelStandard(Family):
         bases = _bases(drive)
         highest = STANDARD_IDENTIFIER_MAX - max(bases.values())
         if drive.station < 1:
-            yield Complaint('station', says('station_out_of_range', station=drive.station,
-                                            most=highest, family=self.name))
+            yield Complaint('station', complaints.station_out_of_range(
+                station=drive.station, most=highest, family=self.name))
         for direction, base in bases.items():
             identifier = base + drive.station
             if identifier > STANDARD_IDENTIFIER_MAX:
                 yield Complaint(
-                    'station', says('identifier_too_long', station=drive.station,
-                                    direction=direction, base=base, identifier=identifier,
-                                    most=highest))
+                    'station', complaints.identifier_too_long(
+                        station=drive.station, direction=direction, base=base,
+                        identifier=identifier, most=highest))
                 break
         if bases['request'] == bases['response']:
-            yield Complaint('response_id_base', says('same_base', base=bases['response']))
+            yield Complaint('response_id_base', complaints.same_base(base=bases['response']))
 
 
 def _bases(drive: DriveConfiguration) -> dict[str, int]:
@@ -212,7 +214,8 @@ class DataModelExtended(Family):
         for key in ('cyclic_request', 'cyclic_response'):
             listed: tuple[Parameter, ...] = getattr(drive, key)
             if len(listed) > SLOTS:
-                yield Complaint(key, says('too_many_slots', count=len(listed), most=SLOTS))
+                yield Complaint(key, complaints.too_many_slots(count=len(listed), most=SLOTS))
             for parameter in listed:
                 if parameter.number is not None and parameter.number + offset == 0:
-                    yield Complaint(key, says('number_zero', name=parameter.name, most=NUMBER_MAX))
+                    yield Complaint(key, complaints.number_zero(
+                        name=parameter.name, most=NUMBER_MAX))

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, RetryPolicy, Written
-from drive_can_bridge.core.sentences import NOTHING, Sentence
 from drive_can_bridge.protocols.access import Access, Found, Item, ParameterPlacement, read_back
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Read, Reply, Step, Words, Write)

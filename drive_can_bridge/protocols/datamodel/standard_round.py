@@ -6,8 +6,8 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.process_image import control_word, status_word
-from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Procedure, Read
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.procedures import Numbers

@@ -20,11 +20,10 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core.messages import together
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.sentences import (
-    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, together,
-    write_not_confirmed,
-)
+    may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, write_not_confirmed)
 from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Outcome, Place, Status, Stop

@@ -12,8 +12,8 @@ from test_cia402_set_up import FITS
 from test_cia402_stop import running, WATCH_OFF
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.canopen.sdo import describe
 from drive_can_bridge.protocols.cia402.handover import Handover

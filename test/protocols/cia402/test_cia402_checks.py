@@ -12,7 +12,7 @@ from servo_builders import (
 )
 
 from drive_can_bridge.core.frame import worst_bits
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = FAMILIES['cia402']

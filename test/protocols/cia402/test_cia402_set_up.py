@@ -8,7 +8,7 @@ from saying import says
 from servo_builders import Axis, POSITION, TORQUE, VELOCITY
 
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
-from drive_can_bridge.core.sentences import Sentence
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.canopen.sdo import describe
 from drive_can_bridge.protocols.cia402.bring_up import interpolation_time
 from drive_can_bridge.protocols.cia402.states import State

@@ -1,0 +1,132 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+How texts for people are written as rows of data.
+
+The rows stand in :mod:`.sentences` (of drives, requests and stops) and :mod:`.complaints` (of
+files): the text, and what to do about it. The name of a row is the *code*, and what stands in
+braces are the *fields*. A row is called with its fields, and returns a :class:`Sentence`: text
+wherever text is wanted, which tells programs and tests what it says without being read:
+
+.. code-block:: python
+
+    no_answer = Text('no answer in {timeout:g} s, {attempts:#attempt}', do='look at its cable')
+
+    reason = sentences.no_answer(timeout=0.1, attempts=3)
+    reason == 'no answer in 0.1 s, 3 attempts'
+    reason.code == 'no_answer' and reason.fields['attempts'] == 3
+
+A sentence that gives the reason of another one has it among its fields, code and all.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from string import Formatter
+from typing import Any
+
+from drive_can_bridge.core.text import counted, show
+
+
+class Sentence(str):
+    """
+    A text for people that programs need not read.
+
+    :ivar code: what it says, as a stable word.
+    :ivar fields: of what, by name.
+    """
+
+    __slots__ = ('code', 'fields')
+
+    code: str
+    fields: Mapping[str, Any]
+
+    def __new__(cls, text: str = '', code: str = '',
+                fields: Mapping[str, Any] | None = None) -> 'Sentence':
+        said = super().__new__(cls, text)
+        said.code, said.fields = code, fields or {}
+        return said
+
+
+#: where there is nothing to be said
+NOTHING = Sentence()
+
+
+def together(said: Iterable[Sentence]) -> Sentence:
+    """Put several sentences in one line; its code is that of the first, all are in its fields."""
+    parts = [part for part in said if part]
+    if len(parts) < 2:
+        return parts[0] if parts else NOTHING
+    return Sentence('; '.join(parts), parts[0].code, {'parts': parts})
+
+
+class Text:
+    """
+    A row of the catalogue; a call with its fields returns the sentence.
+
+    In braces stand fields, and behind a colon how they are written: as :func:`format` has it,
+    ``{n:#byte}`` counts, ``{names:, }`` joins several, ``{ran:?}`` writes nothing; ``{value!r}``
+    writes a value as a user would recognise it. Of several texts the first is taken whose fields
+    are all there: given, and neither empty nor false. The last one is for all other cases.
+
+    :ivar code: its name in the catalogue.
+    :ivar do: what people should do about it.
+    :ivar fields: the names of its fields, in the order in which they may be given.
+    :ivar optional: those that may be missing.
+    :param fields: that order, where it is not that of the text, or where a field is in no text.
+    :param how: writes a field in a way of its own, by name.
+    """
+
+    def __init__(self, *texts: str, do: str = '', fields: str = '',
+                 **how: Callable[[Any], str]) -> None:
+        self.code, self.do, self.texts = '', do, texts
+        parsed = [list(Formatter().parse(text)) for text in texts]
+        in_text = [[name for _, name, _, _ in text if name] for text in parsed]
+        self.fields = tuple(fields.split()) or tuple(dict.fromkeys(sum(in_text, [])))
+        self.optional = frozenset(sum(in_text, [])) - set(in_text[-1])
+        *self._variants, (_, self._pieces) = [
+            (self.optional.intersection(names),
+             [(before, name, how.get(name or '') or _writer(spec or '', conversion))
+              for before, name, spec, conversion in text])
+            for names, text in zip(in_text, parsed)]
+
+    def __call__(self, *args: Any, **fields: Any) -> Sentence:
+        if args:
+            fields = {**dict(zip(self.fields, args)), **fields}
+        pieces = self._pieces
+        for wanted, variant in self._variants:
+            if all(_is_there(fields.get(name)) for name in wanted):
+                pieces = variant
+                break
+        return Sentence(''.join([before + write(fields[name]) if name else before
+                                 for before, name, write in pieces]), self.code, fields)
+
+
+def catalogue(module: dict[str, Any], do: str = '') -> dict[str, Text]:
+    """
+    Give the rows of a module their codes, and return them.
+
+    :param do: what to do about those that do not say it.
+    """
+    rows = {code: row for code, row in module.items() if isinstance(row, Text)}
+    for code, row in rows.items():
+        row.code, row.do = code, row.do or do
+    return rows
+
+
+def _is_there(value: Any) -> bool:
+    return bool(value) or value == 0 and value is not False
+
+
+def _writer(spec: str, conversion: str | None) -> Callable[[Any], str]:
+    if conversion == 'r':
+        return show
+    if spec == '?':
+        return lambda value: ''
+    if spec.startswith('#'):
+        return lambda value: counted(value, spec[1:])
+    if not spec:
+        return format
+
+    def write(value: Any) -> str:
+        if isinstance(value, Collection) and not isinstance(value, str):
+            return spec.join(map(str, value))
+        return format(value, spec)
+    return write

@@ -1,0 +1,180 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The catalogue of sentences and complaints: its rows are what people read, and not repeated here.
+
+Told are: how rows are written out; that each is said somewhere with the right fields, and that
+a story somewhere among the tests gets each complaint.
+"""
+
+import ast
+from collections.abc import Iterable, Iterator
+from functools import cache
+import inspect
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from saying import says
+
+from drive_can_bridge.core import complaints, sentences
+from drive_can_bridge.core.messages import NOTHING, Sentence, Text, together
+
+TESTS = Path(__file__).parents[1]
+PRODUCT = TESTS.parent / 'drive_can_bridge'
+CATALOGUES = {each.__name__: each.CODES for each in (complaints, sentences)}
+
+#: modules of stories about configurations; elsewhere ``says`` is mostly a sentence of a drive
+STORIES = [*(TESTS / 'configuration').glob('test_*.py'),
+           TESTS / 'protocols' / 'cia402' / 'test_cia402_checks.py',
+           TESTS / 'protocols' / 'cannord' / 'test_cannord_group.py',
+           TESTS / 'ros' / 'test_ros_refusals.py']
+
+
+@pytest.mark.parametrize(('sentence', 'text'), [
+    (sentences.no_answer(timeout=0.1, attempts=1), 'no answer in 0.1 s, 1 attempt'),
+    (sentences.no_answer(0.25, 3), 'no answer in 0.25 s, 3 attempts'),
+    (sentences.members_offline(names=['hoist', 'turn']), 'hoist, turn offline'),
+    (sentences.not_armed(wanted=('0 to /a', '0 to /b')), 'not armed: publish 0 to /a and 0 to /b'),
+    (sentences.maps_written([50, 51], (209,)), 'request map [50, 51], response map [209]'),
+    (sentences.word_stays(), 'the word stays'),
+    (sentences.status_word(8), 'status word 0008h'),
+    (sentences.status_words({'lift': 0xB30, 'hoist': None}),
+     'status words: lift 0B30h, hoist unknown'),
+    (sentences.slow_exchange(mean=0.0312, period=0.02),
+     'an exchange takes 31 ms, the period is 20 ms: the drive is slow; choose a longer period or '
+     'a shorter cyclic_response'),
+    (sentences.answer_late(0.0004),
+     'answer 0.4 ms after its period: the computer or the drive is too slow'),
+    (sentences.refused_by_drive(2, 'error 2: limit exceeded'),
+     'refused by the drive: error 2: limit exceeded'),
+    (complaints.wrong_type(value='maybe', kind='a string', allowed='true or false'),
+     "'maybe' is a string, allowed is true or false"),
+    (complaints.unknown_word(value=False, near='', allowed='lenient or strict'),
+     'false is unknown, allowed is lenient or strict'),
+    (complaints.no_mapping(entry='x'), 'no mapping, allowed is NODE_NAME: {x: …}'),
+])
+def test_counting_joining_and_numbers(sentence: Sentence, text: str) -> None:
+    assert sentence == text
+
+
+def test_the_first_text_whose_fields_are_all_there() -> None:
+    assert sentences.unknown_parameter('ramp') == 'unknown parameter ramp'
+    assert sentences.unknown_parameter('ramp', None) == 'unknown parameter ramp'
+    assert sentences.unknown_parameter('ramp', 'rump') == (
+        'unknown parameter ramp, did you mean rump?')
+    assert sentences.fault_came('status 8', False) == 'fault (status 8)'
+    assert sentences.fault_came('status 8', True) == (
+        'fault (status 8); only ~/enable starts the drive again')
+    assert sentences.mode_differs('csp', 8, None) == '6061h shows nothing yet instead of 8 (csp)'
+    assert sentences.mode_differs('csp', 8, 0) == '6061h shows mode 0 yet instead of 8 (csp)'
+    assert 'stuck in state ready (s); a; b' in sentences.stuck(2.0, 'ready', 's', ['a', 'b'])
+    assert sentences.stuck(2.0, 'ready', 's').endswith('stuck in state ready (s)')
+
+
+def test_a_sentence_has_the_code_of_its_row_and_the_fields_that_it_was_given() -> None:
+    said = sentences.no_answer(0.1, attempts=3)
+    assert (said.code, said.fields) == ('no_answer', {'timeout': 0.1, 'attempts': 3})
+    assert sentences.booted().fields == {}
+
+
+def test_a_reason_keeps_its_code_within_another_sentence() -> None:
+    why = sentences.stop_not_answered()
+    said = sentences.may_still_be_running(why)
+    assert said == says('may_still_be_running', why=says('stop_not_answered'))
+    assert said != says('may_still_be_running', why=says('stop_not_possible'))
+    assert 'stop_not_answered' not in said
+
+
+def test_several_things_in_one_line() -> None:
+    first, second = sentences.heartbeat_missing(), sentences.booted()
+    both = together([NOTHING, first, second])
+    assert both == f'{first}; {second}' and both.code == first.code
+    assert both.fields == {'parts': [first, second]}
+    assert together([second, NOTHING]) is second and together([]) is NOTHING
+
+
+@pytest.mark.parametrize('module', [complaints, sentences])
+def test_every_row_has_words_and_advice_and_stands_once(module: ModuleType) -> None:
+    for code, row in module.CODES.items():
+        assert row.do and all(row.texts), code
+    names = [target.id for node in ast.parse(inspect.getsource(module)).body
+             if isinstance(node, ast.Assign) for target in node.targets
+             if isinstance(target, ast.Name)]
+    assert len(names) == len(set(names))
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding='utf-8'))
+
+
+def rows_named_in(tree: ast.Module, module: str) -> Iterator[tuple[ast.expr, str, Text | None]]:
+    """Return what names a row of the catalogue: the expression, the code, the row."""
+    own: dict[str, str] = {'sentences': 'drive_can_bridge.core.sentences',
+                           'complaints': 'drive_can_bridge.core.complaints'}
+    names = {code: (code, row) for code, row in CATALOGUES.get(module, {}).items()}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module in CATALOGUES:
+            rows = CATALOGUES[node.module]
+            names.update((each.asname or each.name, (each.name, rows[each.name]))
+                         for each in node.names if each.name in rows)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id in names and isinstance(node.ctx, ast.Load):
+            yield node, *names[node.id]
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and (
+                node.value.id in own):
+            yield node, node.attr, CATALOGUES[own[node.value.id]].get(node.attr)
+
+
+def product() -> Iterator[tuple[Path, str]]:
+    for path in sorted(PRODUCT.rglob('*.py')):
+        text = path.read_text(encoding='utf-8')
+        if 'sentences' in text or 'complaints' in text:     # parsing is what takes long
+            yield path, '.'.join(path.relative_to(TESTS.parent).with_suffix('').parts)
+
+
+def test_every_call_gives_the_right_fields() -> None:
+    """As mypy would: none that its row has not, none missing, no more than it has."""
+    wrong, looked_at = [], 0
+    for path, module in product():
+        tree = parsed(path)
+        rows = {node: row for node, _, row in rows_named_in(tree, module)}
+        for call in ast.walk(tree):
+            row = rows.get(call.func) if isinstance(call, ast.Call) else None
+            if not isinstance(call, ast.Call) or row is None or any(
+                    each.arg is None for each in call.keywords) or any(
+                        isinstance(each, ast.Starred) for each in call.args):
+                continue
+            given = [*row.fields[:len(call.args)], *(str(each.arg) for each in call.keywords)]
+            looked_at += 1
+            if (len(call.args) > len(row.fields) or len(given) != len(set(given))
+                    or not {*given} <= {*row.fields}
+                    or not {*row.fields} - row.optional <= {*given}):
+                wrong.append(f'{path.name}:{call.lineno}: {row.code} is given {given}, has '
+                             f'{row.fields}')
+    assert wrong == []
+    assert looked_at > 400
+
+
+def test_every_row_is_said() -> None:
+    said = {row for path, module in product() for _, _, row in rows_named_in(parsed(path), module)}
+    assert [row.code for rows in CATALOGUES.values() for row in rows.values()
+            if row not in said] == []
+
+
+def named(files: Iterable[Path], *functions: str) -> Iterator[str]:
+    """Return the texts that these functions are called with."""
+    for path in files:
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in functions:
+                for argument in node.args:
+                    for each in ast.walk(argument):
+                        if isinstance(each, ast.Constant):
+                            yield str(each.value)
+
+
+def test_every_complaint_has_a_story() -> None:
+    """A story that passes has got what it names: at(PLACE, CODE), says(CODE), complaints.CODE."""
+    told = {*named(STORIES, 'at', 'says')}
+    told.update(code for path in STORIES for _, code, _ in rows_named_in(parsed(path), ''))
+    assert complaints.CODES.keys() - told == set()
