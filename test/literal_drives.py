@@ -210,8 +210,8 @@ class ServoDrive:
             identifier = self.number(0x1800 + pdo, 1)
             if not identifier & 0x80000000 and self.number(0x1800 + pdo, 2) in kinds:
                 found.append(Frame(identifier & 0x7FF, b''.join(
-                    self.objects[index, subindex]
-                    for index, subindex, _ in self.mapped(0x1A00 + pdo)), False))
+                    self.objects.get((index, subindex), bytes(length))
+                    for index, subindex, length in self.mapped(0x1A00 + pdo)), False))
         return found
 
     # -- objects ----------------------------------------------------------------------------------
@@ -229,10 +229,15 @@ class ServoDrive:
             found = self.objects.get((index, subindex), bytes(4))
             return bytes((0x4F - (len(found) - 1 << 2),)) + data[1:4] + found.ljust(4, b'\0')
         else:
-            code = self.fixed.get((index, subindex), 0)
+            content = data[4:8 - (data[0] >> 2 & 3)]
+            code = self.refusal(index, subindex, content)
             if not code:
-                self.write(index, subindex, data[4:8 - (data[0] >> 2 & 3)])
+                self.write(index, subindex, content)
         return bytes((0x80 if code else 0x60,)) + data[1:4] + code.to_bytes(4, 'little')
+
+    def refusal(self, index: int, subindex: int, content: bytes) -> int:
+        """Return why it does not let something be written; 0: it does."""
+        return self.fixed.get((index, subindex), 0)
 
     def write(self, index: int, subindex: int, content: bytes) -> None:
         self.objects[index, subindex] = content

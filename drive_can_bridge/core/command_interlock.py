@@ -26,6 +26,10 @@ class Presence(Protocol):
     active: bool
     online: bool
 
+    @property
+    def error(self) -> Sentence:
+        """Why a drive that is online must not be driven; '' if it may."""
+
 
 class CommandInterlock:
     """
@@ -80,7 +84,7 @@ class CommandInterlock:
         """Take commands while they may move the drive, and only then: otherwise it is neutral."""
         presence, obeyed = self._presence, self.obeyed
         self._setpoints.allow(presence.online and presence.active and not self._held and (
-            obeyed is None or obeyed.operating))
+            obeyed is None or obeyed.operating) and not presence.error)
 
     def hold(self, held: bool) -> None:
         """Be neutral and disarmed, and take no commands, or take them again."""

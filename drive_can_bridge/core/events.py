@@ -105,11 +105,13 @@ class Noted:
 
     :param warning: somebody should do something about it.
     :param danger: at once: a drive may be running that should not.
+    :param error: what is told is more than a warning.
     """
 
     text: Sentence
     warning: bool = False
     danger: bool = False
+    error: bool = False
 
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, DriveFailed, MappingDiffered,

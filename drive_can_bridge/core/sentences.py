@@ -382,6 +382,24 @@ restarted_waiting = Text('the device restarted: waiting for it to answer', do='w
 mapping_differs = Text(
     'mapping differs: {how}',
     do='correct the drive or the configuration, or set mapping configure')
+of_object = Text(
+    '{what}: {why}',
+    do='take it out of cyclic_request or cyclic_response, or correct it in the profile')
+no_such_object = Text(
+    'no such object',
+    do='see the manual of the drive, or its EDS, for the objects that it has')
+limit_without_effect = Text(
+    '{what} stays {shown} although {sent} is sent: the limit is not in effect',
+    do='take it out of cyclic_request and set it as a parameter, or correct the drive')
+limit_in_vain = Text(
+    '{why}; disarmed: disable the drive',
+    do='disable the drive; it is not enabled again before the limit is in effect')
+limit_otherwise = Text(
+    '{what} is {shown} although {sent} is sent',
+    do='look which other limit of the drive bounds this one')
+limit_unread = Text(
+    '{what} has not been read back yet',
+    do='wait; where it lasts, look at the cable and raise parameter_timeout')
 object_refused = Text(
     '{what} refused by the drive: {why}',
     do='take other parameters, or PDOs that fit what the drive has (mapping verify, assume)')

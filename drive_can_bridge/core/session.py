@@ -523,6 +523,11 @@ class Session(ABC):
         return NOTHING
 
     @property
+    def error(self) -> Sentence:
+        """Why a drive that is online must not be driven, as an ERROR; '' if it may."""
+        return NOTHING
+
+    @property
     def busy(self) -> Sentence:
         """What the drive is about that nobody commands, and nothing arms meanwhile; '' if not."""
         return NOTHING

@@ -261,6 +261,8 @@ class DriveReporter:
                     *self._warnings(rejected)]
             return DiagnosticStatus.ERROR, together(told)
         told = self._warnings(rejected)
+        if session.error:
+            return DiagnosticStatus.ERROR, together((session.error, *told))
         obeyed = session.interlock.obeyed
         if obeyed is not None and obeyed.disregard:
             return DiagnosticStatus.ERROR, together((obeyed.disregard, *told))

@@ -272,6 +272,8 @@ class DriveNode(DriveListener):
             if event.text.code == 'emergency':
                 # each tells of another error, and a drive may have any number of them
                 self._log.warn('emergency', event.text, few=FEW)
+            elif event.error:
+                self._log.error(event.text)
             elif event.warning:
                 self._log.warning(event.text, urgent=event.danger)
             else:

@@ -10,6 +10,7 @@ from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import DriveState, Noted, SetpointsExpired
 from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.sentences import NOTHING
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 
@@ -21,6 +22,7 @@ class Stand:
 
     def __init__(self, *, controlled: bool = True, led: bool = False) -> None:
         self.active = self.online = True
+        self.error = NOTHING
         self.setpoints = Setpoints((SPEED,), timeout=0.5, rearm_immediate=True)
         self.control = ControlMachine(CONTROL, timeout=2.0) if controlled else None
         self.leader = ControlMachine(CONTROL, timeout=2.0) if led else None

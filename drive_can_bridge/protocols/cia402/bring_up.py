@@ -28,8 +28,11 @@ from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
+from drive_can_bridge.protocols.cia402.limits import LimitCheck
+from drive_can_bridge.protocols.cia402.mapped import read_mapped
 from drive_can_bridge.protocols.cia402.objects import (
     at_object, differs, End, Found, Objects, Outcome, Procedure, silent)
+from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
 from drive_can_bridge.protocols.cia402.states import MODES, State
 from drive_can_bridge.protocols.cia402.watch import Watch
@@ -51,19 +54,20 @@ class BringUp:
     The sequence for one drive.
 
     :param rules: learn what the drive does at a quick stop.
+    :param limits: learn what they are before anything is sent.
     :ivar watch: who watches the bridge.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
     :ivar nmt_at: when it was sent NMT last.
     """
 
-    def __init__(self, session: Session, node: Node, rules: DriveRules,
-                 channel: SdoChannel) -> None:
+    def __init__(self, session: Session, node: Node, rules: DriveRules, channel: SdoChannel,
+                 limits: LimitCheck) -> None:
         drive = session.configuration
         self._session, self._node, self._rules = session, node, rules
-        self._channel = channel
+        self._channel, self._limits = channel, limits
         self._drive, self._options = drive, drive.options
         self._mode = MODES[drive.options.mode]
-        objects = Objects(drive.parameter_retries + 1)
+        objects = self._objects = Objects(drive.parameter_retries + 1)
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
         self._synchronous: bool = drive.options.transmission == 'sync'
@@ -84,6 +88,7 @@ class BringUp:
             yield from self._learn()
             yield from self._heartbeat()
             if self._options.mapping != 'assume':
+                yield from self._look_at_objects(reply)
                 yield from self._exchange()
             yield from self._interpolation_time()
             yield from self._choose_mode()
@@ -192,6 +197,14 @@ class BringUp:
                 yield from self._put(PRODUCER, 0, interval, 2)):
             node.heartbeat_timeout = 0.0
             self.tell(sentences.no_heartbeat_producer())
+
+    def _look_at_objects(self, status: Reply) -> Procedure:
+        """See that all is there that is to be mapped, and that limits are not without effect."""
+        drive = self._drive
+        without_effect = self._limits.found((yield from read_mapped(
+            self._objects, [*request_pdos(drive), *response_pdos(drive)], status)))
+        if without_effect:
+            raise differs(without_effect)
 
     def _beats(self) -> Procedure:
         """Wait for heartbeats that have ceased: it would be online again, and not watched."""

@@ -65,6 +65,10 @@ class Known(Protocol):
         """What it lacks to be driven although it reports enabled; '' if nothing."""
 
     @property
+    def unready(self) -> Sentence:
+        """What has to be seen before it is enabled; '' if nothing."""
+
+    @property
     def why(self) -> Sentence:
         """What else it says of why it is not enabled; '' if nothing."""
 
@@ -131,7 +135,7 @@ class DriveRules(TableRules):
         if self.state is State.OPERATION_ENABLED:
             return self._enable_word | self.mode_bits
         if self.state is State.SWITCHED_ON:
-            return self._enable_word
+            return states.SWITCH_ON if self._else_known.unready else self._enable_word
         return states.SWITCH_ON if self.state is State.READY_TO_SWITCH_ON else states.SHUTDOWN
 
     def rests(self, word: int) -> bool:

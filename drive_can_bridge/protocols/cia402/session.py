@@ -46,6 +46,7 @@ from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, Sd
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
+from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.objects import Found, Outcome
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import (
@@ -142,7 +143,11 @@ class Cia402Session(Session):
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
         self._heartbeats = Heartbeats(self, self._node, heartbeat)
-        self._bring_up = BringUp(self, self._node, self._rules, self._channel)
+        self._limits = LimitCheck(
+            [] if options.mapping == 'assume' else [
+                each for each in drive.cyclic_request if each.limit],
+            self.sent, self._channel, self._limits_judged)
+        self._bring_up = BringUp(self, self._node, self._rules, self._channel, self._limits)
         self.homes = options.homing
         self._handover = Handover(
             self.setpoints, self._rules, drive.control_timeout, self.report,
@@ -172,6 +177,7 @@ class Cia402Session(Session):
         self._channel.cancel(Priority.OWN)
         self._course.stop()
         self._forget_state()
+        self._limits.stop()
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
@@ -181,6 +187,7 @@ class Cia402Session(Session):
         self._channel.clear()
         self._looking = False
         self._homing.stop()
+        self._limits.stop()
         self._stop.forget()
         self._course.stop()
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
@@ -257,6 +264,7 @@ class Cia402Session(Session):
         self._answers.book.forget_asked()
         self._answers.book.stale = self._beat.running    # it answers to the SYNC of others
         self.setpoints.changed = True   # what was written by SDO meanwhile was something else
+        self._limits.begin()
         exchange.start(now)
         self.report.advice = sentences.cycles_unanswered()
 
@@ -289,6 +297,7 @@ class Cia402Session(Session):
 
     def lost(self, now: float, *, was_online: bool) -> None:
         self._homing.stop()
+        self._limits.stop()
         self._forget_state()
         self._set.clear()
 
@@ -399,6 +408,9 @@ class Cia402Session(Session):
         self._homing.sampled(raws[0], raws, now)
         self.report.note(ProcessDataReceived(raws, received_at))
         exchange.wait_out(now)
+        self._limits.answered(now)
+        if self._limits.without_effect:
+            self._see_to_limits(now)
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
         change = self._node.receive_heartbeat(state, now)
@@ -501,7 +513,7 @@ class Cia402Session(Session):
         code, emergency = self._error_code, self._node.emergency
         known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
-        return together((self._homing.not_back, known, newest))
+        return together((self._homing.not_back, self.unready, known, newest))
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         # also where the answer was lost: it may have been written
@@ -509,10 +521,41 @@ class Cia402Session(Session):
                 parameter.index in states.STOP_OPTIONS for parameter, _ in request.items):
             self._channel.run(self._bring_up.learn_again(), lambda _: None, self._channel.now)
 
+    # -- limits -----------------------------------------------------------------------------------
+
+    def _limits_judged(self) -> None:
+        now, limits = self._channel.now, self._limits
+        if limits.otherwise:
+            self._bring_up.tell(limits.otherwise)
+        if limits.without_effect and not self._see_to_limits(now):
+            self.report.note(Noted(self.error, error=True))
+        self._machine.rules_changed()
+        self.control_changed(now)
+
+    def _see_to_limits(self, now: float) -> bool:
+        """End the exchange with a drive whose limit has no effect, unless it is enabled."""
+        control = self._machine
+        if (self.stage is not Stage.RUNNING or not self.online or not control.at_rest
+                or control.pending and control.stopping or self._rules.state in states.MOVING):
+            return False
+        self.remedy = sentences.drive_to_correct
+        self._close(sentences.mapping_differs(self._limits.without_effect), now, START_SPACING)
+        return True
+
+    @property
+    def error(self) -> Sentence:
+        why = self._limits.without_effect
+        return sentences.limit_in_vain(why) if why else NOTHING
+
+    @property
+    def unready(self) -> Sentence:
+        """What has to be seen before the drive is enabled; '' if nothing."""
+        return self._limits.unseen
+
     # -- control ----------------------------------------------------------------------------------
 
     def home(self, request: ControlRequest, now: float) -> None:
-        refusal = self._homing.refusal()
+        refusal = self.error or self._homing.refusal()
         if refusal:
             self.report.note(ControlCompleted(request, False, refusal))
         else:
@@ -537,8 +580,10 @@ class Cia402Session(Session):
             timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
 
     def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
-        if refusal or action is not ControlAction.ENABLE or not self._machine.fault:
+        if refusal or action is not ControlAction.ENABLE:
             return refusal
+        if self.error or not self._machine.fault:
+            return self.error
         # nobody heard the emergency where the bridge itself was gone
         emergency, watch = self._node.emergency, self.fault_watch
         missed = HEARTBEAT_ERROR in (emergency and emergency.code, watch and watch.error_code)
@@ -633,7 +678,8 @@ class Cia402Session(Session):
 
     @property
     def warning(self) -> Sentence:
-        return together((self._node.ailing, self._node.missing))
+        return together((
+            self._node.ailing, self._node.missing, self._limits.otherwise))
 
     def facts(self) -> dict[str, str]:
         return {**self._node.facts(), 'stops_by': stops_by(self._bring_up.options)}

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A servo drive, node 5, in csv or csp, with its bus; frames as candump writes them."""
 
+from collections.abc import Callable
 from typing import Any
 
 from builders import Conversation, drive, frame, INT16, INT32, parameter, RAM, RO
@@ -25,11 +26,13 @@ IP_TARGET = parameter('interpolation', None, index=0x60C1, subindex=1, type=INT3
 MODES_OF = parameter('mode_shown', None, index=0x6061, subindex=0, type=ParameterType.INT8,
                      access=RO)
 ERROR = parameter('error', None, index=0x603F, subindex=0, access=RO)
+TORQUE_LIMIT = parameter('torque_limit', None, index=0x6072, subindex=0, scale=0.1, unit='%',
+                         minimum=0.0, maximum=100.0, neutral=100.0, limit=True, storage=RAM)
 RAMP = parameter('acceleration', None, index=0x6083, subindex=0, type=ParameterType.UINT32)
 MODE_TARGETS = {'csv': VELOCITY_TARGET, 'pv': VELOCITY_TARGET, 'csp': TARGET, 'pp': TARGET,
                 'tq': TORQUE_TARGET, 'cst': TORQUE_TARGET, 'vl': SPEED_VL, 'ip': IP_TARGET}
 TABLE = (VELOCITY_TARGET, POSITION, TARGET, VELOCITY, TORQUE, TORQUE_TARGET, SPEED_VL, IP_TARGET,
-         MODES_OF, RAMP)
+         MODES_OF, RAMP, TORQUE_LIMIT)
 PERIOD = 0.01
 OBJECTS = {(0x6064, 0): (1000).to_bytes(4, 'little'), (0x60FF, 0): bytes(4),
            (0x607A, 0): bytes(4), (0x6077, 0): bytes(2), (0x6071, 0): bytes(2),
@@ -51,6 +54,7 @@ class Axis:
     """
     A session and the drive at the other end of the bus, with a heartbeat each 0.1 s.
 
+    :param make: makes the drive.
     :ivar log: what was sent, and when.
     :ivar mute: nothing of what the drive says arrives.
     :ivar deaf: nothing of what it is told arrives.
@@ -58,11 +62,12 @@ class Axis:
 
     DELAY = 0.0002
 
-    def __init__(self, mode: str = 'csv', objects: dict[tuple[int, int], bytes] | None = None,
+    def __init__(self, mode: str = 'csv', objects: dict[tuple[int, int], bytes] | None = None, *,
+                 make: Callable[[int, dict[tuple[int, int], bytes]], ServoDrive] = ServoDrive,
                  **options: Any) -> None:
         self.talk = Conversation(servo(mode, **options))
         self.session = self.talk.session
-        self.drive = ServoDrive(5, {**OBJECTS, **(objects or {})})
+        self.drive = make(5, {**OBJECTS, **(objects or {})})
         self.now = 10.0
         self.beat_at = 10.05
         self.log: list[tuple[float, str]] = []

@@ -1,0 +1,56 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Whether the objects exist that PDOs are to carry.
+
+Some stacks acknowledge the mapping of an object that they lack, and read it back: what is sent by
+it has no effect then (Lely core 2.4.0, CanFestival 3). So each object is read before anything is
+mapped. Only the drive's own word counts: that it has none (06020000h, 06090011h), or, of a drive
+that tells the size of its status word as it is, another size than the profile has.
+"""
+
+from collections.abc import Generator, Iterable
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.messages import Sentence, together
+from drive_can_bridge.protocols.canopen import sdo
+from drive_can_bridge.protocols.cia402 import pdo
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects
+from drive_can_bridge.protocols.cia402.pdo import Pdo
+
+
+def named(parameter: Parameter) -> str:
+    """Return name and object of a parameter: ``torque_limit (6072h.00h)``."""
+    return f'{parameter.name} ({at_object(parameter.index or 0, parameter.subindex or 0)})'
+
+
+def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: Reply,
+                ) -> Generator[Ask, Reply, dict[Parameter, int]]:
+    """
+    Read all that PDOs are to carry.
+
+    :param status: how the drive answers the read of its status word.
+    :return: what was read, as words.
+    :raises End: nobody answers, or something does not exist.
+    """
+    wanted = {(each.index or 0, each.subindex or 0): each for one in pdos
+              for each in one.parameters}
+    tells_size = status.sized and status.data is not None and len(status.data) == 2
+    found: dict[Parameter, int] = {}
+    missing: list[Sentence] = []
+    for place, parameter in wanted.items():
+        reply = yield from objects.transfer(Ask(*place))
+        length = pdo.width(parameter)
+        if reply.abort in sdo.ABSENT:
+            missing.append(sentences.of_object(named(parameter), sentences.no_such_object()))
+        elif reply.data is None:
+            continue
+        elif tells_size and reply.sized and len(reply.data) != length:
+            missing.append(sentences.of_object(named(parameter), sentences.other_length(
+                len(reply.data), parameter.type.value)))
+        else:
+            found[parameter] = int.from_bytes(reply.data[:length], 'little')
+    if missing:
+        raise differs(together(missing))
+    return found

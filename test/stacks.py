@@ -1,0 +1,112 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+CiA 402 drives as real CANopen stacks and devices behave, on the literal drive of literal_drives.
+
+Each says what showed it. What they have in common stands in :class:`ServoDrive`.
+"""
+
+from literal_drives import ServoDrive
+
+NO_OBJECT, ACCESS = 0x06020000, 0x06010000
+
+
+class AcceptsAnything(ServoDrive):
+    """
+    Acknowledges the mapping of an object that it lacks, and reads it back; no effect.
+
+    Lely core 2.4.0 (620d185) in pre-operational with ros2_canopen's fake slave (6ada196), and
+    CanFestival 3 (12a05e4): neither looks at what is mapped.
+    """
+
+    def write(self, index: int, subindex: int, content: bytes) -> None:
+        if (index, subindex) in self.objects or 0x1400 <= index < 0x1C00:
+            super().write(index, subindex, content)
+
+
+class DropsLimit(AcceptsAnything):
+    """
+    Has 6072h, maps it, and never takes what comes by PDO; SDO writes it.
+
+    What CanFestival 3 (12a05e4) makes of a PDO entry with another length than its object.
+    """
+
+    def _apply(self) -> None:
+        kept = self.objects.get((0x6072, 0))
+        super()._apply()
+        if kept is not None:
+            self.objects[0x6072, 0] = kept
+
+
+class ChecksMapping(ServoDrive):
+    """CANopenNode 4 (9b8beed): COB-ID invalid first, then the count 0; objects have to exist."""
+
+    def refusal(self, index: int, subindex: int, content: bytes) -> int:
+        first = next((each for each in (0x1600, 0x1A00) if each <= index < each + 4), None)
+        if first is not None:
+            if not self.number(index - 0x200, 1) & 0x80000000 or subindex and self.number(index):
+                return ACCESS
+            entry = int.from_bytes(content, 'little')
+            if subindex and entry and (entry >> 16, entry >> 8 & 0xFF) not in self.objects:
+                return NO_OBJECT
+        return super().refusal(index, subindex, content)
+
+
+class FourBytes(ServoDrive):
+    """
+    Answers every SDO read with four bytes (43h), whatever the size; users of several makers.
+
+    :ivar signed: what is filled up with its sign, as others do it; the rest with 00.
+    """
+
+    signed: frozenset[int] = frozenset()
+
+    def _sdo(self, data: bytes) -> bytes:
+        answer = super()._sdo(data)
+        if answer[0] & 0xE3 != 0x43:
+            return answer
+        content = answer[4:8 - (answer[0] >> 2 & 3)]
+        sign = content[-1] & 0x80 and int.from_bytes(answer[1:3], 'little') in self.signed
+        return b'\x43' + answer[1:4] + content.ljust(4, b'\xFF' if sign else b'\0')
+
+
+class ShortFrames(ServoDrive):
+    """Sends SDO frames that are as short as their content; reported of a stepper's firmware."""
+
+    def _sdo(self, data: bytes) -> bytes:
+        answer = super()._sdo(data)
+        if answer[0] == 0x60:
+            return answer[:4]
+        return answer[:8 - (answer[0] >> 2 & 3)] if answer[0] & 0xE3 == 0x43 else answer
+
+
+class SignedLengths(ServoDrive):
+    """Reads mapping lengths back with bit 7 set where the object is signed (users' reports)."""
+
+    SIGNED = (0x60FF, 0x607A, 0x6064, 0x606C, 0x6071, 0x6077)
+
+    def _sdo(self, data: bytes) -> bytes:
+        answer = super()._sdo(data)
+        index = int.from_bytes(answer[1:3], 'little')
+        if data[0] == 0x40 and answer[0] == 0x43 and answer[3] and (
+                0x1600 <= index < 0x1604 or 0x1A00 <= index < 0x1A04) and (
+                int.from_bytes(answer[6:8], 'little') in self.SIGNED):
+            return answer[:4] + bytes((answer[4] | 0x80,)) + answer[5:]
+        return answer
+
+
+class EightEntries(ServoDrive):
+    """The count of a mapping is 8 for ever; entries behind are 00000000h (Curtis, user report)."""
+
+    def _sdo(self, data: bytes) -> bytes:
+        index, subindex = int.from_bytes(data[1:3], 'little'), data[3]
+        if 0x1600 <= index < 0x1604 or 0x1A00 <= index < 0x1A04:
+            if not subindex and data[0] != 0x40:
+                return b'\x80' + data[1:4] + (0x06010002).to_bytes(4, 'little')
+            if not subindex:
+                return b'\x4F' + data[1:4] + b'\x08\0\0\0'
+        return super()._sdo(data)
+
+    def mapped(self, at: int) -> list[tuple[int, int, int]]:
+        entries = [self.objects.get((at, place), bytes(4)) for place in range(1, 9)]
+        return [(int.from_bytes(entry[2:], 'little'), entry[1], entry[0] // 8)
+                for entry in entries if any(entry)]
