@@ -109,6 +109,19 @@ joint_quantity_ignored = Text(
 joint_not_named = Text(
     'joint_command without an entry named {joint}',
     do='publish a JointState that has the joint')
+clock_of_publisher_set = Text(
+    '{topic}: the clock of its publisher was set back by {seconds:.2f} s; its setpoints are '
+    'disarmed, and commands count again from here',
+    do='arm it again; synchronise the clocks of the hosts')
+steadily_late = Text(
+    '{topic}: all that came for 10 s was {seconds:.2f} s later than others have (a clock was set, '
+    'a quicker publisher is gone, or the network stays slower); its setpoints are disarmed, and '
+    'commands count again from here',
+    do='arm it again; synchronise the clocks of the hosts, or see what slows the network down')
+clocks_differ = Text(
+    'command on {topic} thrown away: the clocks of its publishers differ by {seconds:.2f} s: '
+    'synchronise the clocks of the hosts',
+    do='synchronise the clocks of the hosts')
 
 # -- control: what became of enable, disable, quick stop and fault reset --------------------------
 no_control_section = Text(

@@ -99,9 +99,14 @@ class Setpoints:
         """Take a command that is too old to move anything: one that equals neutral disarms."""
         setpoint = self.items[index]
         if setpoint.armed and setpoint.armed_by(value):
-            before = setpoint.raw
-            setpoint.disarm()
-            self.changed |= setpoint.raw != before
+            self.disarm_one(index)
+
+    def disarm_one(self, index: int) -> None:
+        """Send neutral for one setpoint until it is armed again; a limit stays as it is."""
+        setpoint = self.items[index]
+        before = setpoint.raw
+        setpoint.disarm()
+        self.changed |= setpoint.raw != before
 
     def expire(self, now: float) -> list[Setpoint]:
         """

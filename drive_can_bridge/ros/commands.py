@@ -92,14 +92,16 @@ class CommandIntake:
                 name, kind = setpoint.parameter.name, setpoint.parameter.kind
                 self._topics.subscribe(TOPIC_TYPES[kind], f'~/command/{name}',
                                        partial(self._command, index),
-                                       partial(session.setpoints.old_command, index))
+                                       partial(session.setpoints.old_command, index),
+                                       partial(session.setpoints.disarm_one, index))
                 for quantity in QUANTITIES if joint is not None else ():
                     if joint is not None and getattr(joint, f'{quantity}_command') == name:
                         self._joint_targets[quantity] = _Target(
                             index, joint.factors[name], kind is ValueKind.INTEGER)
             if joint is not None:
                 self._topics.subscribe(JointState, '~/joint_command', self._take_joint,
-                                       self._take_old_joint, JointReader())
+                                       self._take_old_joint, self.disarm_joint,
+                                       JointReader())
         except BaseException:
             self.destroy()
             raise
@@ -178,6 +180,11 @@ class CommandIntake:
             if target is not None and entry < len(values) and values[entry] == values[entry]:
                 self._session.setpoints.old_command(
                     target.setpoint, _in_units(values[entry], target))
+
+    def disarm_joint(self) -> None:
+        """Disarm all that is commanded for the joint."""
+        for target in self._joint_targets.values():
+            self._session.setpoints.disarm_one(target.setpoint)
 
     def take_quantity(self, quantity: str, value: float, now: float) -> None:
         """Take a command for one quantity of the joint, in SI units; NaN leaves it alone."""

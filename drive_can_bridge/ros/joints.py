@@ -189,7 +189,8 @@ class Joints:
                 taker = _Taker(joints, known, warn, log.info)
             taken = PolledTopics(node, clock, warn, taker.refuse)
             self._taken.append(taken)
-            taken.subscribe(JointState, COMMANDS, taker, taker.take_old, JointReader())
+            taken.subscribe(JointState, COMMANDS, taker, taker.take_old, taker.disarm,
+                            JointReader())
             for drive in here:
                 drive.joint_commands = taken
         if configuration.joint_state_rate > 0.0:
@@ -269,6 +270,11 @@ class _Taker:
             for entry, name in enumerate(names):
                 if name in self._joints:
                     self._joints[name].commands.take_old(message, entry)
+
+    def disarm(self) -> None:
+        """Disarm all joints."""
+        for drive in self._joints.values():
+            drive.commands.disarm_joint()
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a message that is thrown away, for all that it might have moved."""

@@ -29,11 +29,11 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.command_age import Age, ALONE, CommandAges
+from drive_can_bridge.core.sentences import clock_of_publisher_set, clocks_differ, steadily_late
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.middleware import command_quality, GONE, overriding
 
-#: ns by which a command may take longer than the quickest of its topic
-LATENESS_MAX = 250_000_000
 #: messages that are taken at once where everything is kept, and that are thrown away at once: more
 #: than any middleware keeps (Fast DDS: 5000), since what is left would pass for fresh
 DEPTH_UNBOUNDED, KEPT_MAX = 1000, 100_000
@@ -43,12 +43,19 @@ LENGTH_MAX = 1 << 20
 HEADER = 4
 #: struct code of the one number of these messages
 _CODES = {Float64: 'd', Int64: 'q', Bool: '?'}
+#: what is thrown away
+_TOO_OLD = Age.LATE, Age.CLOCKS_DIFFER
 #: what bytes that nobody can read raise
 _UNREADABLE = RuntimeError, ValueError, struct.error
 #: s between two looks at who publishes
 COUNT_PERIOD = 0.05
 #: s between two looks at events of subscriptions
 EVENT_PERIOD = 1.0
+#: ns by which two clocks that are read one after the other may differ, and none was set
+JITTER = 1_000_000
+
+#: the steady time, and by how much the time of the day is ahead of it, in ns
+Look = tuple[int, int]
 
 
 class CommandTopic:
@@ -59,24 +66,19 @@ class CommandTopic:
     rclpy takes to make an object of it; and bytes that nobody can read are one more refused
     command, not an exception in the thread of the exchange.
 
-    How old a command is, its two time stamps say: what the publisher's clock showed when it was
-    published, and this machine's when it arrived. The clocks may differ; so what counts is by how
-    much the difference exceeds the smallest that was seen on the topic. A command that waited
-    somewhere (a process that stood still, a network that was away) is told from a fresh one by
-    that. It moves nothing, but one that equals neutral stops all the same: so a publisher whose
-    clock lags can.
+    A command that is too old (:mod:`drive_can_bridge.core.command_age`) moves nothing, but one
+    that equals neutral stops all the same: so a publisher whose clock is behind can.
 
     :param use: takes each message (of the types with one number: the number) and ``now``.
     :param old: takes each that is thrown away for its age, for what it may stop.
-    :param late: takes by how many s a command that is thrown away came too late.
+    :param aged: takes what its age says of each that is not simply fresh, and the figure in s.
     :param unreadable: takes why a message cannot be read.
-    :param stamp: this machine's time of the day, in ns.
     :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
     def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
-                 old: Callable[[Any], None], late: Callable[[float], None],
-                 unreadable: Callable[[str], None], stamp: Callable[[], int],
+                 old: Callable[[Any], None], aged: Callable[[Age, float], None],
+                 unreadable: Callable[[str], None],
                  read: Callable[[bytes], Any] | None = None) -> None:
         self.subscription = subscription
         self.handle: Any = subscription.handle
@@ -87,31 +89,40 @@ class CommandTopic:
         self._depth = (quality.depth if bounded else DEPTH_UNBOUNDED) or 1
         self._waiting_max = self._depth if bounded else KEPT_MAX
         self._use, self._old = use, old
-        self._stamp = stamp
-        self._late = late
+        self._aged = aged
         self._unreadable = unreadable
         code = _CODES.get(self._type)
         self._read = read or partial(deserialize_message, message_type=self._type)
         self._structs = [struct.Struct(order + code) for order in '><'] if code else []
-        self._quickest = math.inf
+        self._ages = CommandAges()
+        self.forget = self._ages.forget
 
-    def take(self, now: float) -> None:
+    def take(self, now: float, look: Look) -> None:
         """
         Hand over what waits, oldest first.
 
+        :param look: what the clocks show.
         :raises InvalidHandle: the node is being destroyed.
         """
-        take = self.handle.take_message
-        for _ in range(self._depth):
+        take, alone = self.handle.take_message, None
+        self._ages.look(*look)
+        for count in range(self._depth):
             taken = take(self._type, True)
             if taken is None:
                 return
             data, info = taken
-            lateness = self._lateness(info)
-            if lateness > LATENESS_MAX:
-                self._late(1e-9 * lateness)
-                self._take_old(data)
-                continue
+            publisher = _gid(info)
+            if publisher is None:
+                if count == 0 and self.handle.get_publisher_count() == 1:
+                    alone = ALONE
+                publisher = alone
+            age, seconds = self._ages.judge(
+                info['source_timestamp'], info['received_timestamp'], publisher)
+            if age is not Age.FRESH:
+                self._aged(age, seconds)
+                if age in _TOO_OLD:
+                    self._take_old(data)
+                    continue
             try:
                 message = self._decode(data)
             except _UNREADABLE as error:
@@ -119,8 +130,9 @@ class CommandTopic:
                 continue
             self._use(message, now)
 
-    def discard(self) -> int:
+    def discard(self, look: Look) -> int:
         """Throw away what waits, but for what it may stop; return how many commands that were."""
+        self._ages.look(*look)
         for count in range(self._waiting_max):
             taken = self.handle.take_message(self._type, True)
             if taken is None:
@@ -132,20 +144,6 @@ class CommandTopic:
         with suppress(*_UNREADABLE):
             self._old(self._decode(data))
 
-    def forget(self) -> None:
-        """Record that nobody publishes here any more: the next one has a clock of its own."""
-        self._quickest = math.inf
-
-    def _lateness(self, info: dict[str, Any]) -> float:
-        """Return how much longer than the quickest a message took, in ns."""
-        source = info['source_timestamp']
-        if not source:  # this middleware does not tell
-            return 0.0
-        age = (info['received_timestamp'] or self._stamp()) - source
-        if age < self._quickest:
-            self._quickest = age
-        return float(age - self._quickest)
-
     def _decode(self, data: bytes) -> Any:
         if self._structs and len(data) >= HEADER:
             code = self._structs[data[1] & 1]       # the lowest bit says: low byte first
@@ -155,6 +153,13 @@ class CommandTopic:
             raise ValueError(f'{len(data)} bytes, at most {LENGTH_MAX} are looked at')
         message = self._read(data)
         return message.data if self._structs else message
+
+
+def _gid(info: dict[str, Any]) -> bytes | None:
+    """Return who published a message; None: this rclpy or middleware does not tell."""
+    gid = info.get('publisher_gid')
+    data = bytes(gid['data'] if isinstance(gid, dict) else gid or b'')
+    return data if any(data) else None
 
 
 class PolledGroup(CallbackGroup):
@@ -221,15 +226,18 @@ class PolledTopics:
         self._count_at = -math.inf
         self._events: list[PolledEvent] = []
         self._look_at = -math.inf
+        self._ahead = self._compare_clocks()[1]
 
     def subscribe(self, message_type: type, topic: str,
                   take: Callable[[Any, float], None], old: Callable[[Any], None],
+                  disarm: Callable[[], None],
                   read: Callable[[bytes], Any] | None = None) -> None:
         """
         Add a topic.
 
         :param take: gets each message (or its number) and ``now``.
         :param old: gets each that is thrown away for its age, for what it may stop.
+        :param disarm: disarms what the topic commands.
         :param read: makes of the bytes what ``take`` gets; None: the message.
         """
         node = self._node
@@ -247,27 +255,34 @@ class PolledTopics:
             subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
             incompatible))
 
-        def late(seconds: float) -> None:
-            self._refuse(f'late {name}', f'command on {name} thrown away: it came {seconds:.2f} s '
-                         f'later than others have')
+        def aged(age: Age, seconds: float) -> None:
+            if age is Age.LATE:
+                self._refuse(f'late {name}', f'command on {name} thrown away: it came '
+                             f'{seconds:.2f} s later than others have')
+            elif age is Age.CLOCKS_DIFFER:
+                self._refuse(f'clocks {name}', clocks_differ(name, seconds))
+            else:
+                disarm()
+                said = clock_of_publisher_set if age is Age.CLOCK_SET else steadily_late
+                self._warn(f'begins again {name}', said(name, seconds))
 
         def unreadable(reason: str) -> None:
             self._refuse(f'unreadable {name}',
                          f'command on {name} cannot be read: {printable(reason)}')
-        self._topics.append(CommandTopic(subscription, use=take, old=old, late=late,
-                                         unreadable=unreadable, stamp=self._clock.stamp,
-                                         read=read))
+        self._topics.append(CommandTopic(subscription, use=take, old=old, aged=aged,
+                                         unreadable=unreadable, read=read))
 
     def take(self, now: float) -> None:
         """Hand over all that waits, oldest first."""
+        look = self._look()
         try:
             if now < self._count_at:
                 for topic in self._published:
-                    topic.take(now)
+                    topic.take(now, look)
                 return
             self._count_at = now + COUNT_PERIOD
             for topic in self._topics:  # some may have come from a publisher that is gone by now
-                topic.take(now)
+                topic.take(now, look)
             self._published = [topic for topic in self._topics
                                if topic.handle.get_publisher_count()]
             for topic in self._topics:
@@ -282,10 +297,24 @@ class PolledTopics:
 
     def discard(self) -> int:
         """Throw away what is waiting; return how many commands that were."""
+        look = self._look()
         try:
-            return sum(topic.discard() for topic in self._topics)
+            return sum(topic.discard(look) for topic in self._topics)
         except GONE:  # the node is being destroyed
             return 0
+
+    def _look(self) -> Look:
+        """Return what the clocks show; what they differ by is as before, unless one was set."""
+        look = self._compare_clocks()
+        if abs(look[1] - self._ahead) > JITTER:
+            look = self._compare_clocks()   # this thread may only have had to wait in between
+            if abs(look[1] - self._ahead) > JITTER:
+                self._ahead = look[1]
+        return look[0], self._ahead
+
+    def _compare_clocks(self) -> Look:
+        now = round(1e9 * self._clock.now())
+        return now, self._clock.stamp() - now
 
     def destroy(self) -> None:
         """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""

@@ -441,6 +441,7 @@ class Publisher(TopicEnd):
 
     def __init__(self, node: Node, kind: Any, name: str, quality: Any) -> None:
         super().__init__(node, kind, name, quality)
+        self.behind = 0     # ns, of the clock of its host
         self.kept: deque[tuple[bytes, int, int]] = deque(maxlen=self.depth())
         self._number = itertools.count(1)
         for each in self.peers(self.graph.subscriptions):
@@ -453,7 +454,7 @@ class Publisher(TopicEnd):
     def publish_raw(self, data: bytes) -> None:
         """Publish the bytes of a message."""
         self.check()
-        sample = bytes(data), self.graph.stamp(), next(self._number)
+        sample = bytes(data), self.graph.stamp() - self.behind, next(self._number)
         if self.latched:
             self.kept.append(sample)
         for each in self.peers(self.graph.subscriptions):

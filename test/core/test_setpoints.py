@@ -88,6 +88,21 @@ def test_an_axis_stays_what_was_sent_last() -> None:
     assert not made.items[0].armed
 
 
+def test_a_topic_that_begins_again_disarms_its_setpoint_and_no_limit() -> None:
+    made = Setpoints((SPEED, LIMIT, parameter('torque', 4, type=INT16, limit=True)), timeout=0.5,
+                     rearm_immediate=True)
+    made.allow(True)
+    for index in range(3):
+        made.command(index, 5.0, 1.0)
+    made.changed = False
+    made.disarm_one(2)
+    assert not made.changed
+    made.disarm_one(0)
+    assert made.changed
+    assert [item.armed for item in made.items] == [False, True, True]
+    assert [item.raw for item in made.items] == [0, 50, 5]
+
+
 def test_refused_values_are_refused_even_while_closed() -> None:
     made = setpoints(enabled=False)
     with pytest.raises(ValueRefused):

@@ -10,8 +10,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
-from waiting import clock
 
+from drive_can_bridge.core.command_age import Age
 from drive_can_bridge.ros.polled_topics import CommandTopic
 
 MS = 1_000_000
@@ -26,6 +26,10 @@ class Subscription:
         self.handle = self
         self.waiting: deque[tuple[bytes, dict[str, Any]]] = deque()
         self.endless = False
+        self.publishers = 1
+
+    def get_publisher_count(self) -> int:
+        return self.publishers
 
     def put(self, data: bytes, source: int = 0, received: int = 0) -> None:
         self.waiting.append((data, {'source_timestamp': source, 'received_timestamp': received}))
@@ -45,11 +49,21 @@ class Taken:
         self.used: list[Any] = []
         self.old: list[Any] = []
         self.late: list[float] = []
+        self.begun: list[Age] = []
         self.unreadable: list[str] = []
         self.topic = CommandTopic(
             self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
-            old=self.old.append, late=self.late.append, unreadable=self.unreadable.append,
-            stamp=clock().stamp)
+            old=self.old.append, aged=self._aged, unreadable=self.unreadable.append)
+
+    def _aged(self, age: Age, seconds: float) -> None:
+        if age in (Age.LATE, Age.CLOCKS_DIFFER):
+            self.late.append(seconds)
+        else:
+            self.begun.append(age)
+
+    def take(self, now: int = 20_000_000 * MS) -> None:
+        """Take what waits; the time of the day shows what the steady clock does."""
+        self.topic.take(1e-9 * now, (now, 0))
 
 
 @pytest.mark.parametrize('message', [
@@ -58,7 +72,7 @@ class Taken:
 def test_as_the_middleware_writes_it(message: Any) -> None:
     taken = Taken(type(message))
     taken.subscription.put(serialize_message(message))
-    taken.topic.take(1.0)
+    taken.take()
     assert taken.used == [message.data] and type(taken.used[0]) is type(message.data)
 
 
@@ -71,7 +85,7 @@ def test_as_the_middleware_writes_it(message: Any) -> None:
 def test_as_others_write_it(kind: Any, data: str, value: Any) -> None:
     taken = Taken(kind)
     taken.subscription.put(bytes.fromhex(data))
-    taken.topic.take(1.0)
+    taken.take()
     assert taken.used == [value] and not taken.unreadable
 
 
@@ -82,7 +96,7 @@ def test_rubbish_is_no_exception(kind: Any, data: bytes) -> None:
     taken = Taken(kind)
     taken.subscription.put(data)
     taken.subscription.put(serialize_message(kind()))
-    taken.topic.take(1.0)
+    taken.take()
     assert len(taken.used) + len(taken.unreadable) == 2
     assert taken.used
 
@@ -91,7 +105,7 @@ def test_a_joint_state_is_an_object() -> None:
     taken = Taken(JointState)
     message = JointState(name=['belt'], velocity=[1.0])
     taken.subscription.put(serialize_message(message))
-    taken.topic.take(1.0)
+    taken.take()
     assert taken.used == [message]
 
 
@@ -105,7 +119,7 @@ def test_age(skew: int) -> None:
         taken.used.clear()
         taken.late.clear()
         taken.subscription.put(data, 10_000_000 * MS, 10_000_000 * MS + skew + age * MS)
-        taken.topic.take(1.0)
+        taken.take()
         return len(taken.used), taken.late
     assert came(50) == (1, [])
     assert came(300) == (1, [])
@@ -120,12 +134,13 @@ def test_age(skew: int) -> None:
 
 def test_of_two_commanders_the_one_whose_clock_is_behind_can_only_stop() -> None:
     taken = Taken(Float64)
+    taken.subscription.publishers = 2
     now = 10_000_000 * MS
 
     def sends(value: float, behind: int) -> tuple[list[float], list[float]]:
         now_used, now_old = len(taken.used), len(taken.old)
         taken.subscription.put(serialize_message(Float64(data=value)), now - behind * MS, now)
-        taken.topic.take(1.0)
+        taken.take()
         return taken.used[now_used:], taken.old[now_old:]
     assert sends(1.0, 0) == ([1.0], [])
     # a laptop whose clock lags moves nothing; what is neutral disarms all the same
@@ -144,11 +159,11 @@ def test_what_is_thrown_away_may_still_stop() -> None:
     taken.subscription.put(serialize_message(Float64(data=1.0)), 10_000 * MS, 10_000 * MS)
     taken.subscription.put(serialize_message(Float64(data=2.0)), 10_000 * MS, 10_300 * MS)
     taken.subscription.put(b'', 10_000 * MS, 10_300 * MS)
-    taken.topic.take(1.0)
+    taken.take()
     assert (taken.used, taken.old, len(taken.late), taken.unreadable) == ([1.0], [2.0], 2, [])
     taken.subscription.put(serialize_message(Float64(data=3.0)))
     taken.subscription.put(b'')
-    assert taken.topic.discard() == 2
+    assert taken.topic.discard((20_000_000 * MS, 0)) == 2
     assert (taken.used, taken.old, taken.unreadable) == ([1.0], [2.0, 3.0], [])
 
 
@@ -156,7 +171,7 @@ def test_a_middleware_without_time_stamps() -> None:
     taken = Taken(Bool)
     for _ in range(3):
         taken.subscription.put(serialize_message(Bool(data=True)), 0, 0)
-    taken.topic.take(1.0)
+    taken.take()
     assert taken.used == [True] * 3
 
 
@@ -166,20 +181,19 @@ def test_where_everything_is_kept_everything_is_thrown_away() -> None:
     taken.subscription.qos_profile = QoSProfile(history=HistoryPolicy.KEEP_ALL)
     topic = CommandTopic(
         taken.subscription, use=lambda message, _: taken.used.append(message),  # type: ignore
-        old=taken.old.append, late=taken.late.append, unreadable=taken.unreadable.append,
-        stamp=clock().stamp)
+        old=taken.old.append, aged=taken._aged, unreadable=taken.unreadable.append)
     for value in range(2500):
         taken.subscription.put(serialize_message(Float64(data=float(value))))
-    assert topic.discard() == 2500
-    topic.take(1.0)
+    assert topic.discard((20_000_000 * MS, 0)) == 2500
+    topic.take(1.0, (20_000_000 * MS, 0))
     assert not taken.used and len(taken.old) == 2500
 
 
 def test_a_flood_is_taken_in_bounds() -> None:
     taken = Taken(Float64, depth=5)
     taken.subscription.endless = True
-    taken.topic.take(1.0)
+    taken.take()
     assert len(taken.used) == 5
-    assert taken.topic.discard() == 5
+    assert taken.topic.discard((20_000_000 * MS, 0)) == 5
     taken.subscription.endless = False
-    assert taken.topic.discard() == 0
+    assert taken.topic.discard((20_000_000 * MS, 0)) == 0

@@ -195,20 +195,103 @@ def test_another_publisher_has_another_clock(bridge: StartBridge, client: Client
     """How quick the last one was says nothing about who comes when it has gone."""
     one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
     one.online()
-    topic, = one.node.drives['conveyor'].commands._topics._topics[:1]
     with one.record() as recorder:
-        first = client.node.create_publisher(Float64, SPEED, 1)
-        wait_until(lambda: first.publish(Float64(data=0.0)) or math.isfinite(topic._quickest))
-        topic._quickest -= 10_000_000_000       # as if its clock had been 10 s ahead of ours
+        quick, slow = (client.node.create_publisher(Float64, SPEED, 1) for _ in range(2))
+        slow.handle.behind = 10_000_000_000
+        wait_until(lambda: quick.publish(Float64(data=0.0)) or not waiting_setpoints(one))
         before = refused(one)
-        wait_until(lambda: first.publish(Float64(data=0.0)) or refused(one) > before)
+        wait_until(lambda: slow.publish(Float64(data=0.0)) or refused(one) > before)
         client.wait_logged(f'conveyor: command on {SPEED} thrown away: it came 10')
-        client.node.destroy_publisher(first)
-        wait_until(lambda: topic.handle.get_publisher_count() == 0)
+        for publisher in (quick, slow):
+            client.node.destroy_publisher(publisher)
+        wait_until(lambda: client.node.count_publishers(SPEED) == 0)
         cycles_pass(one)        # it is looked up every 0.05 s
+        client.publisher(SPEED, Float64).handle.behind = 20_000_000_000
         before = refused(one)
         arm(client, recorder)
     assert refused(one) == before
+
+
+def waiting_setpoints(one: Bridge) -> list[str]:
+    """Return which setpoints of the conveyor are not armed."""
+    setpoints = one.node.drives['conveyor'].session.setpoints
+    return [setpoint.parameter.name for setpoint in setpoints.waiting]
+
+
+JOINT = {'name': 'belt', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint'}
+
+
+@pytest.mark.parametrize('topic', [SPEED, '/conveyor/joint_command',
+                                   '/drive_can_bridge/joint_commands'])
+def test_a_publisher_whose_clock_is_set_back_arms_again(bridge: StartBridge, client: Client,
+                                                        topic: str) -> None:
+    """What its topic commands is disarmed, nothing else is; and it counts again from there."""
+    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT}))
+    one.online()
+    client.listen()
+
+    def send(speed: float) -> None:
+        client.publish(topic, Float64(data=speed) if topic == SPEED else JointState(
+            name=['belt'], velocity=[speed * 2 * math.pi / 60]))
+    with one.record() as recorder:
+        client.publish('/conveyor/command/torque_limit', Float64(data=0.0))
+        send(0.0)
+        send(100.0)
+        until_sent(recorder, 0, 1000)
+        wait_until(lambda: not waiting_setpoints(one))
+        client.publisher(topic, Float64).handle.behind = 3_600_000_000_000
+        send(100.0)
+        until_sent(recorder, 0, 0)
+        client.wait_logged(f'{topic}: the clock of its publisher was set back by ')
+        assert waiting_setpoints(one) == ['speed_setpoint']
+        send(100.0)
+        cycles_pass(one)
+        assert recorder.words()[0] == 0
+        send(0.0)
+        send(200.0)
+        until_sent(recorder, 0, 2000)
+        assert not refused(one)
+
+
+def test_a_publisher_that_is_steadily_late_is_obeyed_after_10_s(bridge: StartBridge,
+                                                                client: Client) -> None:
+    """Its clock was set back by less than what lies between two of its commands."""
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
+    one.online()
+    client.listen()
+    with one.record() as recorder:
+        arm(client, recorder)
+        client.publisher(SPEED, Float64).handle.behind = 1_000_000_000
+        pause(2.0)
+        for _ in range(8):
+            client.publish(SPEED, Float64(data=200.0))
+            pause(1.6)
+        client.wait_logged(f'{SPEED}: all that came for 10 s was 1.00 s later')
+        until_sent(recorder, 0, 0)
+        assert refused(one) == 7
+        arm(client, recorder, 300.0)
+    assert refused(one) == 7
+
+
+def test_of_two_publishers_the_one_behind_can_only_stop(bridge: StartBridge,
+                                                        client: Client) -> None:
+    one = bridge(parameters(conveyor={**CONVEYOR, 'cyclic_request': ['speed_setpoint']}))
+    one.online()
+    client.listen()
+    with one.record() as recorder:
+        arm(client, recorder)
+        behind = client.node.create_publisher(Float64, SPEED, 1)
+        behind.handle.behind = 400_000_000
+        for count in range(1, 4):
+            behind.publish(Float64(data=200.0))
+            wait_until(lambda count=count: refused(one) == count)
+            client.publish(SPEED, Float64(data=100.0))
+            cycles_pass(one)
+        client.wait_logged('the clocks of its publishers differ by 0.40 s: '
+                           'synchronise the clocks of the hosts')
+        assert recorder.words()[0] == 1000
+        behind.publish(Float64(data=0.0))
+        until_sent(recorder, 0, 0)
 
 
 def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
