@@ -2,7 +2,8 @@
 
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+# makes the environment, and names its folder
+SETUP = .ci/setup '$(PYTHON)' '$(VENV)'
 
 # Nothing that runs from here leaves this machine, unless you say otherwise.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
@@ -20,35 +21,34 @@ help:
 	@echo 'make bench   measurements; ARGS="..." goes to bench/run.py'
 	@echo 'make pictures  those of README and docs, from a demo that runs'
 	@echo 'make lint    style and types'
-	@echo 'make setup   only the virtual environment that all of them use, in $(VENV); the demo makes half'
-	@echo 'make clean   removes it and everything else that was built'
+	@echo 'make setup   only the virtual environment that all of them use, in $(VENV) or beside it; the demo'
+	@echo '             makes half of it. What you add to it stays.'
+	@echo 'make clean   removes it, if nothing runs from it, and everything else that was built'
 	@echo
 	@echo 'With ROS 2 Jazzy sourced, that one is used; otherwise it comes as wheels (Linux on x86-64).'
 	@echo 'PYTHON=... says which Python, 3.10 to 3.13.'
 
 setup:
-	@.ci/setup '$(PYTHON)' '$(VENV)'
+	@$(SETUP) >/dev/null
 
 # Ctrl-C ends the demo, which ends well, and so does make.
 demo:
-	@.ci/setup '$(PYTHON)' '$(VENV)' demo
-	@exec $(BIN)/python .ci/foreground $(BIN)/drive_can demo $(ARGS)
+	@venv=$$($(SETUP) demo) && exec $$venv/bin/python .ci/foreground $$venv/bin/drive_can demo $(ARGS)
 
 test:
 	@.ci/test '$(PYTHON)' '$(VENV)' $(ARGS)
 
-check-stops: setup
-	@exec $(BIN)/python .ci/foreground $(BIN)/python test/stop_checker.py $(ARGS)
+check-stops:
+	@venv=$$($(SETUP)) && exec $$venv/bin/python .ci/foreground $$venv/bin/python test/stop_checker.py $(ARGS)
 
-bench: setup
-	@exec $(BIN)/python .ci/foreground $(BIN)/python bench/run.py $(ARGS)
+bench:
+	@venv=$$($(SETUP)) && exec $$venv/bin/python .ci/foreground $$venv/bin/python bench/run.py $(ARGS)
 
-pictures: setup
-	@exec $(BIN)/python docs/pictures.py $(ARGS)
+pictures:
+	@venv=$$($(SETUP)) && exec $$venv/bin/python docs/pictures.py $(ARGS)
 
-lint: setup
-	@.ci/lint '$(VENV)'
+lint:
+	@venv=$$($(SETUP)) && exec .ci/lint "$$venv"
 
 clean:
-	rm -rf $(VENV) build install log dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
-	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	@.ci/clean '$(VENV)'
