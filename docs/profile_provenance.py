@@ -15,7 +15,7 @@ from drive_can_bridge.resources import profiles_directory, share_directory
 
 PAGE = 'profile_trust.md'
 #: how the entries of each kind are headed, in the order of the page
-TITLES: dict[bool | None, str] = {True: 'Verified; open', False: 'Not verified; open',
+TITLES: dict[bool | None, str] = {True: 'Verified; open', False: 'Unverified; open',
                                 None: 'Not judged; open'}
 #: names that are numbered on, without addresses
 _RUN = re.compile(r'`([a-z_0-9]+)_(\d+)`(?:, `\1_\d+`)+, `\1_(\d+)`')
@@ -23,9 +23,10 @@ _RUN = re.compile(r'`([a-z_0-9]+)_(\d+)`(?:, `\1_\d+`)+, `\1_(\d+)`')
 _HEAD = """\
 # How far the shipped profiles can be trusted
 
-What of each entry nothing backs, and in brackets which documents back the rest (of each entry by
-itself they stand in the profile). *Verified*: address, type, scale and unit are backed. None has
-been compared with a device.
+What of each entry is open, because no document backs it, and in brackets which documents back the
+rest (of each entry by itself they stand in the profile). *Verified*: documents back address, type,
+scale and unit. *Unverified*: look up in the drive's manual what is open before you rely on it. No
+profile has been compared with a device.
 
 Made by `docs/profile_provenance.py`; edit the profiles ([keys](profiles.md)).
 """
@@ -54,8 +55,9 @@ def _section(checked: Checked) -> Iterator[str]:
             yield ''
             for still_open, (names, sources) in groups.items():
                 named = _RUN.sub(r'`\1_\2` to `\1_\3`', ', '.join(names))
-                yield f'* {named}: {still_open} ({", ".join(sources)})' \
-                    if still_open else f'* {named}: nothing'
+                backed_by = ', '.join(sources) or 'no document'
+                yield f'* {named}: {still_open} ({backed_by})' if still_open \
+                    else f'* {named}: nothing'
             yield ''
     yield '### Sources'
     yield ''
@@ -76,8 +78,8 @@ def _groups(checked: Checked, verified: bool | None) -> dict[str, tuple[list[str
             f' {parameter.address}')
         names.append(f'`{name}`{address}')
         # which of them backs what stands in the profile, in brackets
-        sources += [each for each in re.sub(r' \([^)]*\)', '', entry.get('source', '')).split(', ')
-                    if each not in sources]
+        backed_by = re.sub(r' \([^)]*\)', '', entry.get('source', ''))
+        sources += [each for each in backed_by.split(', ') if each and each not in sources]
     return groups
 
 
