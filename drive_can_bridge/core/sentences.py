@@ -489,8 +489,16 @@ nothing_stops = Text(
     'nothing stops this drive when the bridge dies',
     do='see bridge_heartbeat; give the drive a watchdog of its own (1016h, 6007h)')
 watch_unknown = Text(
-    'whether anything stops this drive when the bridge dies is not known (mapping: assume)',
-    do='look at 1016h and 6007h of the drive')
+    'whether anything stops this drive when the bridge dies is not known ({why})',
+    do='look at 1016h and 6007h of the drive; try it, with the motor uncoupled')
+life_guarding = Text(
+    'life guarding (100Ch, 100Dh: {time} ms) is what stops this drive when the bridge dies; it '
+    'begins when a master guards the drive, which the bridge does not do',
+    do='try it, with the motor uncoupled; a heartbeat (1016h) needs no master that guards')
+pdo_time_out = Text(
+    'the time-out of its receive PDO ({what}: {time} ms) is what stops this drive when the bridge '
+    'dies',
+    do='try it, with the motor uncoupled; it has to be longer than period')
 watch_too_short = Text(
     '{what} watches the bridge for {limit} ms, less than two intervals of its heartbeat '
     '({interval:g} s)',

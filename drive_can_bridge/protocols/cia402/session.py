@@ -682,15 +682,21 @@ class Cia402Session(Session):
             self._node.ailing, self._node.missing, self._limits.otherwise))
 
     def facts(self) -> dict[str, str]:
-        return {**self._node.facts(), 'stops_by': stops_by(self._bring_up.options)}
+        return {**self._node.facts(), 'stops_by': stops_by(
+            self._bring_up.options, self._bring_up.watch.text)}
 
 
-def stops_by(options: dict[int, int]) -> str:
-    """Say what quick stop and disable do on a drive, by its 605Ah, 605Bh, 605Ch."""
+def stops_by(options: dict[int, int], bridge_lost: str) -> str:
+    """
+    Say what quick stop and disable do on a drive, by its 605Ah, 605Bh, 605Ch.
+
+    :param bridge_lost: what stops it when the bridge dies; '': not known yet.
+    """
     known = [(name, index, meanings) for name, index, meanings in _STOPS if index in options]
-    return '; '.join(
+    return '; '.join([
         f'{name}: {meanings.get(options[index], "as the manual says")} '
-        f'({index:04X}h = {options[index]})' for name, index, meanings in known) or 'not known'
+        f'({index:04X}h = {options[index]})' for name, index, meanings in known] + (
+            [f'bridge lost: {bridge_lost}'] if bridge_lost else [])) or 'not known'
 
 
 _HOW = {0: 'power off, it coasts', 1: 'slow-down ramp', 2: 'quick-stop ramp', 3: 'current limit',

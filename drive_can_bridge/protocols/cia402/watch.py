@@ -1,54 +1,112 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Who watches the bridge, so that the drive stops by itself when the bridge dies."""
+"""
+What stops the drive when the bridge dies.
+
+The drive watches the heartbeat of the bridge (1016h), and acts as its 6007h says. What it watches
+by itself is named: life guarding (100Ch, 100Dh), or how long a receive PDO may be missing (1400h
+sub-index 5). Without 6007h nobody knows what it does: there are stacks that report 8130h, and go
+on moving (Lely core 2.4.0).
+"""
 
 from collections.abc import Callable, Generator
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.messages import Sentence
-from drive_can_bridge.protocols.cia402 import states
+from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.protocols.canopen import sdo
+from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
+from drive_can_bridge.protocols.cia402.pdo import request_pdos
 
-CONSUMER = 0x1016
+CONSUMER, GUARD_TIME, LIFE_FACTOR = 0x1016, 0x100C, 0x100D
 #: the bridge's heartbeat may be late by so many intervals
 WATCH_INTERVALS = 3
+_ACTIONS = {0: 'nothing', 1: 'fault', 2: 'power off, it coasts', 3: 'quick stop'}
 
 
 class Watch:
     """
     What watches the bridge on behalf of one drive.
 
-    :param tell: tells people once what the drive lacks.
+    :param tell: tells people once what the drive lacks (``warning``), or has.
     :ivar slot: sub-index of 1016h by which the drive watches the bridge, written by us; None.
+    :ivar text: what stops the drive when the bridge dies, for diagnostics; '': not looked yet.
     """
 
     def __init__(self, objects: Objects, drive: DriveConfiguration,
-                 tell: Callable[[Sentence], None]) -> None:
+                 tell: Callable[..., None]) -> None:
         self.slot: int | None = None
+        self.text = ''
         self._objects, self._options, self._tell = objects, drive.options, tell
         self._attempts = drive.parameter_retries + 1
+        self._received = request_pdos(drive)
+        self._unsure = NOTHING      # why nobody knows whether the drive watches
 
     def set_up(self) -> Procedure:
         """Have the drive stop by itself when the bridge dies."""
         interval, mapping = self._options.bridge_heartbeat, self._options.mapping
+        self._unsure = NOTHING
         if mapping == 'assume':
-            self._tell(sentences.watch_unknown())
+            self._unknown('mapping: assume')
             return
         slot = None
         if interval > 0.0:
             slot = yield from (self._write_watch if mapping == 'configure' else
                                self._read_watch)(interval)
-        option = (yield from self._objects.read(states.ABORT_CONNECTION_OPTION, 0, 2)) \
-            if slot is not None else 0
-        if option == 0:
+        guarding, time_out = (yield from self._guarding()), (yield from self._time_out())
+        option = yield from self._objects.read(states.ABORT_CONNECTION_OPTION, 0, 2)
+        refused = self._refused(states.ABORT_CONNECTION_OPTION) if option is None else NOTHING
+        alone = [each for each in (guarding, time_out) if each]
+        for each in alone:
+            self._tell(each, warning=False)
+        if time_out or alone and option != 0:
+            self.text = '; '.join(alone)
+        elif slot is None and self._unsure:
+            self._unknown(self._unsure)
+        elif slot is None or option == 0:
+            self.text = 'nothing'
             self._tell(sentences.nothing_stops())
+        elif option is None:
+            self._unknown(refused or 'no 6007h')
+        else:
+            self.text = (f'{_ACTIONS.get(option, "as the manual says")} (6007h = {option}), by '
+                         f'{at_object(CONSUMER, slot)}')
+
+    def _unknown(self, why: str) -> None:
+        self.text = f'not known ({why})'
+        self._tell(sentences.watch_unknown(why))
+
+    def _refused(self, index: int, subindex: int = 0) -> Sentence:
+        """Say why the object that was read last is not known; '' if the drive has none."""
+        return NOTHING if self._objects.absent else sentences.object_refused(
+            at_object(index, subindex), sdo.describe(self._objects.abort or 0))
+
+    def _guarding(self) -> Generator[Ask, Reply, Sentence]:
+        """Name life guarding, if that is set."""
+        time = (yield from self._objects.read(GUARD_TIME, 0, 2)) or 0
+        factor = (yield from self._objects.read(LIFE_FACTOR, 0, 1)) or 0
+        return sentences.life_guarding(time * factor) if time * factor else NOTHING
+
+    def _time_out(self) -> Generator[Ask, Reply, Sentence]:
+        """Name the receive PDO that may be missing for a time only."""
+        for each in self._received:
+            time = yield from self._objects.read(each.communication, pdo.EVENT_TIMER, 2)
+            if time:
+                return sentences.pdo_time_out(
+                    at_object(each.communication, pdo.EVENT_TIMER), time)
+        return NOTHING
 
     def _watchers(self) -> Generator[Ask, Reply, list[int]]:
         count = yield from self._objects.read(CONSUMER, 0, 1)
+        if count is None:
+            self._unsure = self._refused(CONSUMER)
         found = []
         for subindex in range(1, (count or 0) + 1):
-            found.append((yield from self._objects.read(CONSUMER, subindex)) or 0)
+            entry = yield from self._objects.read(CONSUMER, subindex)
+            if entry is None:
+                self._unsure = self._unsure or self._refused(CONSUMER, subindex)
+            found.append(entry or 0)
         return found
 
     def _write_watch(self, interval: float) -> Generator[Ask, Reply, 'int | None']:
@@ -61,10 +119,16 @@ class Watch:
             return None
         limit = min(round(1000 * WATCH_INTERVALS * interval), 0xFFFF)
         before, self.slot = self.slot, slots[0]   # also where the end comes before the answer
-        refusal = yield from self._objects.put(CONSUMER, slots[0], node << 16 | limit, 4)
+        entry, wanted = entries[slots[0] - 1], node << 16 | limit
+        refusal = yield from self._objects.put(CONSUMER, slots[0], wanted, 4)
         if refusal:
             self.slot = before
             self._tell(refusal)
+            return slots[0] if entry >> 16 & 0x7F == node and entry & 0xFFFF else None
+        found = yield from self._objects.read(CONSUMER, slots[0])
+        if found not in (None, wanted):     # acknowledged, and not taken
+            self._tell(sentences.object_differs(
+                at_object(CONSUMER, slots[0]), f'{found:08X}h', f'{wanted:08X}h'))
             return None
         return self.slot
 

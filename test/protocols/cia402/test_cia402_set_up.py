@@ -359,9 +359,64 @@ class TestWatches:
         axis = meet(objects=objects)
         assert notes(axis).count(says('nothing_stops')) == 1
         assert axis.session.online
+        assert axis.session.facts()['stops_by'].endswith('bridge lost: nothing')
 
-    def test_no_6007h_counts_as_watching(self) -> None:
-        assert says('nothing_stops') not in notes(meet(lacks=(0x6007, 0)))
+    def test_no_1016h(self) -> None:
+        assert says('nothing_stops') in notes(meet(lacks=(0x1016, 0)))
+
+    def test_without_6007h_it_is_not_known(self) -> None:
+        """Lely core 2.4.0 has none: it reports 8130h, and goes on at 60 rpm."""
+        axis = meet(lacks=(0x6007, 0))
+        axis.live(3.0)
+        said = notes(axis)
+        assert said.count(says('watch_unknown', why='no 6007h')) == 1
+        assert says('nothing_stops') not in said
+        assert 'bridge lost: not known (no 6007h)' in axis.session.facts()['stops_by']
+
+    @pytest.mark.parametrize(('mapping', 'place'), [
+        ('configure', '076000'), ('configure', '161000'), ('verify', '161000'),
+        ('verify', '161001')])
+    def test_a_refusal_is_no_absence(self, mapping: str, place: str) -> None:
+        axis = Axis(objects=FITS, mapping=mapping)
+        axis.drive.instead = {f'40{place}': f'80{place}22000008'}
+        axis.start()
+        told = notes(axis)
+        assert says('nothing_stops') not in told and says('watch_unknown') in told
+
+    @pytest.mark.parametrize(('objects', 'what'), [
+        ({(0x100C, 0): b'\xF4\1', (0x100D, 0): b'\3'}, says('life_guarding', time=1500)),
+        ({(0x1400, 5): b'\x64\0'}, says('pdo_time_out', what='1400h.05h', time=100))])
+    @pytest.mark.parametrize('options', [{}, {'bridge_heartbeat': 0.0}])
+    def test_what_it_watches_by_itself_is_named(
+            self, objects: dict[Any, Any], what: says, options: dict[str, Any]) -> None:
+        axis = meet(objects=objects, **options)
+        told = axis.talk.events(Noted)
+        assert [note.text for note in told if not note.warning].count(what) == 1
+        assert not {'nothing_stops', 'watch_unknown'}.intersection(
+            note.text.code for note in told)
+        assert any(word in axis.session.facts()['stops_by'] for word in ('100Ch', '1400h.05h'))
+        assert not any(text.startswith(('0C10', '0D10', '001405')) for text in written(axis))
+
+    def test_guarding_stops_nothing_where_6007h_is_0(self) -> None:
+        axis = meet(objects={(0x100C, 0): b'\xF4\1', (0x100D, 0): b'\3', (0x6007, 0): bytes(2)})
+        assert says('nothing_stops') in notes(axis)
+
+    @pytest.mark.parametrize('objects', [
+        {(0x100C, 0): b'\xF4\1', (0x100D, 0): b'\0'}, {(0x1400, 5): bytes(2)}])
+    def test_what_is_off_is_not_named(self, objects: dict[Any, Any]) -> None:
+        assert says('nothing_stops') in notes(meet(objects=objects, bridge_heartbeat=0.0))
+
+    def test_an_entry_that_is_acknowledged_and_not_taken(self) -> None:
+        axis = Axis()
+        write = axis.drive.write
+        axis.drive.write = (    # type: ignore[method-assign]
+            lambda index, *rest: None if index == 0x1016 else write(index, *rest))
+        axis.start()
+        assert says('nothing_stops') in notes(axis)
+
+    def test_an_entry_of_ours_that_cannot_be_written_watches_all_the_same(self) -> None:
+        axis = meet(objects={(0x1016, 1): bytes.fromhex('F4017F00')}, refuses=fixed((0x1016, 1)))
+        assert says('nothing_stops') not in notes(axis)
 
     def test_off(self) -> None:
         axis = meet(bridge_heartbeat=0.0)
