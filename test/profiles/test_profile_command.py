@@ -124,7 +124,7 @@ class TestShow:
             'bits': {}, 'values': {}, 'word_order': None, 'protected': False,
             'description': 'Full load current in percent of the largest one of the controller; a '
                            'small contactor rating raises the minimum',
-            'source': 'installation_guide (unit, step, limits), memory (number)',
+            'source': 'installation_guide (unit, step, limits)',
             'verified': False, 'open': 'number'}
 
 
