@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 import math
+import sys
 from typing import Union
 
 from drive_can_bridge.core import sentences
@@ -28,6 +29,17 @@ Value = Union[float, int, bool]
 STEP_TOLERANCE = 1e-6
 # Beyond any integer type, and still an integer for floor().
 _STEPS_MAX = 1e18
+_NORMAL_MIN = sys.float_info.min
+
+
+def is_misplaced_integer(value: Value) -> bool:
+    """
+    Tell whether a double is so small that it is none: an integer was put into its field.
+
+    Message classes check no types, and so what stands in its place is taken: the size of the
+    integer. 300 arrives as 5e-324, from Python 3.12 on as 4e-323, and 0 as 5e-324.
+    """
+    return isinstance(value, float) and 0.0 < abs(value) < _NORMAL_MIN
 
 
 class ParameterType(Enum):
@@ -230,13 +242,13 @@ class Parameter:
         """
         Return the raw integer nearest to a physical value.
 
-        :raises ValueRefused: not finite, wrong type, outside ``minimum..maximum``, or outside
-            what the type can represent. Nothing is ever clamped.
+        :raises ValueRefused: not finite, subnormal, wrong type, outside ``minimum..maximum``, or
+            outside what the type can represent. Nothing is ever clamped.
         """
         # nearly all commands; the rest has reasons
         if type(value) is float and self.scaled:
             low, high = self._carried_limits
-            if low <= value <= high:
+            if low <= value <= high and not 0.0 < abs(value) < _NORMAL_MIN:
                 raw = math.floor((value - self.offset) / self.scale + 0.5)
                 least, most = self.raw_limits
                 if least <= raw <= most:
@@ -247,8 +259,13 @@ class Parameter:
             raise ValueRefused(sentences.not_a_bool(repr(value)))
         if isinstance(value, bool):
             raise ValueRefused(sentences.not_a_number(repr(value)))
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ValueRefused(sentences.not_finite(str(value)))
+        if isinstance(value, float):
+            if is_misplaced_integer(value):
+                raise ValueRefused(sentences.misplaced_integer(value))
+            if math.isnan(value):
+                raise ValueRefused(sentences.nan_refused())
+            if not math.isfinite(value):
+                raise ValueRefused(sentences.not_finite(str(value)))
         self.check_limits(value)
         if not self.scaled:
             if isinstance(value, float) and not value.is_integer():

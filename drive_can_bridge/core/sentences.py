@@ -78,6 +78,13 @@ wrong_type = Text('wrong type: {found}, expected {expected}', do='send a value o
 not_a_bool = Text('{value} is not a bool', do='send true or false')
 not_a_number = Text('{value} is a bool, not a number', do='send a number')
 not_finite = Text('{value} is not a finite number', do='look at whoever commands this')
+nan_refused = Text(
+    'nan is not a finite number (a negative integer in a float field may arrive so, too: write '
+    '300.0, not 300)',
+    do='look at whoever commands this')
+misplaced_integer = Text(
+    '{value} is what arrives when an integer was put into a float field: write 300.0, not 300',
+    do='have its publisher write floating-point numbers')
 not_an_integer = Text('{value} is not an integer', do='send a whole number')
 not_carried = Text(
     '{value} is not representable: {type_name} carries {allowed}',

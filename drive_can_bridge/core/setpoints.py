@@ -16,7 +16,7 @@ import math
 
 from drive_can_bridge.core.holding import HeldSetpoint, Limit, make_setpoint, Setpoint
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
-from drive_can_bridge.core.parameters import Parameter, Value
+from drive_can_bridge.core.parameters import is_misplaced_integer, Parameter, Value
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.sentences import position_not_told, would_jump
 
@@ -67,9 +67,12 @@ class Setpoints:
         Take a command for one setpoint. The newest one wins.
 
         :param active: the bridge is: a limit is taken, whatever the drive is doing.
-        :raises ValueRefused: the value cannot be sent. Nothing changes then, the age included.
+        :raises ValueRefused: the value cannot be sent. Nothing changes then, the age included; but
+            what may have been meant to be 0 disarms.
         """
         setpoint = self.items[index]
+        if is_misplaced_integer(value):
+            self.disarm_one(index)
         raw = setpoint.parameter.raw_from_value(value)
         if isinstance(setpoint, Limit) and active:
             self.changed |= setpoint.take(raw)
@@ -98,7 +101,7 @@ class Setpoints:
     def old_command(self, index: int, value: Value) -> None:
         """Take a command that is too old to move anything: one that equals neutral disarms."""
         setpoint = self.items[index]
-        if setpoint.armed and setpoint.armed_by(value):
+        if setpoint.armed and (setpoint.armed_by(value) or is_misplaced_integer(value)):
             self.disarm_one(index)
 
     def disarm_one(self, index: int) -> None:

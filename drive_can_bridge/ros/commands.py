@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Value, ValueKind
+from drive_can_bridge.core.parameters import is_misplaced_integer, Value, ValueKind
 from drive_can_bridge.core.sentences import joint_not_named, joint_quantity_ignored
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -213,5 +213,7 @@ class CommandIntake:
 
 def _in_units(value: float, target: _Target) -> Value:
     """Return a value in SI units in those of the setpoint."""
+    if is_misplaced_integer(value):     # it must not become a 0, which arms
+        return value
     physical = value / target.factor
     return round(physical) if target.integer and abs(physical) < 1e15 else physical

@@ -71,6 +71,51 @@ def test_a_command_that_is_too_old_can_only_stop(value: float, stops: bool) -> N
     assert len(made.expire(2.0)) == 2 - stops
 
 
+@pytest.mark.parametrize('value', [5e-324, -5e-324, 300 * 5e-324, 2.2e-308])
+def test_an_integer_in_a_float_field_is_refused_and_stops(value: float) -> None:
+    """It may have been the 0 that was to stop."""
+    limit = parameter('torque', 4, type=INT16, limit=True)
+    made = Setpoints((SPEED, LIMIT, limit), timeout=0.5, rearm_immediate=False)
+    made.allow(True)
+    with pytest.raises(ValueRefused, match=r'write 300\.0, not 300'):
+        made.command(0, value, 1.0)
+    assert not made.items[0].armed      # it equals neutral, and arms nothing
+    for index in (0, 1):
+        made.command(index, 0.0, 1.0)
+        made.command(index, 5.0, 1.0)
+    made.command(2, 7, 1.0)
+    made.changed = False
+    for index in (0, 2):
+        with pytest.raises(ValueRefused, match=r'write 300\.0, not 300'):
+            made.command(index, value, 1.1)
+    assert made.changed
+    assert [item.armed for item in made.items] == [False, True, True]
+    assert [item.raw for item in made.items] == [0, 50, 7]
+    made.old_command(1, value)          # one that is too late stops as well
+    assert [item.armed for item in made.items] == [False, False, True]
+
+
+def test_a_held_axis_stays_where_it_was_sent_by_an_integer_in_a_float_field() -> None:
+    position = parameter('position', 60, type=INT16, neutral_from='actual', arming_tolerance=2.0)
+    sent = LastSent([position])
+    made = Setpoints((position,), timeout=0.5, rearm_immediate=False,
+                     sample=(parameter('actual', 61, type=INT16),), sent=sent)
+    made.measure([100], driven=False)
+    made.allow(True)
+    made.command(0, 100, 1.0)
+    made.command(0, 130, 1.1)
+    sent.take([120])
+    with pytest.raises(ValueRefused):
+        made.command(0, 300 * 5e-324, 1.2)
+    assert (made.items[0].raw, made.items[0].armed) == (120, False)
+
+
+def test_a_negative_integer_in_a_float_field_is_nan() -> None:
+    made = setpoints()
+    with pytest.raises(ValueRefused, match=r'^nan is not a finite .* write 300\.0, not 300'):
+        made.command(0, math.nan, 1.0)
+
+
 def test_an_axis_stays_what_was_sent_last() -> None:
     position = parameter('position', 60, type=INT16, neutral_from='actual', arming_tolerance=2.0)
     actual = parameter('actual', 61, type=INT16)

@@ -294,6 +294,35 @@ def test_of_two_publishers_the_one_behind_can_only_stop(bridge: StartBridge,
         until_sent(recorder, 0, 0)
 
 
+def test_an_integer_in_a_float_field_stops_and_says_why(bridge: StartBridge,
+                                                        client: Client) -> None:
+    """Message classes check no types: what stands in its place arrives."""
+    one = bridge(parameters(conveyor={**CONVEYOR, 'joint': JOINT}))
+    one.online()
+    client.listen()
+    with one.record() as recorder:
+        arm(client, recorder)
+        client.publish(SPEED, Float64(data=300))
+        until_sent(recorder, 0, 0)
+        client.wait_logged('is what arrives when an integer was put into a float field: '
+                           'write 300.0, not 300')
+        assert refused(one) == 1
+        client.publish(SPEED, Float64(data=100.0))
+        cycles_pass(one)
+        assert recorder.words()[0] == 0
+        arm(client, recorder)
+        client.publish('/conveyor/joint_command', JointState(name=['belt'], velocity=[5e-324]))
+        until_sent(recorder, 0, 0)
+        assert refused(one) == 2
+        # one that is neutral in everything else arms nothing either
+        client.publish('/conveyor/joint_command', JointState(name=['belt'], velocity=[5e-324]))
+        client.publish(SPEED, Float64(data=100.0))
+        cycles_pass(one)
+        assert recorder.words()[0] == 0
+    assert client.set('/conveyor', ramp_time=5e-324) == [
+        (False, sentences.misplaced_integer(5e-324))]
+
+
 def test_incompatible_publishers_are_told_about(bridge: StartBridge, client: Client) -> None:
     content = parameters()
     content['qos_overrides'] = {SPEED: {'subscription': {'reliability': 'reliable'}}}

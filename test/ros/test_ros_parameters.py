@@ -42,7 +42,7 @@ def test_set_refusals(bridge: StartBridge, client: Client) -> None:
             (False, sentences.wrong_type('integer', 'bool')),
             (False, sentences.wrong_type('bool', 'double')),
             (False, sentences.out_of_range('3000.1', SPEED_RANGE)),
-            (False, sentences.not_finite('nan')),
+            (False, sentences.nan_refused()),
             (False, sentences.sent_cyclically('speed_setpoint')),
             (False, sentences.sent_cyclically('torque_limit')),
             (False, sentences.mapping_parameter()),
