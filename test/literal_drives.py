@@ -119,7 +119,9 @@ class ServoDrive:
 
     It changes its state by the control word at once, sees RPDOs of type 1 at SYNC, and is
     pre-operational when it is switched on. What it does not let others write is in ``fixed``.
+    Stopped by NMT, it hears no SDO and no PDO, and its motor goes on (CiA 301; all stacks).
 
+    :ivar now: s, of the frame that it takes, where the bench tells it.
     :ivar objects: (index, sub-index) -> content, low byte first.
     :ivar state: the bits of the status word that tell it.
     :ivar told: the control words that it was sent, in order, without repetitions.
@@ -129,7 +131,8 @@ class ServoDrive:
 
     def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
         self.node = node
-        self.operational = False
+        self.now = 0.0
+        self.operational = self.stopped = False
         self.state = self.OFF
         self.powered = True             # no safe torque off
         self.told: list[int] = []
@@ -159,13 +162,15 @@ class ServoDrive:
 
     def takes(self, sent: Frame) -> list[Frame]:
         identifier, data, _ = sent
-        if identifier == 0 and data[1] in (0, self.node):
-            self.operational = data[0] == 1
-        elif identifier == 0x80:
+        if identifier == 0:
+            return self.obeys(data[0]) if data[1] in (0, self.node) else []
+        if self.stopped:
+            return []
+        if identifier == 0x80:
             return self._sync()
-        elif identifier == 0x600 + self.node:
+        if identifier == 0x600 + self.node:
             return [] if data[0] == 0x80 else [Frame(0x580 + self.node, self._sdo(data), False)]
-        elif self.operational:
+        if self.operational:
             for pdo in range(4):
                 if self.number(0x1400 + pdo, 1) == identifier:
                     self._staged.append((pdo, data))
@@ -173,11 +178,28 @@ class ServoDrive:
                         self._apply()
         return []
 
+    def obeys(self, command: int) -> list[Frame]:
+        """Take an NMT command."""
+        if command in (0x81, 0x82):
+            return self.restarts()
+        self.operational, self.stopped = command == 0x01, command == 0x02
+        return []
+
+    def beats(self) -> Frame:
+        """Return its heartbeat."""
+        state = b'\x04' if self.stopped else b'\x05' if self.operational else b'\x7F'
+        return Frame(0x700 + self.node, state, False)
+
+    def passes(self, now: float) -> list[Frame]:
+        """Return what it says by itself now, but for heartbeats; to be called each millisecond."""
+        self.now = now
+        return []
+
     def restarts(self) -> list[Frame]:
         """Be switched off and on: disabled, and what was written of the PDOs is forgotten."""
         self.objects.update({place: content for place, content in self._initial.items()
                              if place[0] < 0x2000 or place[0] in (0x6060, 0x6061)})
-        self.operational = False
+        self.operational = self.stopped = False
         self.becomes(self.OFF)
         self._staged.clear()
         return [Frame(0x700 + self.node, b'\0', False)]

@@ -14,6 +14,8 @@ from their motors, by these rules:
 4. Nothing begins to run, or is given a setpoint, without an enable and a command of a user who
    meant it: later than the last loss, stall, stop, restart or end.
 5. A drive that runs when its bus is lost is said to run, perhaps.
+6. What can be talked to at the end has stopped then, in whatever state NMT has put its node; but
+   for PKW, where nothing is sent by NMT at the end: such a node hears nothing, and is named.
 
 Nothing in here asks a session what it owes, and no codec of the package is used.
 
@@ -261,7 +263,7 @@ KINDS: dict[str, Kind] = {
 #: what may happen, and how many s pass then
 THINGS = ('run', 'enable', 'zero', 'quiet', 'disable', 'quick_stop', 'silent', 'mute', 'late',
           'twice', 'well', 'power', 'stall', 'late process', 'bus down', 'bus up', 'refuses',
-          'maps', 'response map', 'maps right', 'end', 'begin')
+          'maps', 'response map', 'maps right', 'nmt stop', 'end', 'begin')
 PAUSES = (0.013, 0.9)
 Story = tuple[tuple[str, float], ...]
 
@@ -622,6 +624,12 @@ class World:
     def _refuses(self) -> None:
         self.refusing = True
 
+    def _nmt_stop(self) -> None:
+        """Have another master stop the nodes by NMT: they hear no PDO and no SDO, and run on."""
+        for partner in self.partners:
+            if isinstance(partner.device, (PkwNode, ServoDrive)):
+                partner.device.takes(Frame(0, bytes((2, partner.device.node)), False))
+
     def _maps(self) -> None:
         """Have somebody change the request map: what was the setpoint is nothing any more."""
         if self.kind.maps:
@@ -665,6 +673,12 @@ class World:
                 session.give_up(self.now)
         self.took()
         self.stop_is_honest('the end')
+        for partner in self.partners:
+            if partner.motor.runs and not partner.left_over and (
+                    self.reachable() and not self.twice and self.delay == PROMPT
+                    and getattr(partner.device, 'operational', True) | isinstance(
+                        partner.device, ServoDrive)):
+                raise Violation(f'the end: drive {partner.index + 1} runs, and would have heard')
 
     def _begin(self) -> None:
         if not self.active:

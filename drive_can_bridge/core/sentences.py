@@ -343,6 +343,10 @@ write_not_taken = Text('{what} not taken by the bus', do='look at cable, termina
 write_not_acknowledged = Text(
     '{what} not acknowledged in {attempts} attempts',
     do='see why the drive does not answer')
+node_may_be_stopped = Text(
+    'a node that NMT has stopped answers no SDO: only an NMT command (pre-operational, start) of '
+    'its own master helps',
+    do='have its NMT master send pre-operational or start, or cut its power')
 write_read_back = Text(
     '{what}: read back {found} instead of {wanted}',
     do='see who else writes it')

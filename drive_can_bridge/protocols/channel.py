@@ -141,7 +141,7 @@ class _Queue(Generic[StepT, ReplyT]):
         self.waiting: deque[tuple[Generator[StepT, ReplyT, Any], Done]] = deque()
         self.step: StepT | None = None
         self.attempts_left = 0
-        self.repeated = False  # nobody answered the attempt before
+        self.repeated = False  # nobody answered the same before
         self._running: tuple[Generator[StepT, ReplyT, Any], Done] | None = None
         self._transactor = transactor
 
@@ -165,6 +165,7 @@ class _Queue(Generic[StepT, ReplyT]):
             done(stop.value)
         else:
             self.step = step
+            self.repeated = self._transactor.again(step)
             self.attempts_left = self._transactor.attempts(step)
 
     @property

@@ -101,6 +101,10 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
         """Tell whether a reply says that nobody answered, and a late answer may come."""
 
+    def again(self, step: StepT) -> bool:
+        """Tell whether a step is the one before once more: what answers either answers both."""
+        return False
+
     def repeatable(self, step: StepT, *, users: bool) -> bool:
         """
         Tell whether a step that had to make room, or is not believed, is done once more.

@@ -14,6 +14,7 @@ from stop_checker import (
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.setpoints import Setpoint
 from drive_can_bridge.core.stop_duty import Do, StopDuty
+from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.safe_stop import SafeStop
@@ -25,8 +26,8 @@ BY_CHANCE = times(3, 20)
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_motor_runs_on(kind: str) -> None:
     everything = [*all_stories(1)]
-    assert len(everything) == 44
-    assert check(kind, some(everything, 6)) >= times(7, 44)
+    assert len(everything) == 46
+    assert check(kind, some(everything, 6)) >= times(7, 46)
     assert check(kind, islice(some_stories(1), BY_CHANCE)) == BY_CHANCE
 
 
@@ -57,6 +58,12 @@ def test_drive_that_is_silent_when_its_response_map_differs_is_named(kind: str, 
             ('response map', 0.1 * place), ('silent', 0.0), ('quick_stop', 0.9), (end, 0.0)))
 
 
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if 'CiA 402' in kind])
+@pytest.mark.parametrize('seconds', [0.0, 0.013, 0.2])
+def test_a_node_that_nmt_has_stopped_is_told_at_the_end(kind: str, seconds: float) -> None:
+    assert not broken(kind, (('nmt stop', seconds), ('end', 0.0)))
+
+
 def _nothing(*_: Any, **__: Any) -> None:
     pass
 
@@ -79,6 +86,8 @@ DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
     (ControlMachine, 'withdraw', _nothing, 'CANnord', (('silent', 0.9), ('well', 0.9))),
     (SetpointWriter, 'write_again', lambda self, since, now: False, '11 bit, no word',
      (('silent', 0.013), ('quick_stop', 0.11), ('well', 0.9))),
+    (SdoStop, '_may_be_stopped', lambda self, since: False, 'CiA 402',
+     (('nmt stop', 0.0), ('end', 0.0))),
     (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),
 ]
 

@@ -62,6 +62,7 @@ class Node:
     :ivar emergency: what it last said of its errors; None: nothing, or no error any more.
     :ivar free_at: when PDOs may be sent.
     :ivar heartbeat_lost: a heartbeat is overdue.
+    :ivar pdo_at: when it sent a PDO last, for who looks at them.
     """
 
     def __init__(self, number: int, *, heartbeat_timeout: float) -> None:
@@ -75,7 +76,8 @@ class Node:
         self.emergency: Emergency | None = None
         self.free_at = math.inf
         self.heartbeat_lost = False
-        self._heartbeat_at = -math.inf          # or the boot-up frame
+        self.pdo_at = -math.inf
+        self._heartbeat_at = self._said_at = -math.inf      # or the boot-up frame
         self._interval: float | None = None     # None: there was no heartbeat yet
         self._blocked_until = -math.inf         # a heartbeat is believed until then
 
@@ -95,7 +97,7 @@ class Node:
         """Take a boot-up frame or heartbeat."""
         was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
-        self._heartbeat_at = now
+        self._heartbeat_at = self._said_at = now
         if state is NmtState.BOOT_UP:
             self.state = NmtState.PRE_OPERATIONAL
             self.emergency = None
@@ -159,6 +161,11 @@ class Node:
         if not self._blocked(now) or self.state is None:
             return NOTHING
         return sentences.node_state(self.state.text)
+
+    def said(self, now: float) -> NmtState | None:
+        """Return the state that its last heartbeat says; None: there is none that is recent."""
+        recent = now - self._said_at <= (self.heartbeat_timeout or BELIEF_TIME)
+        return self.state if recent else None
 
     @property
     def ailing(self) -> Sentence:

@@ -35,6 +35,7 @@ class Ask:
     :param attempts: how often it is tried; None: a read as configured, a write once.
     :param timeout: s to wait for the answer; None: as configured.
     :param pause: s in which nothing is asked; then it is no transfer.
+    :param again: it is the one before once more, which nobody has answered.
     """
 
     index: int = 0
@@ -43,6 +44,7 @@ class Ask:
     attempts: int | None = None
     timeout: float | None = None
     pause: float = 0.0
+    again: bool = False
 
 
 class Reply(NamedTuple):
@@ -197,6 +199,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
 
     def unanswered(self, step: Ask, reply: Reply) -> bool:
         return reply is SILENT
+
+    def again(self, step: Ask) -> bool:
+        return step.again
 
     def repeatable(self, step: Ask, *, users: bool) -> bool:
         return not users or step.data is None

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Parameters of users by SDO, and the stop.
+Parameters of users by SDO.
 
 Every generator here is for :class:`.channel.SdoChannel`. What is written goes to the drive's RAM;
 it is acknowledged, and not read back. No parameter has more than four bytes, so that no download
@@ -19,7 +19,6 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.pdo import is_map, width
-from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
 NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
@@ -117,28 +116,3 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
 def _own_width(parameter: Parameter) -> bool:
     """Tell whether a profile says how wide a parameter is; the drive knows for raw names."""
     return parameter.listed
-
-
-StopProcedure = Generator[Ask, Reply, list[Sentence]]
-
-
-def write_until_answered(writes: Sequence[StopWrite], timeout: float) -> StopProcedure:
-    """
-    Tell a drive to stand still, each thing until it is acknowledged or was tried three times.
-
-    :param timeout: s for each attempt.
-    :return: what failed, in words.
-    """
-    failed: list[Sentence] = []
-    for parameter, raw, is_word in writes:
-        name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
-        data = parameter.word_from_raw(raw).to_bytes(width(parameter), 'little')
-        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data,
-                          attempts=STOP_ATTEMPTS, timeout=timeout)
-        if reply.abort is not None:
-            failed.append(sentences.write_refused(name, refused(reply.abort).reason))
-        elif not reply.sent:
-            failed.append(sentences.write_not_taken(name))
-        elif reply.data is None:
-            failed.append(sentences.write_not_acknowledged(name, STOP_ATTEMPTS))
-    return failed

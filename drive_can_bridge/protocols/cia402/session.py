@@ -49,8 +49,8 @@ from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.objects import Found, Outcome
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
-from drive_can_bridge.protocols.cia402.procedures import (
-    cells, MAP, SdoAccess, StopProcedure, write_until_answered)
+from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
+from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
@@ -129,6 +129,7 @@ class Cia402Session(Session):
             word=CONTROL_PARAMETER)
         self._again = StopAgain(self, self._channel, self._stop, partial(
             self._stop_by_sdo, again=True))
+        self._sdo_stop = SdoStop(self, self._node, self._channel, self._stop.answer_time)
         self._requests, self._responses = request_pdos(drive), response_pdos(drive)
         self._places = {each.identifier: place for place, each in enumerate(self._responses)}
         self._masters = {each.identifier for each in self._requests} | {
@@ -210,7 +211,7 @@ class Cia402Session(Session):
         writes = STOP_ATTEMPTS * (len(self.setpoints.items) + 1) + (
             self.configuration.parameter_retries + 1)
         return (self.exchange.longest_stop + self.configuration.control_timeout
-                + writes * self._stop.answer_time + ANSWER_TIME)
+                + self._sdo_stop.longest + writes * self._stop.answer_time + ANSWER_TIME)
 
     def fall_silent(self) -> None:
         super().fall_silent()
@@ -235,13 +236,16 @@ class Cia402Session(Session):
             now = yield again
         while True:
             self._heartbeats.send(now)      # to be heard before the drive is to watch it
+            if self._stopped_by_nmt(now) and now >= bring_up.nmt_at + START_PERIOD:
+                bring_up.wake(now)
             outcome: Outcome = yield bring_up.run()
             now, found, text = self._channel.now, outcome.found, outcome.text
             if found is Found.READY:
                 self._start_cycling(outcome.status, now)
                 return
             self.remedy = outcome.remedy
-            self.report.advice = text or sentences.set_up_unanswered()
+            self.report.advice = text or self.request_refusal(now) or (
+                sentences.set_up_unanswered())
             again = now + LOOK_AGAIN
             if found is Found.DIFFERS:
                 self.report.advice = sentences.mapping_differs(text)
@@ -257,6 +261,10 @@ class Cia402Session(Session):
                     bring_up.wake(now)      # a node that was stopped answers nothing
             told = text or told
             now = yield again
+
+    def _stopped_by_nmt(self, now: float) -> bool:
+        """Tell whether the node says that it is in the state in which it answers no SDO."""
+        return self._node.said(now) is NmtState.STOPPED
 
     def _start_cycling(self, status: int, now: float) -> None:
         exchange = self.exchange
@@ -370,6 +378,7 @@ class Cia402Session(Session):
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
         exchange, answers, count = self.exchange, self._answers, len(self._responses)
+        self._node.pdo_at = now
         if not exchange.cycling:
             answers.book.take_stale()
             return
@@ -414,6 +423,8 @@ class Cia402Session(Session):
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
         change = self._node.receive_heartbeat(state, now)
+        if self.stage is Stage.STOPPING:
+            self._no_pdos_at_the_end(state, now)
         if self.stage is not Stage.RUNNING:
             return
         if change is Change.RESTARTED:
@@ -423,12 +434,28 @@ class Cia402Session(Session):
             self._channel.clear()
             self._stop.forget()
             self._close(reason, now, START_SPACING)
+        elif state is NmtState.STOPPED and self._stop.running:
+            self._no_answer_comes(now)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
-                not self.exchange.leaving
+                state is NmtState.STOPPED or not self.exchange.leaving
                 and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.heard(now, hurry=True)
+
+    def _no_pdos_at_the_end(self, state: NmtState, now: float) -> None:
+        """Have a node told by SDO, at the end, that takes no PDOs any more."""
+        if self.exchange.cycling and self.unshown and state is not NmtState.OPERATIONAL:
+            self.exchange.doubt_the_end()
+            self.exchange.stop()
+            self._stop_by_sdo(now)
+        elif state is NmtState.STOPPED and self._stop.running:
+            self._no_answer_comes(now)
+
+    def _no_answer_comes(self, now: float) -> None:
+        """End what is under way at once: a node that NMT has stopped answers nothing."""
+        self._transactor.abandon(now)
+        self._channel.advance(now)
 
     # -- what follows from the state --------------------------------------------------------------
 
@@ -515,6 +542,10 @@ class Cia402Session(Session):
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
         return together((self._homing.not_back, self.unready, known, newest))
 
+    def request_refusal(self, now: float) -> Sentence:
+        return sentences.drive_offline_because(sentences.node_state(
+            NmtState.STOPPED.text)) if self._stopped_by_nmt(now) else NOTHING
+
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         # also where the answer was lost: it may have been written
         if not self.serving and isinstance(request, WriteRequest) and any(
@@ -591,18 +622,24 @@ class Cia402Session(Session):
 
     # -- the stop ---------------------------------------------------------------------------------
 
-    def _stop_by_sdo(self, now: float, *, again: bool = False) -> None:
-        """Write ``disable`` and neutral setpoints to their objects."""
+    def _stop_by_sdo(self, now: float, *, again: bool = False, unheard: bool = False) -> None:
+        """
+        Write ``disable`` and neutral setpoints to their objects.
+
+        :param unheard: it was told by cycles, and has answered none.
+        """
         if self._stop.running:
             return
         self._channel.make_room(now)
+        if self._stopped_by_nmt(now):
+            self._no_answer_comes(now)
         writes = [each._replace(raw=self._machine.word) if each.is_word else each
                   for each in self._stop.writes()]
-        self._stop.begin(self._see_it_stop(writes), now, again=again)
+        self._stop.begin(self._see_it_stop(writes, unheard=unheard), now, again=again)
 
-    def _see_it_stop(self, writes: list[StopWrite]) -> StopProcedure:
+    def _see_it_stop(self, writes: list[StopWrite], *, unheard: bool) -> StopProcedure:
         """Tell it to stop, and in the end look whether it has, as long as frames would go on."""
-        failed = yield from write_until_answered(writes, self._stop.answer_time)
+        failed = yield from self._sdo_stop.writes(writes, unheard=unheard)
         if not failed and self.stage is Stage.STOPPING:
             state = yield from self._state_in_the_end()
             if state in states.MOVING:
@@ -641,12 +678,16 @@ class Cia402Session(Session):
                 or self._rules.state and self._machine.word_due):
             self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
             return
+        unheard = self.unshown
         self.exchange.doubt_the_end()
         if self._rules.state in states.MOVING:
             self.duty.channel(CYCLE, Happened.RUN_LEFT)
             self.duty.happened(Happened.SILENT)     # of what it should have done
         self.exchange.stop()
-        self._release(now)
+        if unheard:
+            self._stop_by_sdo(now, unheard=True)
+        else:
+            self._release(now)
 
     def _release(self, now: float) -> None:
         """Come to the end, as soon as the drive does not watch the bridge any more."""

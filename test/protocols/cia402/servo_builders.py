@@ -34,6 +34,12 @@ MODE_TARGETS = {'csv': VELOCITY_TARGET, 'pv': VELOCITY_TARGET, 'csp': TARGET, 'p
 TABLE = (VELOCITY_TARGET, POSITION, TARGET, VELOCITY, TORQUE, TORQUE_TARGET, SPEED_VL, IP_TARGET,
          MODES_OF, RAMP, TORQUE_LIMIT)
 PERIOD = 0.01
+#: COB-ID, type and mapping as the bridge writes them for csv with the position
+FITTING = {
+    (0x1400, 1): '05020000', (0x1400, 2): '01', (0x1600, 0): '02', (0x1600, 1): '10004060',
+    (0x1600, 2): '2000FF60', (0x1800, 1): '85010000', (0x1800, 2): '01', (0x1A00, 0): '02',
+    (0x1A00, 1): '10004160', (0x1A00, 2): '20006460'}
+FITS = {place: bytes.fromhex(text) for place, text in FITTING.items()}
 OBJECTS = {(0x6064, 0): (1000).to_bytes(4, 'little'), (0x60FF, 0): bytes(4),
            (0x607A, 0): bytes(4), (0x6077, 0): bytes(2), (0x6071, 0): bytes(2),
            (0x6042, 0): bytes(2), (0x60C1, 1): bytes(4), (0x6083, 0): bytes(4)}
@@ -97,7 +103,7 @@ class Axis:
                 self.now = max(self.now, self.beat_at)
                 self.beat_at += 0.1
                 if self.drive.number(0x1017) and not self.mute:
-                    self.says('705#05' if self.drive.operational else '705#7F')
+                    self.says(str(self.drive.beats()))
                 continue
             self.now = max(self.now, due)
             self.deliver(self.talk.at(self.now))

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from saying import says
-from servo_builders import Axis, POSITION, TORQUE, VELOCITY
+from servo_builders import Axis, FITS, POSITION, TORQUE, VELOCITY
 
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.messages import Sentence
@@ -14,12 +14,6 @@ from drive_can_bridge.protocols.cia402.bring_up import interpolation_time
 from drive_can_bridge.protocols.cia402.states import State
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)
-#: COB-ID, type and mapping as the bridge writes them for csv with the position
-FITTING = {
-    (0x1400, 1): '05020000', (0x1400, 2): '01', (0x1600, 0): '02', (0x1600, 1): '10004060',
-    (0x1600, 2): '2000FF60', (0x1800, 1): '85010000', (0x1800, 2): '01', (0x1A00, 0): '02',
-    (0x1A00, 1): '10004160', (0x1A00, 2): '20006460'}
-FITS = {place: bytes.fromhex(text) for place, text in FITTING.items()}
 
 
 def meet(mode: str = 'csv', objects: dict[Any, Any] | None = None, *,

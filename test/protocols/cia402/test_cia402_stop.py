@@ -273,7 +273,7 @@ class TestLosses:
         axis.take()
         axis.talk.events()
         axis.mute = True
-        axis.live(1.5)
+        axis.live(2.5)
         sent = [text for text in axis.take() if text.startswith(('205#', '605#'))]
         quiet = sent.index('605#2B40600007000000')
         assert sent[quiet - 3:quiet] == ['205#070000000000'] * 3

@@ -217,7 +217,7 @@ class TestRounds:
             one.pump(place)
         one.live(0.9)
         assert one.rounds() == [['201', '202', '080']] * 6
-        one.live(0.2)
+        one.live(1.5)       # NMT may have stopped them: they are told pre-operational, and again
         assert all(session.stopped for session in one.sessions)
         assert [sum(getattr(event, 'danger', False) for event in events)
                 for events in one.events.values()] == [1, 1]

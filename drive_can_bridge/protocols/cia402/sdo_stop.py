@@ -1,0 +1,113 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The stop of a drive by SDO, which no mapping can misroute; also of a node that NMT has stopped.
+
+In the NMT state *stopped* a node answers no SDO and takes no PDO (CiA 301), and its motor goes on
+as before. So one that may be in it is sent NMT *pre-operational* first, and 6040h right behind.
+What says that it may be: its heartbeat; or that neither the control word nor its repetition was
+answered, and neither a heartbeat nor a PDO shows that it is in another state.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.session import Session
+from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
+from drive_can_bridge.protocols.canopen.node import Node
+from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SILENT
+from drive_can_bridge.protocols.cia402.pdo import width
+from drive_can_bridge.protocols.cia402.procedures import refused
+from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS, StopWrite
+
+#: s between two NMT commands to a node that may be stopped, and for which they are repeated
+NMT_SPACING, NMT_TIME = 0.05, 1.0
+_ATTEMPTS_UNTIL_NMT = 2
+_ROUNDING = 1e-6
+
+StopProcedure = Generator[Ask, Reply, list[Sentence]]
+
+
+class SdoStop:
+    """
+    The writes that make one drive stand still.
+
+    :param timeout: s for each attempt.
+    """
+
+    def __init__(self, session: Session, node: Node, channel: SdoChannel, timeout: float) -> None:
+        self._session, self._node, self._channel = session, node, channel
+        self._timeout = timeout
+        self._answer_time = max(ANSWER_TIME, session.configuration.parameter_timeout)
+
+    @property
+    def longest(self) -> float:
+        """How many s it takes at most beyond the attempts at each write."""
+        return _ATTEMPTS_UNTIL_NMT * self._answer_time + NMT_TIME
+
+    def writes(self, writes: Sequence[StopWrite], *, unheard: bool = False) -> StopProcedure:
+        """
+        Tell it to stand still, each thing until it is acknowledged or was tried three times.
+
+        :param unheard: it was told by cycles, and has answered none.
+        :return: what failed, in words.
+        """
+        failed: list[Sentence] = []
+        began, nmt = self._channel.now, self._session.configuration.options.nmt_start
+        for parameter, raw, is_word in writes:
+            name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
+            place = parameter.index or 0, parameter.subindex or 0
+            data = parameter.word_from_raw(raw).to_bytes(width(parameter), 'little')
+            attempts = STOP_ATTEMPTS
+            if is_word:
+                reply, attempts = yield from self._word(
+                    Ask(*place, data, attempts=1, timeout=self._timeout), unheard=unheard)
+            else:
+                reply = yield Ask(*place, data, attempts=attempts, timeout=self._timeout)
+            if reply.abort is not None:
+                failed.append(sentences.write_refused(name, refused(reply.abort).reason))
+            elif not reply.sent:
+                failed.append(sentences.write_not_taken(name))
+            elif reply.data is None:
+                failed.append(sentences.write_not_acknowledged(name, attempts))
+                if is_word and not nmt and self._may_be_stopped(began):
+                    failed.append(sentences.node_may_be_stopped())
+        return failed
+
+    def _word(self, word: Ask, *, unheard: bool) -> Generator[Ask, Reply, tuple[Reply, int]]:
+        """Write the control word; return what became of it, and the number of attempts."""
+        began, attempts = self._channel.now, 0
+        waited = began if unheard else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
+        while True:
+            may_be_stopped = self._may_be_stopped(began)
+            due = self._said_stopped or may_be_stopped and self._channel.now > waited - _ROUNDING
+            if due and self._session.configuration.options.nmt_start:
+                return (yield from self._wake(word, attempts))
+            if attempts >= STOP_ATTEMPTS and (due or not may_be_stopped):
+                return SILENT, attempts
+            reply = yield replace(word, again=attempts > 0)
+            attempts += 1
+            if reply is not SILENT:
+                return reply, attempts
+
+    def _wake(self, word: Ask, attempts: int) -> Generator[Ask, Reply, tuple[Reply, int]]:
+        """Have the node answer SDO, and write the control word right behind, until it answers."""
+        until = self._channel.now + NMT_TIME - 0.5 * NMT_SPACING
+        command = network.encode_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node.number)
+        reply = SILENT
+        while reply is SILENT and self._channel.now < until:
+            self._session.outbox.put(command)
+            reply = yield replace(word, timeout=NMT_SPACING, again=attempts > 0)
+            attempts += 1
+        return reply, attempts
+
+    @property
+    def _said_stopped(self) -> bool:
+        return self._node.said(self._channel.now) is NmtState.STOPPED
+
+    def _may_be_stopped(self, since: float) -> bool:
+        """Tell whether nothing shows that it is in another state; a PDO since then does."""
+        return self._node.pdo_at < since and self._node.said(self._channel.now) in (
+            None, NmtState.STOPPED)

@@ -1,0 +1,244 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""In which NMT state a node is, and what it may be asked there: a stop above all."""
+
+from builders import read
+import pytest
+from saying import says
+from servo_builders import Axis, FITS, POSITION
+
+from drive_can_bridge.core.events import Noted
+from drive_can_bridge.core.frame import Frame
+
+PRE_OPERATIONAL, DISABLE = '000#8005', '605#2B40600007000000'
+#: a node that says nothing of its state
+MUTE = {'heartbeat_producer': 0.0, 'heartbeat_timeout': 0.0}
+
+
+def running(**options: object) -> Axis:
+    axis = Axis(**options).enabled()    # type: ignore[arg-type]
+    axis.commands(0.0, 100.0)
+    axis.live(0.05)
+    assert axis.drive.state == axis.drive.ENABLED
+    axis.take()
+    axis.talk.events()
+    return axis
+
+
+def stopped(axis: Axis, *, tells: bool) -> float:
+    """Have another master stop the node by NMT; return when it did."""
+    at = axis.now
+    axis.drive.takes(Frame(0, b'\x02\x05', False))
+    if tells:
+        axis.says('705#04')
+    return at
+
+
+def stops_at(axis: Axis, duration: float) -> float:
+    """Let time pass until the drive is not enabled any more; return the time."""
+    end = axis.now + duration
+    while axis.now < end and axis.drive.state == axis.drive.ENABLED:
+        axis.live(0.001)
+    return axis.now
+
+
+def told(axis: Axis) -> list[tuple[float, str]]:
+    """Return NMT commands and SDO requests."""
+    return [(at, text) for at, text in axis.log if text[:4] in ('000#', '605#')]
+
+
+def doubts(axis: Axis) -> list[str]:
+    return [note.text for note in axis.talk.events(Noted) if note.danger]
+
+
+class TestStoppedInMotion:
+
+    def test_its_heartbeat_says_so_and_it_is_told_at_once(self) -> None:
+        axis = running()
+        at = stopped(axis, tells=True)
+        assert [text for _, text in told(axis)[:2]] == [PRE_OPERATIONAL, DISABLE]
+        assert {time for time, _ in told(axis)[:2]} == {round(at, 6)}
+        assert axis.drive.state == axis.drive.ON
+        assert doubts(axis) == []
+        axis.live(1.5)
+        assert axis.session.online
+
+    def test_a_user_reads_at_that_moment(self) -> None:
+        axis = running()
+        axis.deaf = True
+        axis.session._channel.run(      # type: ignore[attr-defined]
+            axis.session._look_at_error(), lambda _: None, axis.now)    # type: ignore[attr-defined]
+        axis.deliver(axis.talk.sent())
+        axis.deaf = False
+        at = stopped(axis, tells=True)
+        assert (round(at, 6), DISABLE) in axis.log
+        assert axis.drive.state == axis.drive.ON
+
+    def test_it_says_nothing_and_is_told_behind_the_word_and_its_repetition(self) -> None:
+        axis = running(**MUTE)
+        at = stopped(axis, tells=False)
+        axis.live(0.5)
+        first, second, third, fourth, *_ = told(axis)
+        assert first[1] == second[1] == DISABLE
+        assert second[0] - first[0] == pytest.approx(0.1)
+        assert third == (pytest.approx(first[0] + 0.2), PRE_OPERATIONAL)
+        assert fourth == (third[0], DISABLE)
+        assert fourth[0] - at < 0.3
+        assert axis.drive.state == axis.drive.READY     # and set up again
+        assert doubts(axis) == []
+
+    def test_a_slow_drive_is_given_its_time(self) -> None:
+        axis = running(parameter_timeout=0.3, **MUTE)
+        stopped(axis, tells=False)
+        axis.live(1.5)
+        first = next(at for at, text in told(axis) if text == DISABLE)
+        nmt = next(at for at, text in told(axis) if text == PRE_OPERATIONAL)
+        assert nmt - first == pytest.approx(0.6)
+
+    def test_again_every_50_ms_for_a_second(self) -> None:
+        axis = running(**MUTE)
+        stopped(axis, tells=False)
+        axis.deaf = True
+        axis.live(2.0)
+        sent = [(at, text) for at, text in told(axis) if text in (PRE_OPERATIONAL, DISABLE)]
+        first = next(at for at, text in sent if text == PRE_OPERATIONAL)
+        nmt = [at for at, text in sent if text == PRE_OPERATIONAL and at < first + 1.05]
+        assert len(nmt) == 20
+        assert {round(later - at, 4) for at, later in zip(nmt, nmt[1:])} == {0.05}
+        assert [text for at, text in sent if first <= at < first + 1.0] == [
+            PRE_OPERATIONAL, DISABLE] * 20
+        assert len(doubts(axis)) == 1
+
+    def test_until_it_answers(self) -> None:
+        axis = running()
+        axis.deaf = True
+        stopped(axis, tells=True)
+        axis.live(0.12)
+        axis.deaf = False
+        axis.live(0.04)
+        assert axis.drive.state == axis.drive.ON
+        axis.take()
+        axis.live(0.5)
+        assert DISABLE not in axis.take()
+        assert doubts(axis) == []
+
+    def test_its_heartbeat_says_so_while_it_is_told(self) -> None:
+        axis = running()
+        axis.mute = True
+        axis.live(0.2)
+        assert DISABLE in axis.take()
+        axis.mute = False
+        at = stopped(axis, tells=True)
+        assert told(axis) == [(round(at, 6), PRE_OPERATIONAL), *told(axis)[1:]]
+
+    @pytest.mark.parametrize('beat', ['705#05', '705#7F'])
+    def test_one_that_says_that_it_is_not_stopped_is_sent_no_nmt(self, beat: str) -> None:
+        axis = running()
+        axis.mute = True
+        for _ in range(12):
+            axis.live(0.05)
+            axis.says(beat)
+        sent = [text for _, text in told(axis)]
+        assert sent.count(DISABLE) >= 3
+        assert PRE_OPERATIONAL not in sent[:sent.index(DISABLE) + 4]
+
+    def test_nor_one_that_sends_pdos(self) -> None:
+        axis = running(**MUTE)
+        axis.deaf = True
+        for _ in range(60):
+            axis.live(0.01)
+            if DISABLE in axis.take():
+                break
+        for _ in range(25):
+            axis.live(0.01)
+            axis.says('185#3712E8030000')
+        assert PRE_OPERATIONAL not in [text for _, text in told(axis)]
+
+    @pytest.mark.parametrize('tells', [True, False])
+    def test_without_nmt_start_it_is_said_that_only_its_master_helps(self, tells: bool) -> None:
+        axis = Axis(nmt_start=False, **({} if tells else MUTE))
+        axis.drive.operational = True
+        axis.drive.objects.update(FITS)
+        axis.enabled()
+        stopped(axis, tells=tells)
+        axis.live(1.2)
+        assert not any(text.startswith('000#') for _, text in axis.log)
+        said, *_ = doubts(axis)
+        assert says('node_may_be_stopped') in said.fields['why'].fields['what']
+
+
+class TestWhatElseItIsAsked:
+
+    def test_one_that_is_found_stopped_is_made_pre_operational_before_it_is_asked(self) -> None:
+        axis = Axis()
+        axis.drive.objects[0x1017, 0] = b'\x64\0'
+        axis.drive.takes(Frame(0, b'\x02\x05', False))
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.says('705#04')
+        axis.deliver(axis.talk.activate(axis.now))
+        assert [text for _, text in told(axis)][:2] == [PRE_OPERATIONAL, '605#4041600000000000']
+        axis.live(0.3)
+        assert axis.session.online
+
+    @pytest.mark.parametrize('serves', [True, False])
+    def test_requests_of_users_are_refused_at_once(self, serves: bool) -> None:
+        axis = Axis(nmt_start=False)
+        axis.deaf = True
+        axis.deliver(axis.talk.bus_up(axis.now))
+        if serves:
+            axis.session.serve()
+        else:
+            axis.deliver(axis.talk.activate(axis.now))
+        axis.says('705#04')
+        axis.live(0.32)
+        axis.talk.events()
+        axis.take()
+        axis.deliver(axis.talk.submits(read(POSITION), axis.now))
+        because = says('drive_offline_because', reason=says('node_state', state='stopped'))
+        assert axis.talk.outcomes() == [[because]]
+        assert serves or axis.session.offline_advice == because
+        axis.says('705#7F')
+        axis.deliver(axis.talk.submits(read(POSITION), axis.now))
+        assert '605#4064600000000000' in axis.take()
+
+
+class TestStoppedAtTheEnd:
+    """By NMT in the moment in which the bridge ends."""
+
+    @pytest.mark.parametrize('tells', [True, False])
+    @pytest.mark.parametrize('before', [True, False])
+    def test_it_is_told_all_the_same(self, tells: bool, before: bool) -> None:
+        axis = running(**({} if tells else MUTE))
+        at = stopped(axis, tells=False)
+        if before and tells:
+            axis.says('705#04')
+        axis.deliver(axis.talk.deactivate(axis.now))
+        if not before and tells:
+            axis.live(0.0006)
+            axis.says('705#04')
+        assert stops_at(axis, 2.0) - at < (0.011 if tells else 0.4)
+        axis.live(2.0)
+        assert axis.session.stopped
+        assert axis.drive.state in (axis.drive.ON, axis.drive.READY)
+        assert doubts(axis) == []
+
+    def test_one_that_is_silent_is_named_and_the_end_comes(self) -> None:
+        axis = running(**MUTE)
+        axis.mute = axis.deaf = True
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(axis.session.longest_stop)
+        assert axis.session.stopped
+        assert len(doubts(axis)) == 1
+
+    @pytest.mark.parametrize('beat', ['705#7F', '705#00'])
+    def test_one_that_takes_no_pdos_is_told_by_sdo(self, beat: str) -> None:
+        axis = running()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.drive.operational = False
+        axis.mute = True
+        axis.live(0.002)
+        axis.mute = False
+        axis.says(beat)
+        assert DISABLE in [text for _, text in told(axis)]
+        axis.live(0.5)
+        assert axis.session.stopped
+        assert doubts(axis) == []
