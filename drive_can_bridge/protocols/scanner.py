@@ -226,6 +226,11 @@ def conclude(key: str, votes: dict[str, list[str]], *, what: str, missing: str) 
     return Finding(key, None, f'{what} contradict each other: {told}' if votes else missing)
 
 
+def undecided(key: str, why: str) -> Finding:
+    """Return that nothing is concluded about a key: silence and most refusals prove nothing."""
+    return Finding(key, None, f'undecided: {why}')
+
+
 def spaced(data: bytes) -> str:
     """Write bytes as the manuals do: ``66 70 00 00``."""
     return data.hex(' ').upper()

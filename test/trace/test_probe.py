@@ -292,6 +292,43 @@ def test_a_node_that_says_nothing_and_one_that_has_nothing() -> None:
     assert {frame.data[0] for frame in bench.sent} == {0x40}
 
 
+@pytest.mark.parametrize(('answer', 'why'), [
+    ('', 'was not answered'),
+    ('22000008', 'was refused: 08000022h (data cannot be stored in the present state of the '
+                 'device)'), ('01000106', 'was refused: 06010001h (read of a write-only object)')])
+@pytest.mark.parametrize(('lost', 'key'), [
+    ('026500', 'mode'), ('001600', 'mapping'), ('5C6000', 'disable_word'),
+    ('5B6000', None), ('161000', 'bridge_heartbeat'), ('076000', None)])
+def test_what_a_servo_does_not_say_is_not_concluded(
+        answer: str, why: str, lost: str, key: str | None) -> None:
+    """Lost answers once made 1016h missing: ``bridge_heartbeat: 0.0`` was to be set."""
+    servo, lacking = simulated(AXIS), bytes.fromhex(lost)
+
+    def device(frame: Frame) -> list[Frame]:
+        if frame.data[1:4] != lacking:
+            return servo(frame)
+        return [Frame(0x580 + AXIS.station, b'\x80' + lacking + bytes.fromhex(answer), False)
+                ] if answer else []
+    found, whole = Bench(device).probe(AXIS), Bench(simulated(AXIS)).probe(AXIS)
+    index = f'{int.from_bytes(lacking[:2], "little"):04X}h'
+    for each, finding in found.items():
+        if each == key:
+            assert finding.value is None
+            assert f'undecided: {index} {why}' in finding.reason
+        else:
+            assert finding.value == whole[each].value
+
+
+def test_lost_answers_propose_nothing() -> None:
+    servo, lost = simulated(AXIS), (b'\x16\x10', b'\x5B\x60', b'\x5C\x60')
+    found = Bench(lambda frame: [] if frame.data[1:3] in lost else servo(frame)).probe(AXIS)
+    assert found['bridge_heartbeat'] == (
+        'bridge_heartbeat', None, 'undecided: 1016h was not answered')
+    assert found['disable_word'] == (
+        'disable_word', None,
+        'undecided: 605Ch was not answered, 605Bh was not answered')
+
+
 # -- nobody is moved ------------------------------------------------------------------------------
 
 @pytest.mark.parametrize('drive', [LIFT, ELEVEN, STARTER, INVERTER],

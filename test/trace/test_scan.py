@@ -349,17 +349,19 @@ def test_a_canopen_node_that_boots_ends_asking_by_name(protocol: str) -> None:
     ('20010030', '05020000', False),    # another identifier, which may be somebody else's
     ('20010030', '05050080', False),    # a PDO that does not exist
     ('20010030', '05050020', False),    # 29 bits
-    ('20010030', None, True),           # it does not say: where the standard has it
-    ('10004060', None, False),
+    ('20010030', '', True),             # it lacks what says that: where the standard has it
+    ('10004060', '', False),
+    ('20010030', '22000008', False),    # it does not say so now
 ])
-def test_mailboxes_alone_are_read(mapped: str, identifier: str | None, read: bool) -> None:
+def test_mailboxes_alone_are_read(mapped: str, identifier: str, read: bool) -> None:
     objects = {'001000': '00000000', '031601': mapped, '031401': identifier}
 
     def answers(frame: Frame) -> Frame | None:
         if frame.identifier == 0x605 and frame.data[1:4].hex() in objects:
             found = objects[frame.data[1:4].hex()]
-            if found is None:
-                return Frame(0x585, b'\x80' + frame.data[1:4] + b'\0\0\2\6', False)
+            if found in ('', '22000008'):
+                return Frame(0x585, b'\x80' + frame.data[1:4] + bytes.fromhex(
+                    found or '00000206'), False)
             content = bytes.fromhex(found)
             return Frame(0x585, b'\x43' + frame.data[1:4] + content, False)
         if frame.data[:3] == bytes.fromhex('C70100'):

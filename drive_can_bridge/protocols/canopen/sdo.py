@@ -143,10 +143,12 @@ class Uploaded(NamedTuple):
 
     :param object: index and sub-index.
     :param value: None where the node refused, or where it takes more than one frame.
+    :param absent: it says that it has no such object.
     """
 
     object: tuple[int, int]
     value: int | None
+    absent: bool = False
 
 
 def encode(message: Message) -> bytes:
@@ -229,4 +231,5 @@ def decode_upload(data: bytes) -> Uploaded:
     if answer.object is None or answer.kind is Kind.DOWNLOADED:
         raise RemoteProtocolError(f'SDO command {data[0]:02X}h is no answer to an upload')
     return Uploaded(answer.object, int.from_bytes(answer.data, 'little')
-                    if answer.kind is Kind.UPLOADED else None)
+                    if answer.kind is Kind.UPLOADED else None,
+                    answer.kind is Kind.ABORT and answer.number in ABSENT)

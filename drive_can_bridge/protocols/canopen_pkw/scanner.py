@@ -104,14 +104,15 @@ class CanopenScanner(Scanner):
             return
 
     def _take_upload(self, node: int, upload: sdo.Uploaded, now: float) -> None:
-        (index, subindex), value = upload
+        (index, subindex), value, absent = upload
         if index == sdo.DEVICE_TYPE:
             self._fact(node, 'device type', 'refused' if value is None else f'{value:08X}h')
             for entry in ((sdo.IDENTITY, 1), (sdo.IDENTITY, 2), (sdo.RPDO4_MAPPING, 1)):
                 self._questions.append(sdo.encode_upload(node, *entry))
         elif (index, subindex) == (sdo.RPDO4, 1) and node in self._mailboxes:
-            # one that does not say where it listens does so as delivered
-            if value is None or value & _PDO_IDENTIFIER == network.REQUEST_BASE + node:
+            # one without an object that says where it listens does so as delivered
+            if absent or value is not None and (
+                    value & _PDO_IDENTIFIER == network.REQUEST_BASE + node):
                 # a device that got the function of the first one last, does not answer that one
                 self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
                     pkw.read_request(STATUS, 1, toggle), pkw.Layout.WORD_LE), False)

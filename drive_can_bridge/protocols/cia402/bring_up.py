@@ -193,10 +193,15 @@ class BringUp:
         node.heartbeat_timeout = self._options.heartbeat_timeout
         if not interval:
             return
-        if (yield from self._read(PRODUCER, 0, 2)) != interval and (
-                yield from self._put(PRODUCER, 0, interval, 2)):
+        found = yield from self._read(PRODUCER, 0, 2)
+        absent = self._objects.absent
+        if found == interval or not (refusal := (yield from self._put(PRODUCER, 0, interval, 2))):
+            return
+        if absent or found and found >= 1000 * node.heartbeat_timeout:
             node.heartbeat_timeout = 0.0
             self.tell(sentences.no_heartbeat_producer())
+        else:       # it may send them as it is
+            self.tell(refusal)
 
     def _look_at_objects(self, status: Reply) -> Procedure:
         """See that all is there that is to be mapped, and that limits are not without effect."""

@@ -18,7 +18,7 @@ from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cia402.states import CONTROL_PARAMETER, STATUS_PARAMETER
 
-PDO_MAX, LENGTH_MAX = 4, 8
+PDO_MAX, LENGTH_MAX, ENTRIES_MAX = 4, 8, 8
 #: identifier of RPDO and TPDO 1, plus the node; the next ones 100h further each
 RPDO_BASE, TPDO_BASE, PDO_STEP = 0x200, 0x180, 0x100
 #: of PDO 1: its communication parameters, and its mapping
@@ -26,6 +26,8 @@ RPDO_COMMUNICATION, TPDO_COMMUNICATION, MAPPING_OFFSET = 0x1400, 0x1800, 0x200
 COB_ID, TRANSMISSION, INHIBIT_TIME, EVENT_TIMER = 1, 2, 3, 5
 INVALID, NO_REMOTE, LONG_IDENTIFIER = 1 << 31, 1 << 30, 1 << 29
 SYNCHRONOUS, EVENT_PROFILE, EVENT_MAKER = 1, 255, 254
+#: of the length in an entry, as some drives read it back: what it maps is signed
+SIGNED_LENGTH = 0x80
 #: what says how a drive exchanges: identifiers and mapping of PDOs, SYNC, heartbeats,
 #: interpolation time
 _MAPS = frozenset((*range(0x1400, 0x1C00), 0x1005, 0x1006, 0x1016, 0x1017, 0x60C2))
@@ -63,6 +65,22 @@ def entry_text(entry: int) -> str:
     '6064h.00h 32 bits'
     """
     return f'{entry >> 16:04X}h.{entry >> 8 & 0xFF:02X}h {entry & 0xFF} bits'
+
+
+def same_mapping(found: Sequence[int], wanted: Sequence[int]) -> bool:
+    """
+    Tell whether entries that were read mean those that are wanted.
+
+    Some drives set bit 7 of the length of what is signed, and some have a fixed number of entries,
+    with empty ones behind those in use.
+
+    >>> same_mapping([0x604000A0, 0, 0], [0x60400020])
+    True
+    """
+    used = list(found)
+    while len(used) > len(wanted) and not used[-1]:
+        used.pop()
+    return [entry & ~SIGNED_LENGTH for entry in used] == list(wanted)
 
 
 def distribute(lengths: Sequence[int]) -> list[list[int]]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterable
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
@@ -64,6 +65,9 @@ class PdoSetUp:
         """
         at = wanted.communication
         identifier = yield from self._objects.read(at, pdo.COB_ID)
+        if identifier is None and not self._objects.absent:
+            raise differs(sentences.object_refused(
+                at_object(at, pdo.COB_ID), sdo.describe(self._objects.abort or 0)))
         if identifier is None:
             raise differs(sentences.no_such_pdo('TPDO' if transmit else 'RPDO', wanted.number))
         if identifier & ~pdo.NO_REMOTE != wanted.identifier:

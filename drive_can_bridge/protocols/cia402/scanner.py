@@ -12,7 +12,7 @@ are. ``mapping``: PDOs that are as the file wants them already need no writing. 
 
 from collections import Counter
 from collections.abc import Generator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
@@ -21,11 +21,11 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.pdo import (
-    entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos)
+    ENTRIES_MAX, entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos, same_mapping)
 from drive_can_bridge.protocols.cia402.states import (
     ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION)
 from drive_can_bridge.protocols.scanner import (
-    Certainty, Conversation, Finding, Prober, Question, Scanner)
+    Certainty, Conversation, Finding, Prober, Question, Scanner, undecided)
 from drive_can_bridge.protocols.telegrams import Direction
 
 #: device profile, in the lower half of 1000h
@@ -105,7 +105,7 @@ class Cia402Scanner(Scanner):
 
     def _hear_answer(self, frame: Frame, node: int) -> None:
         try:
-            (index, subindex), value = sdo.decode_upload(frame.data)
+            (index, subindex), value, _ = sdo.decode_upload(frame.data)
         except RemoteProtocolError:
             return
         if (index, subindex) == (sdo.DEVICE_TYPE, 0):
@@ -129,8 +129,40 @@ class Cia402Scanner(Scanner):
         self._see(node, text, Certainty.CERTAIN)
 
 
+class _Read(NamedTuple):
+    """
+    What became of the read of an object.
+
+    :param value: None: it is not known.
+    :param absent: the drive says that it has no such object.
+    :param why: why it is not known, in words.
+    """
+
+    value: int | None = None
+    absent: bool = False
+    why: str = ''
+
+    @property
+    def unknown(self) -> bool:
+        """Neither a value nor that there is none: nothing follows from that."""
+        return self.value is None and not self.absent
+
+    @property
+    def signed(self) -> int | None:
+        """The value, of 16 bits with a sign."""
+        return None if self.value is None else (self.value & 0xFFFF ^ 0x8000) - 0x8000
+
+
+_Reading = Generator[Question, Frame | None, _Read]
+
+
 class Cia402Prober(Prober):
-    """Asks one node. SDO is answered in every state but stopped."""
+    """
+    Asks one node. SDO is answered in every state but stopped.
+
+    That it lacks an object is concluded from its own word only (06020000h, 06090011h): an answer
+    may have been lost, and another refusal says nothing of what there is.
+    """
 
     def __init__(self, drive: DriveConfiguration) -> None:
         super().__init__(drive, [Route(each, STANDARD_IDENTIFIER_MAX, False) for each in (
@@ -138,7 +170,7 @@ class Cia402Prober(Prober):
             sdo.REQUEST_BASE + drive.station, network.NMT_IDENTIFIER)])
 
     def converse(self) -> Conversation:
-        device = yield from self._value(sdo.DEVICE_TYPE, 0)
+        device = (yield from self._value(sdo.DEVICE_TYPE, 0)).value
         if device is None and not self.answered:
             return [Finding(key, None, _SILENT) for key in KEYS]
         if device is not None and device & 0xFFFF != _DEVICE_PROFILE:
@@ -149,47 +181,53 @@ class Cia402Prober(Prober):
 
     def _mode(self) -> Generator[Question, Frame | None, Finding]:
         offered = yield from self._value(MODES_OFFERED, 0)
-        if offered is None:
-            return Finding('mode', None, 'no 6502h: the drive does not say which it has')
-        names = [name for name, mode in MODES.items() if offered >> mode.number - 1 & 1]
-        told = f'6502h is {offered:08X}h: {", ".join(names) or "none of those known here"}'
+        if offered.value is None:
+            return undecided('mode', offered.why)
+        names = [name for name, mode in MODES.items() if offered.value >> mode.number - 1 & 1]
+        told = f'6502h is {offered.value:08X}h: {", ".join(names) or "none of those known here"}'
         wanted = self.drive.options.mode
         return Finding('mode', wanted if wanted in names else None, told)
 
     def _mapping(self) -> Generator[Question, Frame | None, Finding]:
         for wanted in (*request_pdos(self.drive), *response_pdos(self.drive)):
-            found = yield from self._entries(wanted)
+            found, why = yield from self._entries(wanted)
             place = f'{wanted.communication + MAPPING_OFFSET:04X}h'
-            if found is None:
-                return Finding('mapping', None, f'{place} was not answered')
-            if found != list(wanted.entries):
+            if why:
+                return undecided('mapping', why)
+            if not same_mapping(found, wanted.entries):
                 return Finding('mapping', 'configure', (
                     f'{place} holds {_entries_text(found)} and not '
                     f'{_entries_text(wanted.entries)}'))
         return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; '
                                             'configure does no harm')
 
-    def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, list[int] | None]:
+    def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, tuple[list[int], str]]:
+        """Return what a PDO holds, or why that is not known."""
         place = pdo.communication + MAPPING_OFFSET
         count = yield from self._value(place, 0)
-        if count is None:
-            return None
+        if count.value is None:
+            return [], count.why
         found = []
-        for subindex in range(1, min(count, 8) + 1):
+        for subindex in range(1, min(count.value, ENTRIES_MAX) + 1):
             entry = yield from self._value(place, subindex)
-            if entry is None:
-                return None
-            found.append(entry)
-        return found
+            if entry.unknown:
+                return [], entry.why
+            found.append(entry.value or 0)
+        return found, ''
 
     def _disable_word(self) -> Generator[Question, Frame | None, Finding]:
-        disable = yield from self._option(DISABLE_OPTION)
-        shutdown = yield from self._option(SHUTDOWN_OPTION)
-        told = ', '.join(f'{index:04X}h is {"missing" if value is None else value}'
-                         for index, value in ((DISABLE_OPTION, disable),
-                                              (SHUTDOWN_OPTION, shutdown)))
+        options = {}
+        for index in (DISABLE_OPTION, SHUTDOWN_OPTION):
+            options[index] = yield from self._value(index, 0)
+        disable, shutdown = (each.signed for each in options.values())
+        told = ', '.join(
+            each.why if each.unknown else
+            f'{index:04X}h is {"missing" if each.absent else each.signed}'
+            for index, each in options.items())
         if disable == _RAMP:
             return Finding('disable_word', 'disable_operation', f'{told}: 0007h brakes by ramp')
+        if any(each.unknown for each in options.values()):
+            return undecided('disable_word', told)
         if shutdown == _RAMP:
             return Finding('disable_word', 'shutdown', f'{told}: 0006h brakes by ramp')
         if disable != _COASTS:      # others are the maker's own
@@ -199,37 +237,41 @@ class Cia402Prober(Prober):
         return Finding('disable_word', 'disable_operation', (
             f'{told}: the axis coasts with every word; write 605Ch := 1 if it may be'))
 
-    def _option(self, index: int) -> Generator[Question, Frame | None, int | None]:
-        value = yield from self._value(index, 0)
-        return None if value is None else (value & 0xFFFF ^ 0x8000) - 0x8000
-
     def _bridge_heartbeat(self) -> Generator[Question, Frame | None, Finding]:
         places = yield from self._value(_CONSUMER_HEARTBEAT, 0)
-        if not places:
-            return Finding('bridge_heartbeat', 0.0, 'no 1016h: the drive cannot watch the bridge, '
+        if places.unknown:
+            return undecided('bridge_heartbeat', places.why)
+        if not places.value:
+            told = 'no 1016h' if places.absent else '1016h has no places'
+            return Finding('bridge_heartbeat', 0.0, f'{told}: the drive cannot watch the bridge, '
                                                     'nothing stops it when the bridge dies')
         option = yield from self._value(ABORT_CONNECTION_OPTION, 0)
-        told = f'1016h has {places} places, 6007h is {"missing" if option is None else option}'
-        if option == 0:
+        told = f'1016h has {places.value} places, ' + (
+            option.why if option.unknown else
+            f'6007h is {"missing" if option.absent else option.value}')
+        if option.value == 0:
             told += ': it does nothing when it misses the bridge; write 6007h'
+        elif option.value is None:
+            told += ': what it does when it misses the bridge is not known'
         return Finding('bridge_heartbeat', self.drive.options.bridge_heartbeat, told)
 
     # -- asking -----------------------------------------------------------------------------------
 
-    def _value(self, index: int, subindex: int) -> Generator[Question, Frame | None, int | None]:
-        """Read an object; None: no answer, or refused."""
+    def _value(self, index: int, subindex: int) -> _Reading:
+        """Read an object."""
         node, place = self.drive.station, (index, subindex)
         data = yield from self.ask(Question(
             sdo.encode_upload(node, index, subindex), sdo.RESPONSE_BASE + node,
             lambda data: _answer(data, place) is not None))
         answer = None if data is None else _answer(data, place)
+        text = f'{index:04X}h' + (f'.{subindex:02X}h' if subindex else '')
         if answer is None:
-            return None
-        if answer.kind is Kind.ABORT:
-            if answer.number not in (sdo.NO_SUCH_OBJECT, sdo.NO_SUCH_SUBINDEX):
-                self.notes.append(f'{index:04X}h: {sdo.describe(answer.number)}')
-            return None
-        return int.from_bytes(answer.data, 'little')
+            return _Read(why=f'{text} was not answered')
+        if answer.kind is not Kind.ABORT:
+            return _Read(int.from_bytes(answer.data, 'little'))
+        if answer.number in sdo.ABSENT:
+            return _Read(absent=True, why=f'the drive has no {text}')
+        return _Read(why=f'{text} was refused: {sdo.describe(answer.number)}')
 
 
 def _answer(data: bytes, place: tuple[int, int]) -> Message | None:

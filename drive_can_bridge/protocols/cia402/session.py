@@ -490,7 +490,7 @@ class Cia402Session(Session):
         """Read 6061h until it shows the mode."""
         while self._rules.state is State.OPERATION_ENABLED:
             reply = yield Ask(states.MODE_SHOWN)
-            if reply.abort is not None:
+            if reply.abort in sdo.ABSENT:
                 self._bring_up.tell(sentences.mode_not_shown())
                 self._mode_shown = self._mode       # nothing says otherwise
             elif reply.data:

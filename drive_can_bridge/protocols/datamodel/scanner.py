@@ -4,8 +4,7 @@ Finding DataModel drives, with 29-bit and with 11-bit identifiers, and how they 
 
 The numbers on the wire are settled by reading the maps: eight parameters whose content can be
 told. Reg.122 to 125 and 126 to 129 hold the numbers that the file configures, moved like
-themselves. Where they hold others, it still tells that a drive does not answer for parameters that
-it has not.
+themselves. That a drive does not answer for other numbers shows nothing: an answer may be lost.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -191,6 +190,8 @@ class DataModelProber(Prober):
             reason = 'no answer: check station and bit rate'
         findings = [Finding('parameter_offset', offset_found, reason)]
         if self._maps_count:
+            if offset_found is None and list(seen) == [options.parameter_offset]:
+                offset_found = options.parameter_offset     # nothing says anything else
             findings += self._map_findings(
                 offset_found, None if offset_found is None else seen[offset_found])
         return findings
@@ -202,9 +203,8 @@ class DataModelProber(Prober):
         if len(agreeing) == 1:
             return agreeing[0], f'the maps of the file are there, {told}'
         if not agreeing and len(seen) == 1:
-            return next(iter(seen)), (
-                'other numbers than these are not answered, and two maps are eight parameters, '
-                + told)
+            return None, ('undecided: the maps of the file are nowhere, and that others were not '
+                          'answered proves nothing, ' + told)
         if not seen:
             return None, 'the maps are not answered; check request_map_base and response_map_base'
         return None, ('the maps of the file are in more than one place, ' if agreeing else

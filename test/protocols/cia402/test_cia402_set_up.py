@@ -7,6 +7,7 @@ import pytest
 from saying import says
 from servo_builders import Axis, FITS, POSITION, TORQUE, VELOCITY
 
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.canopen.sdo import describe
@@ -442,6 +443,45 @@ class TestWatches:
         axis.live(2.0)
         assert axis.session.online
         assert notes(axis).count(says('no_heartbeat_producer')) == 1
+
+
+#: abort code: not in this state of the device
+NOT_TAKEN = '22000008'
+
+
+class TestAbsence:
+    """Only the drive's own word says that it lacks something; any other refusal does not."""
+
+    NONE, NOT_NOW = '00000206', NOT_TAKEN
+
+    @pytest.mark.parametrize(('code', 'what'), [
+        (NONE, says('no_such_pdo')), (NOT_NOW, says('object_refused', what='1800h.01h'))])
+    def test_of_a_pdo(self, code: str, what: says) -> None:
+        axis = Axis()
+        axis.drive.instead = {'40001801': '80001801' + code}
+        axis.start()
+        assert differs(axis) == what
+
+    @pytest.mark.parametrize(('code', 'timeout', 'watched'), [
+        (NONE, 0.35, False), (NOT_NOW, 0.35, True), (NOT_NOW, 0.05, False)])
+    def test_of_a_heartbeat(self, code: str, timeout: float, watched: bool) -> None:
+        axis = Axis(objects={(0x1017, 0): b'\x32\0'}, heartbeat_timeout=timeout,
+                    heartbeat_producer=0.04)
+        axis.drive.instead = {'2b171000': '80171000' + NOT_TAKEN}
+        if code == self.NONE:
+            axis.drive.instead = {'40171000': '80171000' + code, '2b171000': '80171000' + code}
+        axis.start()
+        axis.live(0.3)
+        assert (axis.session._node.heartbeat_timeout > 0) is watched
+        assert (says('no_heartbeat_producer') in notes(axis)) is not watched
+
+    @pytest.mark.parametrize(('code', 'enabled'), [(NONE, True), (NOT_NOW, False)])
+    def test_of_the_mode_that_is_shown(self, code: str, enabled: bool) -> None:
+        axis = Axis().online()
+        axis.drive.instead = {'40616000': '80616000' + code}
+        (_, success, message), = axis.asks(ControlAction.ENABLE, 2.5)
+        assert success is enabled, message
+        assert (says('mode_not_shown') in notes(axis)) is enabled
 
 
 class TestNoNmt:
