@@ -587,10 +587,25 @@ answer_not_delivered = Text(
     'an answer of {service} could not be delivered: its caller takes none (another QoS, or DDS '
     'has not found all of it)',
     do='ask again, with the QoS of services')
-answers_hold_up = Text(
-    'answers hold up the whole process while they wait for a caller that DDS has not found '
-    'yet: rclpy sends them ({reason})',
+requests_hold_up = Text(
+    'a request that the middleware takes long to read, or an answer to a caller that it has not '
+    'found yet, holds up the whole process: rclpy takes and sends them ({reason})',
     do='report it, with the version of rclpy')
+request_hangs = Text(
+    'the middleware has been reading a request of {service} for {seconds:g} s: other services go '
+    'on without it',
+    do='use one middleware for all (RMW_IMPLEMENTATION)')
+request_hung = Text(
+    'a request of {service} took the middleware {seconds:.1f} s',
+    do='use one middleware for all (RMW_IMPLEMENTATION)')
+request_unreadable = Text(
+    'the middleware cannot read a request of {service}: {reason} (clients need the same '
+    'RMW_IMPLEMENTATION)',
+    do='use one middleware for all')
+service_given_up = Text(
+    '{service} is not served any more: {times} of its requests have stopped a thread each '
+    '(clients need the same RMW_IMPLEMENTATION)',
+    do='use one middleware for all, and start the bridge again')
 
 # -- the log, and traces --------------------------------------------------------------------------
 nothing_recorded = Text(

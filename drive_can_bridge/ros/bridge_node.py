@@ -19,6 +19,7 @@ while the bridge runs; all others are read-only and say so.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 import gc
 from pathlib import Path
 import shlex
@@ -45,7 +46,7 @@ from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import bus_hangs, rearm_would_jump
+from drive_can_bridge.core.sentences import bus_hangs, rearm_would_jump, requests_hold_up
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.process.scheduling import raise_priority
@@ -54,9 +55,12 @@ from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.rcl.services import RclServices
+from drive_can_bridge.ros.rcl.unfit import Unfit
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
+from drive_can_bridge.ros.requests import Requests
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
+from drive_can_bridge.ros.threads import ExecutorServices, ExecutorThread, ServiceThread
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.end_point import EndPoint
 
@@ -216,19 +220,23 @@ class BridgeNode(LifecycleNode):
     :param files: the parameter files that were given to this process.
     """
 
+    _own: ExecutorServices | None = None
+    _ended = False
+
     def __init__(self, spinner: ExecutorThread, fatal: Callable[[str], None], clock: Clock, *,
                  context: Context | None = None,
                  open_bus: Callable[[BusConfiguration], EndPoint] | None = None,
                  files: Sequence[str] = (),
                  **options: Any) -> None:
-        self._answers = Answers(lambda topic, text: self.log.speaker('').warn(topic, text),
-                                lambda text: self.log.info(text), clock)
         self._stamps = Stamps(self.get_clock, lambda text: self.log.warning(text), clock)
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
-        self._answers.adopt(self.services)  # not all of them are made by create_service
-        self.log = Log(self.get_logger(), clock)
         self._steady = clock      # the node has a clock of its own: ROS time
+        self.log = Log(self.get_logger(), clock)
+        voice = self.log.speaker('')
+        rcl = _rcl_services(self.services, self.log.warning)
+        self._answers = Answers(rcl, voice.warn, clock)
+        self._requests = Requests(rcl, voice.warning, voice.error, self.context, clock)
         self._open_bus = open_bus
         self._spinner = spinner
         self._fatal = fatal
@@ -237,8 +245,10 @@ class BridgeNode(LifecycleNode):
         self._files = list(files)
         self._transition_lock = clock.lock()
         self._control_threads: dict[str, ServiceThread] = {}     # by bus
-        self._parameter_thread = ServiceThread('parameters', self.context, self.log.error,
-                                               clock, send=self._answers.send)
+        self._parameter_thread = self._service_thread('parameters')
+        self._own_thread = self._service_thread('requests of the bridge')
+        self._own = ExecutorServices(self._own_thread, spinner)
+        self._own.adopt(self.services)
         self._ending = False
         self._leaving: list[DriveNode] = []
         self._runtime: BridgeRuntime | None = None
@@ -248,11 +258,24 @@ class BridgeNode(LifecycleNode):
                            lambda: 'the bridge is being stopped' if self._ending else '')
         spinner.executor.add_node(self)
 
+    def _service_thread(self, name: str, *options: Any, **more: Any) -> ServiceThread:
+        return ServiceThread(name, self.context, self.log.error, self._steady, *options,
+                             send=self._answers.send, take=self._requests.take, **more)
+
     def create_service(self, *arguments: Any, **options: Any) -> Service:
-        """Create a service whose answers hold up nobody else."""
+        """Create a service whose requests and answers hold up nobody else."""
         service = super().create_service(*arguments, **options)
-        self._answers.adopt([service])
+        if self._own is not None:   # else it is made by a base class, and adopted soon
+            self._own.adopt([service])
         return service
+
+    def destroy_service(self, service: Service) -> bool:
+        """Destroy a service, as soon as what it has answered is sent."""
+        destroy = super().destroy_service
+        if self._own is None or self._ended:
+            return destroy(service)
+        self._own.leave(service, partial(destroy, service))
+        return True
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[[Any], None],
                             *arguments: Any, **options: Any) -> Subscription:
@@ -386,9 +409,8 @@ class BridgeNode(LifecycleNode):
     def _control_thread_of(self, bus: str) -> ServiceThread:
         """Return what serves the stops of a bus: one that hangs holds up those of no other."""
         if bus not in self._control_threads:
-            self._control_threads[bus] = ServiceThread(
-                f'control {bus}', self.context, self.log.error, self._steady, raise_priority,
-                share=1.0, send=self._answers.send)
+            self._control_threads[bus] = self._service_thread(
+                f'control {bus}', raise_priority, share=1.0)
         return self._control_threads[bus]
 
     def _activate(self) -> None:
@@ -446,6 +468,9 @@ class BridgeNode(LifecycleNode):
         for thread in self._control_threads.values():
             thread.stop()
         self._parameter_thread.stop()
+        self._own_thread.stop()
+        self._ended = True
+        self._requests.stop()
         self._answers.stop()
 
     def destroy_node(self) -> None:
@@ -472,6 +497,18 @@ class BridgeNode(LifecycleNode):
     def diagnostics(self) -> Diagnostics | None:
         """What reports on buses and drives, from configure to cleanup."""
         return None if self._runtime is None else self._runtime.diagnostics
+
+
+def _rcl_services(services: Iterable[Service], warn: Callable[[str], None]) -> RclServices | None:
+    """Return the way of requests and answers past rclpy; None, and a warning: there is none."""
+    try:
+        rcl = RclServices()
+        for service in services:
+            rcl.check(service)
+    except Unfit as error:
+        warn(requests_hold_up(str(error)))
+        return None
+    return rcl
 
 
 def _gone(drive: DriveNode) -> bool:

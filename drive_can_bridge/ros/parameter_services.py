@@ -166,8 +166,8 @@ class ParameterServices:
 
     async def _describe(self, request: Any, response: Any) -> Any:
         if self._excess(request.names, 'describe parameters'):
-            response.descriptors = [ParameterDescriptor(name=printable(name))
-                                    for name in request.names]
+            each = {name: ParameterDescriptor(name=printable(name)) for name in request.names}
+            response.descriptors = [each[name] for name in request.names]
             return response
         # rcl_interfaces/srv/DescribeParameters: as many descriptors as names, in the same order
         found = [(name, self._directory.find(name)) for name in request.names]
@@ -195,7 +195,7 @@ class ParameterServices:
         excess = self._excess([message.name for message in request.parameters],
                               'set parameters')
         if excess:
-            response.results = [SetParametersResult(reason=excess) for _ in request.parameters]
+            response.results = [SetParametersResult(reason=excess)] * len(request.parameters)
             return response
         results: list[SetParametersResult] = [
             SetParametersResult() for _ in request.parameters]

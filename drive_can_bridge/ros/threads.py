@@ -13,9 +13,11 @@ Callbacks that are coroutines wait for answers without an executor, too: one thr
 coroutine, the one that answers goes on with it.
 """
 
-from collections.abc import Callable, Coroutine, Generator, Mapping
+from collections import Counter
+from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from functools import partial
+from inspect import isawaitable
 import math
 import threading
 from typing import Any, Generic, TypeVar
@@ -33,8 +35,10 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.core.sentences import service_given_up
 from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.polled_topics import PolledGroup
+from drive_can_bridge.ros.requests import full_name, Take, take_by_rclpy
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
@@ -44,6 +48,10 @@ LEAVING = 1.0
 MODEST = 0.3
 #: calls of one service that are taken in a row
 TAKE_MAX = 8
+#: s that the end waits for a request that is being taken, or an answer
+STOP_PATIENCE = 1.0
+#: threads that the requests of one service may stop for ever: each keeps its stack
+STOPPED_MAX = 3
 
 #: takes the response, or the error that there is none for; to be called once, from any thread
 Answer = Callable[[Any], None]
@@ -195,6 +203,30 @@ class CpuThrottle:
             self._clock.wait(now - self._left / self._share)
 
 
+class _Taker:
+    """
+    One of the threads that take requests: but for the last, all are still taking one.
+
+    :ivar changed: what is served is not what it waits for.
+    :ivar superseded: another one has gone on.
+    :ivar without: the service that it is taking a request of since, and others do without.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.guard = rclpy_implementation.GuardCondition(context.handle)
+        self.changed = self.superseded = False
+        self.without: Service | None = None
+
+    def change(self) -> None:
+        """Have it look what is served."""
+        self.changed = True
+        try:
+            with self.guard:
+                self.guard.trigger_guard_condition()
+        except GONE:  # stopped
+            pass
+
+
 class ServiceThread:
     """
     Serves services whose callback group keeps them from executors.
@@ -202,25 +234,28 @@ class ServiceThread:
     Starts with the first service. Answers are awaited by nobody: a callback has to be short.
 
     :param report: takes one line about an exception that a callback let escape.
-    :param prepare_thread: called first in the thread that takes requests.
+    :param prepare_thread: called first in each thread that takes requests.
     :param share: of the processor's time that each of its two threads may use; 1: all of it.
     :param send: sends an answer.
+    :param take: takes a request; where that takes long another thread serves all other services.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None], clock: Clock,
-                 prepare_thread: Callable[[], object] = lambda: None, *,
-                 share: float = MODEST, send: Send = Service.send_response) -> None:
+                 prepare_thread: Callable[[], object] = lambda: None, *, share: float = MODEST,
+                 send: Send = Service.send_response, take: Take = take_by_rclpy) -> None:
         self._name = name
         self._clock = clock
         self._send_response = send
+        self._take_request = take
         self._share = share
         self._context = context
         self._report = report
         self._prepare_thread = prepare_thread
         self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
-        self._changed = False   # what is served
+        self._stopped_threads: Counter[Service] = Counter()
         self._jobs: Mailbox[Callable[[], None] | None] = Mailbox(clock)
-        self._guard = rclpy_implementation.GuardCondition(context.handle)
+        self._taker = _Taker(context)
+        self._superseded: set[_Taker] = set()
         self._ending = False
         self._threads: list[Worker] = []
 
@@ -234,11 +269,11 @@ class ServiceThread:
         self._served[service] = callback, answered
         if not self._threads:
             self._threads = [
-                self._clock.worker(self._take_all, self._name),
+                self._clock.worker(partial(self._take_all, self._taker), self._name),
                 self._clock.worker(self._answer_all, f'{self._name}, answering')]
             for thread in self._threads:
                 thread.start()
-        self._change()
+        self._taker.change()
 
     def later(self, job: Callable[[], None]) -> None:
         """Have the thread that answers do something. From any thread."""
@@ -248,80 +283,106 @@ class ServiceThread:
         """Stop to serve them; they may be destroyed then."""
         for service in services:
             self._served.pop(service, None)
-        self._change()
+        self._taker.change()
 
     def stop(self) -> None:
         """End, when the answers that there are have been sent."""
         self._ending = True
-        self._wake()
+        self._taker.change()
         self._jobs.put(None)
         for thread in self._threads:
-            thread.join(5.0)
+            thread.join(STOP_PATIENCE)
         self._threads.clear()
-        self._guard.destroy_when_not_in_use()
-
-    def _change(self) -> None:
-        self._changed = True
-        self._wake()
-
-    def _wake(self) -> None:
-        try:
-            with self._guard:
-                self._guard.trigger_guard_condition()
-        except GONE:  # stopped
-            pass
+        self._taker.guard.destroy_when_not_in_use()
 
     # -- the thread that takes --------------------------------------------------------------------
 
-    def _take_all(self) -> None:
+    def _take_all(self, taker: _Taker) -> None:
         self._prepare_thread()
         throttle = CpuThrottle(self._share, self._clock)
-        while not self._ending and self._context.ok():
+        while self._goes_on(taker):
             try:
-                self._take_while_unchanged(throttle)
+                self._take_while_unchanged(taker, throttle)
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._ending:
                     return
                 self._report(f'internal error in a callback: {type(error).__name__}: {error}')
                 self._clock.wait(self._clock.now() + ERROR_PAUSE)
+        if taker.superseded:
+            taker.guard.destroy_when_not_in_use()
+            self._superseded.discard(taker)
+            self._taker.change()
 
-    def _take_while_unchanged(self, throttle: CpuThrottle) -> None:
+    def _goes_on(self, taker: _Taker) -> bool:
+        return not self._ending and not taker.superseded and bool(self._context.ok())
+
+    def _take_while_unchanged(self, taker: _Taker, throttle: CpuThrottle) -> None:
         """Take what comes until something else is to be served."""
-        self._changed = False
+        taker.changed = False
         context_handle: Any = self._context.handle
+        without = {other.without for other in self._superseded.copy()}
         with ExitStack() as held:
             present: dict[int, Service] = {}
             for service in list(self._served):
+                if service in without:
+                    continue
                 try:
                     held.enter_context(service.handle)
                 except InvalidHandle:   # destroyed meanwhile
                     continue
                 present[service.handle.pointer] = service
-            held.enter_context(self._guard)
+            held.enter_context(taker.guard)
             held.enter_context(context_handle)
             waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
             handles = [service.handle for service in present.values()]
-            while not self._changed and not self._ending and self._context.ok():
+            while not taker.changed and self._goes_on(taker):
                 waiting.clear_entities()
-                waiting.add_guard_condition(self._guard)
+                waiting.add_guard_condition(taker.guard)
                 for handle in handles:
                     waiting.add_service(handle)
                 waiting.wait(-1)
                 for pointer in waiting.get_ready_entities('service'):
-                    self._take(present[pointer])
+                    self._take(taker, present[pointer])
                 throttle.keep()
 
-    def _take(self, service: Service) -> None:
-        kind: Any = service.srv_type
+    def _take(self, taker: _Taker, service: Service) -> None:
         for _ in range(TAKE_MAX):
             served = self._served.get(service)
-            if served is None:
+            if served is None or taker.superseded:
                 return
-            request, header = service.handle.service_take_request(kind.Request)
-            if header is None:
+            taken = self._take_request(service, partial(self._supersede, taker, service))
+            if taken is None:
                 return
+            request, header = taken
             callback, answered = served
             callback(request, partial(self._answer, service, request, header, answered))
+
+    def _supersede(self, taker: _Taker, service: Service, for_ever: bool) -> None:
+        """
+        Have another thread take the requests of all other services.
+
+        :param for_ever: this one will never go on; then that one takes those of this, too.
+        :raises RuntimeError: no thread can be started.
+        """
+        if not taker.superseded:
+            successor = _Taker(self._context)
+            thread = self._clock.worker(partial(self._take_all, successor), self._name)
+            taker.superseded, taker.without = True, service
+            self._superseded.add(taker)
+            try:
+                thread.start()
+            except RuntimeError:
+                taker.superseded = False
+                self._superseded.discard(taker)
+                raise
+            self._taker, self._threads[0] = successor, thread
+        if for_ever:
+            self._superseded.discard(taker)
+            self._stopped_threads[service] += 1
+            if self._stopped_threads[service] >= STOPPED_MAX:
+                self._served.pop(service, None)
+                self._report(service_given_up(full_name(service), STOPPED_MAX))
+            self._taker.change()
 
     # -- the thread that answers ------------------------------------------------------------------
 
@@ -373,6 +434,39 @@ def _response_to(service: Service, request: Any, error: Exception) -> Any:
     elif kind is SetParameters:     # as many as were asked for
         response.results = [SetParametersResult(reason=text) for _ in request.parameters]
     return response
+
+
+class ExecutorServices:
+    """
+    Services of a node that an executor serves, and whose requests it does not take itself.
+
+    :param thread: takes them.
+    """
+
+    def __init__(self, thread: ServiceThread, spinner: ExecutorThread) -> None:
+        self._thread = thread
+        self._spinner = spinner
+
+    def adopt(self, services: Iterable[Service]) -> None:
+        """Begin to serve services."""
+        for service in services:
+            service.callback_group = PolledGroup()
+            self._thread.serve(service, partial(self._spinner.later, _serve, service))
+
+    def leave(self, service: Service, then: Callable[[], object]) -> None:
+        """Stop to serve one; what follows happens when its answers have been sent."""
+        self._thread.forget([service])
+        self._thread.later(partial(self._spinner.later, then))
+
+
+async def _serve(service: Service, request: Any, answer: Answer) -> None:
+    kind: Any = service.srv_type
+    try:
+        response = service.callback(request, kind.Response())
+        answer(await response if isawaitable(response) else response)
+    except Exception as error:
+        answer(error)
+        raise
 
 
 class Question(Generic[AnswerT]):

@@ -597,7 +597,15 @@ class Service(Entity):
 
 
 class Responses:
-    """Sends answers in place of :class:`drive_can_bridge.ros.answers.RclResponses`."""
+    """In place of :class:`drive_can_bridge.ros.rcl.services.RclServices`."""
+
+    def check(self, service: Any) -> None:
+        """Every service can be served."""
+
+    def take(self, service: Any, lost: Any) -> Any:
+        """Take a request."""
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+        return None if header is None else (request, header)
 
     def prepare(self, service: Any, message: Any, header: Any) -> Any:
         """Make an answer ready."""

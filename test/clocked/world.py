@@ -82,6 +82,6 @@ def world(seed: int, *, ros: bool = False) -> Iterator[World]:
             from graph import pretending, Responses
             made.graph = stack.enter_context(pretending(clock))
             made.graph.tell = made.tell
-            stack.enter_context(patch('drive_can_bridge.ros.answers.RclResponses', Responses))
+            stack.enter_context(patch('drive_can_bridge.ros.bridge_node.RclServices', Responses))
         stack.enter_context(patch.object(sys.modules[__name__], 'current', made))
         yield made

@@ -3,7 +3,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-import struct
 import threading
 from typing import Any
 
@@ -18,11 +17,13 @@ from std_srvs.srv import Trigger
 from waiting import clock
 from world import World
 
-from drive_can_bridge.ros import answers as answers_module
-from drive_can_bridge.ros.answers import (
-    Answers, RclResponses, Response, Unfit, Unreachable, WAITING_MAX,
-)
+from drive_can_bridge.ros import bridge_node
+from drive_can_bridge.ros.answers import Answers, WAITING_MAX
 from drive_can_bridge.ros.polled_topics import PolledGroup
+from drive_can_bridge.ros.rcl import services as rcl_module
+from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
+from drive_can_bridge.ros.rcl.unfit import Unfit
+from drive_can_bridge.ros.requests import Requests
 from drive_can_bridge.ros.threads import ServiceThread
 
 #: what DDS does (test/real.py)
@@ -66,11 +67,18 @@ def _told() -> list[str]:
     return []
 
 
-@pytest.fixture(name='answers')
-def _answers(told: list[str], bench: World | None) -> Iterator[Answers]:
-    answers = Answers(lambda topic, text: told.append(text), told.append, clock())
+@contextmanager
+def sending(rcl: Any, told: list[str]) -> Iterator[Answers]:
+    """Have answers sent by this."""
+    answers = Answers(rcl, lambda _, text: told.append(text), clock())
     yield answers
     answers.stop()
+
+
+@pytest.fixture(name='answers')
+def _answers(told: list[str]) -> Iterator[Answers]:
+    with sending(RclServices(), told) as answers:
+        yield answers
 
 
 def _services(bridge: Bridge) -> list[Service]:
@@ -103,16 +111,16 @@ def test_no_answer_of_the_process_holds_the_interpreter_for_a_caller_out_of_reac
         bridge: StartBridge, client: Client, ticks: Ticks, monkeypatch: pytest.MonkeyPatch,
         recwarn: pytest.WarningsRecorder, capfd: pytest.CaptureFixture[str]) -> None:
     missed: dict[str, int] = {}
-    send = RclResponses.send
+    send = RclServices.send
 
-    def watched(self: RclResponses, response: Response) -> None:
+    def watched(self: RclServices, response: Response) -> None:
         before = ticks.count
         try:
             send(self, response)
         except Unreachable:
             missed[response.service.service_name] = ticks.count - before
             raise
-    monkeypatch.setattr(RclResponses, 'send', watched)
+    monkeypatch.setattr(RclServices, 'send', watched)
     one = bridge(parameters(lift=LIFT))
     client.listen()
     services = _services(one)
@@ -138,8 +146,8 @@ def test_others_are_answered_as_ever_and_as_by_rclpy(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     one = bridge(parameters(lift=LIFT))
     sent: list[str] = []
-    send = RclResponses.send
-    monkeypatch.setattr(RclResponses, 'send', lambda self, response: (
+    send = RclServices.send
+    monkeypatch.setattr(RclServices, 'send', lambda self, response: (
         send(self, response), sent.append(response.service.service_name)))
     kinds = {service.service_name: service.srv_type for service in _services(one)}
     ours = {name: client.call(name, kind) for name, kind in kinds.items()}
@@ -150,7 +158,7 @@ def test_others_are_answered_as_ever_and_as_by_rclpy(
 
     def refuse(*_: Any) -> None:
         raise Unfit('for a test')
-    monkeypatch.setattr(RclResponses, 'prepare', refuse)
+    monkeypatch.setattr(RclServices, 'take', refuse)
     sent.clear()
     assert {name: client.call(name, kind) for name, kind in kinds.items()} == ours
     assert not sent
@@ -166,8 +174,10 @@ class Caller:
         self.service = client.node.create_service(
             Trigger, name, lambda *_: None, callback_group=PolledGroup(),
             qos_profile=qos_profile_parameters)
+        self.requests = Requests(answers._rcl, self.errors.append, self.errors.append,
+                                 context.context, REAL)
         self.thread = ServiceThread('control', context.context, self.errors.append, REAL,
-                                    send=answers.send)
+                                    send=answers.send, take=self.requests.take)
         self.thread.serve(self.service, lambda _, answer: answer(
             Trigger.Response(success=True, message='an answer')))
 
@@ -189,6 +199,7 @@ def called(client: Client, context: ClientContext, answers: Answers,
     caller = Caller(client, context, answers, name)
     yield caller
     caller.thread.stop()
+    caller.requests.stop()
     assert not caller.errors
 
 
@@ -198,62 +209,69 @@ def _caller(client: Client, _client_context: ClientContext, answers: Answers) ->
         yield caller
 
 
-def _other_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module, '_HEAD', answers_module._HEAD + 8)
-
-
-def _no_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module, '_HEAD', 0)
-
-
-def _too_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module, '_HEAD', 1 << 40)
-
-
-def _other_fields(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module, '_INFO', struct.Struct('qqq16s'))
-
-
 def _no_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module.rclpy_implementation, '__file__', '/no/such.so')
+    monkeypatch.setattr(rcl_module.rclpy_implementation, '__file__', '/no/such.so')
 
 
 def _no_function(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module.rclpy_implementation, '__file__', 'libc.so.6')
+    monkeypatch.setattr(rcl_module.rclpy_implementation, '__file__', 'libc.so.6')
 
 
 def _no_capsule(monkeypatch: pytest.MonkeyPatch) -> None:
-    functions = answers_module._functions_of
-    monkeypatch.setattr(answers_module, '_functions_of', lambda kind: functions(int))
+    address = rcl_module._address
+    monkeypatch.setattr(rcl_module, '_address', lambda kind, name: address(int, name))
+
+
+def _other_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    def layout_of(kind: Any) -> Any:
+        raise Unfit('fields of type wstring')
+    monkeypatch.setattr(rcl_module, 'layout_of', layout_of)
 
 
 @REAL_DDS
-def test_rclpy_answers_where_anything_is_other_than_expected(
-        client: Client, _client_context: ClientContext) -> None:
-    for unfit in (_other_place, _no_address, _too_small, _other_fields, _no_library, _no_function,
-                  _no_capsule):
-        told: list[str] = []
-        answers = Answers(lambda _, text, told=told: told.append(text), told.append, REAL)
-        with pytest.MonkeyPatch.context() as patched, \
-                called(client, _client_context, answers, f'~/{unfit.__name__}') as caller:
-            unfit(patched)
-            assert [caller.ask(), caller.ask()] == ['an answer'] * 2, unfit
-            line, = told
-            assert line == says('answers_hold_up'), unfit
-        answers.stop()
+@pytest.mark.parametrize('unfit', [_no_library, _no_function, _no_capsule, _other_messages])
+def test_rclpy_takes_and_answers_where_anything_is_other_than_expected(
+        client: Client, _client_context: ClientContext, told: list[str],
+        monkeypatch: pytest.MonkeyPatch, unfit: Callable[[pytest.MonkeyPatch], None]) -> None:
+    unfit(monkeypatch)
+    rcl = bridge_node._rcl_services(list(client.node.services), told.append)
+    assert rcl is None
+    line, = told
+    assert line == says('requests_hold_up')
+    with sending(rcl, told) as answers, \
+            called(client, _client_context, answers, f'~/{unfit.__name__}') as caller:
+        assert [caller.ask(), caller.ask()] == ['an answer'] * 2
+
+
+@REAL_DDS
+def test_rclpy_goes_on_where_headers_are_other_than_expected(
+        client: Client, _client_context: ClientContext, answers: Answers,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rcl_module, '_NUMBER_MAX', 0)
+    with called(client, _client_context, answers, '~/other_header') as caller:
+        name = caller.service.service_name
+        one = client.node.create_client(Trigger, name, qos_profile=qos_profile_parameters)
+        wait_until(one.service_is_ready)
+        one.call_async(Trigger.Request())   # which nobody can answer
+        wait_until(lambda: caller.errors)
+        assert [caller.ask(), caller.ask()] == ['an answer'] * 2
+        assert caller.errors == [says('requests_hold_up')]
+        caller.errors.clear()
 
 
 @REAL_DDS
 def test_python_does_not_warn_where_rclpy_answers(
-        caller: Caller, client: Client, answers: Answers, monkeypatch: pytest.MonkeyPatch,
-        recwarn: pytest.WarningsRecorder) -> None:
-    _no_library(monkeypatch)
+        _client_context: ClientContext, client: Client, told: list[str],
+        monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder) -> None:
     sent: list[int] = []
     send = Service.send_response
     monkeypatch.setattr(Service, 'send_response',
                         lambda *arguments: (send(*arguments), sent.append(1)))
-    lost = client.node.create_client(Trigger, caller.service.service_name, qos_profile=LATCHED)
-    _call_until(lost, Trigger, lambda: sent)
+    with sending(None, told) as answers, \
+            called(client, _client_context, answers, '~/asked') as caller:
+        lost = client.node.create_client(Trigger, caller.service.service_name,
+                                         qos_profile=LATCHED)
+        _call_until(lost, Trigger, lambda: sent)
     assert not _warnings(recwarn)
 
 
@@ -262,9 +280,9 @@ def test_a_service_may_be_destroyed_while_its_answer_is_sent(
         caller: Caller, client: Client, told: list[str], ticks: Ticks,
         monkeypatch: pytest.MonkeyPatch) -> None:
     over: list[bool] = []
-    send = RclResponses.send
+    send = RclServices.send
 
-    def watched(self: RclResponses, response: Response) -> None:
+    def watched(self: RclServices, response: Response) -> None:
         def destroy() -> None:
             before = ticks.count
             while ticks.count < before + TICKS:
@@ -278,7 +296,7 @@ def test_a_service_may_be_destroyed_while_its_answer_is_sent(
         finally:
             over.append(True)
             thread.join()
-    monkeypatch.setattr(RclResponses, 'send', watched)
+    monkeypatch.setattr(RclServices, 'send', watched)
     name = caller.service.service_name
     lost = client.node.create_client(Trigger, name, qos_profile=LATCHED)
     _call_until(lost, Trigger, lambda: len(over) == 2)
@@ -298,7 +316,7 @@ class FakeRcl:
 
     def prepare(self, service: Any, message: Any, header: bytes) -> Any:
         """Return something with a caller."""
-        return Response(service, message, None, 0, None, header)    # type: ignore[arg-type]
+        return Response(service, message, None, None, header)    # type: ignore[arg-type]
 
     def send(self, response: Response) -> None:
         """Wait for callers out of reach, but for the first time."""
@@ -321,11 +339,20 @@ class FakeService:
         Response = int
 
 
+@pytest.fixture(name='rcl')
+def _rcl() -> FakeRcl:
+    return FakeRcl()
+
+
+@pytest.fixture(name='late_answers')
+def _late_answers(bench: World, rcl: FakeRcl, told: list[str]) -> Iterator[Answers]:
+    with sending(rcl, told) as answers:
+        yield answers
+
+
 def test_a_client_out_of_reach_delays_others_once(
-        bench: World, answers: Answers, told: list[str],
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    rcl = FakeRcl()
-    monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
+        rcl: FakeRcl, late_answers: Answers, told: list[str]) -> None:
+    answers = late_answers
     service: Any = FakeService()
     answers.send(service, 0, b'lost')
     assert told == [says('answer_not_delivered', service=service.srv_name)]
@@ -347,9 +374,8 @@ def test_a_client_out_of_reach_delays_others_once(
 
 
 def test_what_waits_for_clients_out_of_reach_does_not_outlast_the_end(
-        bench: World, answers: Answers, monkeypatch: pytest.MonkeyPatch) -> None:
-    rcl = FakeRcl()
-    monkeypatch.setattr(answers_module, 'RclResponses', lambda: rcl)
+        rcl: FakeRcl, late_answers: Answers) -> None:
+    answers = late_answers
     service: Any = FakeService()
     for number in range(3):
         answers.send(service, number, b'lost')
