@@ -125,6 +125,7 @@ class ServoDrive:
     :ivar objects: (index, sub-index) -> content, low byte first.
     :ivar state: the bits of the status word that tell it.
     :ivar told: the control words that it was sent, in order, without repetitions.
+    :ivar cut_short: how often 0000h has ended its braking.
     """
 
     OFF, READY, ON, ENABLED, QUICK_STOP, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x08
@@ -139,6 +140,7 @@ class ServoDrive:
         self.fixed: dict[tuple[int, int], int] = {}     # (index, sub-index) -> abort code
         self.instead: dict[str, str] = {}   # how an SDO begins -> what is answered instead
         self.braking = 0                # SYNCs until a quick stop has ended
+        self.cut_short = 0
         self.ramp = 0                   # SYNCs that it takes to disable operation
         self._staged: list[tuple[int, bytes]] = []
         self.objects = {
@@ -283,8 +285,13 @@ class ServoDrive:
                 self.becomes(self.ON)
         if self.state == self.QUICK_STOP and self.braking:
             self.braking -= 1
-            if not self.braking and self.number(0x605A) < 5:
+            if not self.braking and not self.stays:
                 self.becomes(self.OFF)
+
+    @property
+    def stays(self) -> bool:
+        """In quick stop active, when it stands."""
+        return self.number(0x605A) >= 5
 
     def _control(self, word: int) -> None:
         before = self.told[-1] if self.told else 0
@@ -295,6 +302,7 @@ class ServoDrive:
             if word & 0x80 and not before & 0x80:
                 self.becomes(self.OFF)
         elif not command & 0x02:
+            self.cut_short += bool(state == self.QUICK_STOP and self.braking)
             self.becomes(self.OFF)
         elif not command & 0x04:
             if state == self.ENABLED:

@@ -191,6 +191,7 @@ class TableRules:
     One word for each action, as the table has them.
 
     :ivar known: the actions that there is a word for.
+    :ivar may_run: whatever the drive reports, it may be as old as before a word that started it.
     """
 
     def __init__(self, table: ControlTable) -> None:
@@ -198,6 +199,7 @@ class TableRules:
             action: word for action in ControlAction
             if (word := getattr(table, action.value, None)) is not None}
         self.known = frozenset(self._words)
+        self.may_run = False
 
     def word(self, sending: ControlAction, *, asked: ControlAction | None) -> int:
         """
@@ -237,6 +239,10 @@ class TableRules:
 
     def remark(self, sending: ControlAction) -> Sentence:
         """Say what else is known of why a drive does not do what is wanted; '' for nothing."""
+        return NOTHING
+
+    def proviso(self) -> Sentence:
+        """Say, once, what is not known of a request that succeeds; '' for nothing."""
         return NOTHING
 
     @property

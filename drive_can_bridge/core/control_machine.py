@@ -15,7 +15,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import (
     ControlAction, ControlCompleted, ControlRequest, Meeting, MEETINGS, Seen, STEPS, TableRules,
     Then)
-from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.status_reports import (
     disregard_text, state_text, StatusReports, stuck_text, success_text, Wording)
@@ -399,7 +399,9 @@ class ControlMachine:
                 MEETINGS[action, under_way.action] is not Meeting.REFUSED
                 or self._nothing_to_do(action)):
             return None
-        return sentences.stop_under_way(under_way.action.value, action.value)
+        return together((
+            sentences.stop_under_way(under_way.action.value, action.value),
+            sentences.still_braking() if self._reports.braking else NOTHING))
 
     def _advance(self) -> None:
         """Take the next step of what is under way, if what it waits for is seen."""
@@ -455,7 +457,8 @@ class ControlMachine:
     def _success(self, under_way: Operation) -> Sentence:
         """Name what was reached, or say that nobody knows."""
         if under_way.action is not ControlAction.RESET_FAULT:
-            return success_text(self._table, self._sending, self.state)
+            return together((
+                success_text(self._table, self._sending, self.state), self._rules.proviso()))
         return (sentences.reset_not_reported() if self._table.fault is None else
                 sentences.state_reached(self.state))
 
@@ -499,7 +502,7 @@ class ControlMachine:
     def _watch_disabled(self, now: float) -> None:
         """Tell of a drive that runs on although its control word is there to stop it."""
         if self._disregard.lasts(now, so=self._sending in _STOPS and self._sent and (
-                not self._fault and self._reports.running_on)):
+                not self._fault and self._reports.running_on and not self._rules.holds)):
             self._disregard.text = disregard_text(
                 self._reports, self.state, self._sending, self.word)
             self._notes.append(self._disregard.text)
@@ -516,7 +519,9 @@ class ControlMachine:
 
     def _confirmed_off(self) -> bool:
         """Tell whether the drive, knowing the current word, reports that it does not run."""
-        return self._sent if self._table.enabled is None else self._reports.standing
+        if self._table.enabled is None:
+            return self._sent
+        return self._reports.standing and not self._rules.may_run
 
     def _resettable(self) -> bool:
         """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""

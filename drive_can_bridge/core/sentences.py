@@ -218,7 +218,12 @@ no_status_since = Text(
 local_control = Text(
     'the drive is not under remote control: look at what gives it its commands',
     do='give CANopen the control of the drive')
-quick_stop_holds = Text('{state}, holds', do='disable or enable it to go on')
+quick_stop_holds = Text(
+    '{state}, holds; enable takes the power off for some cycles: an axis without a brake sinks',
+    do='disable or enable it to go on')
+nothing_says_standing = Text(
+    'nothing says that it stands',
+    do='look whether the axis stands; have the drive tell 6064h or 606Ch')
 error_code = Text('error code (603Fh) {code:04X}h', do="look the number up in the drive's manual")
 target_not_acknowledged = Text(
     'it has not acknowledged its target: bit 12 of the status word is not {expected} after '

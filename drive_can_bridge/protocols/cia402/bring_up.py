@@ -135,7 +135,9 @@ class BringUp:
                     at_object(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
             raw = int.from_bytes(reply.data[:2], 'little')
             state = states.state_of(raw)
-            reacting = state is State.FAULT_REACTION    # it stops by itself, whatever it is told
+            self._rules.standing.status(raw, self._channel.now)
+            # it stops by itself, whatever it is told
+            braking = reacting = state is State.FAULT_REACTION
             if not reacting and state not in _RUNNING:
                 break
             found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
@@ -148,8 +150,7 @@ class BringUp:
             wanted = DISABLE_WORDS[self._options.disable_word]
             if state is State.QUICK_STOP_ACTIVE:    # which takes its course
                 wanted = states.DISABLE_VOLTAGE
-            braking = reacting or (
-                state is State.QUICK_STOP_ACTIVE and (yield from self._brakes(raw)))
+                braking = yield from self._brakes()
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
                 refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)
@@ -161,14 +162,13 @@ class BringUp:
         self._session.duty.happened(Happened.STOPPED)
         return raw
 
-    def _brakes(self, status: int) -> Generator[Ask, Reply, bool]:
-        """Tell whether a quick stop takes its course: one that ends by itself does until then."""
-        self._rules.quick_stop_option = yield from self._read(
+    def _brakes(self) -> Generator[Ask, Reply, bool]:
+        """Tell whether a quick stop takes its course."""
+        standing = self._rules.standing
+        standing.quick_stop_option = yield from self._read(
             states.QUICK_STOP_OPTION, 0, 2, signed=True)
-        if not self._rules.stays:
-            return True
-        return not status & states.TARGET_REACHED and (
-            yield from self._read(states.VELOCITY)) != 0
+        yield from standing.look(self._channel, sampled=False)
+        return not standing.holds
 
     def _learn(self) -> Procedure:
         """Read what the drive does at a stop."""
@@ -178,7 +178,7 @@ class BringUp:
                 self.options.pop(index, None)
             else:
                 self.options[index] = value
-            self._rules.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
+            self._rules.standing.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
     def learn_again(self) -> Procedure:
         """Read it once more: users have written it."""

@@ -10,7 +10,8 @@ enable       switch on disabled      0006h (before 000Fh is sent at all)
              switched on, enabled    000Fh, with the bits of the mode
 disable      operation enabled, or   ``disable_word``: 0007h, 0006h or 0000h
              nobody knows
-             quick stop active       0002h; once it stands and stays there, 0000h
+             quick stop active       0002h; once it stands and stays there, 0000h (which ends the
+                                     braking, so never before)
              anything else           0006h; with ``disable_voltage`` 0000h, unless it is to be
                                      enabled
 quick stop   anything                0002h
@@ -20,6 +21,8 @@ reset fault  anything                0080h
 A drive that was sent 000Fh counts as enabled until a status behind a later word says otherwise,
 and one that was sent 0002h gets no other word until a status behind that was seen: what is on its
 way tells of older times, and 0006h or 0007h in the middle of a quick stop would end its braking.
+A status may be :data:`.STATUS_LAG` answered cycles behind its word: until then it counts only if
+it shows what nothing before that word can have led to.
 """
 
 from typing import Any, Protocol
@@ -29,12 +32,11 @@ from drive_can_bridge.core.control import ControlAction, TableRules
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.protocols.cia402 import states
+from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import PATTERNS, State
 
 DISABLE_WORDS = {'disable_operation': states.SWITCH_ON, 'shutdown': states.SHUTDOWN,
                  'disable_voltage': states.DISABLE_VOLTAGE}
-#: 605Ah: the drive stays in quick stop active
-_STAYS = range(5, 9)
 _ENABLE_OPERATION = 0x0008
 #: a motor may turn: operation enabled, quick stop, fault reaction
 _RUNNING = StatusPattern(0x0004, 0x0004)
@@ -78,23 +80,21 @@ class DriveRules(TableRules):
     The words of one drive.
 
     :param known: what else is known of it.
+    :param standing: whether its axis stands.
     :ivar state: the newest one; None: not known.
     :ivar status: the word that told it; 0: not known.
-    :ivar quick_stop_option: 605Ah; None: the drive has none.
-    :ivar velocity_zero: 606Ch said so in *quick stop active*.
-    :ivar waited_out: nothing says whether it stands there, and it had its time to. That is enough
-        for what users ask for, and says nothing else.
+    :ivar may_run: 000Fh was sent, and no status behind a later word has said otherwise.
     :ivar mode_bits: what the mode adds to the enable word once the drive is enabled.
     :ivar homing_bits: what is sent beside 000Fh in mode 6; None: the drive is in its own mode.
     :ivar halted: the drive was told to halt: its position is its own.
     """
 
-    def __init__(self, table: ControlTable, options: Any, known: Known) -> None:
+    def __init__(self, table: ControlTable, options: Any, known: Known, standing: Standing,
+                 ) -> None:
         super().__init__(table)
         self.state: State | None = None
         self.status = 0
-        self.quick_stop_option: int | None = None
-        self.velocity_zero = self.waited_out = False
+        self.standing = standing
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
         self.homing_bits: int | None = None
         self.halted = False
@@ -102,9 +102,10 @@ class DriveRules(TableRules):
         self._disable_word = DISABLE_WORDS[options.disable_word]
         self._enable_word = states.ENABLE | (
             states.RAMP_BITS if options.mode == 'vl' and options.ramp_bits else 0)
-        self._may_be_enabled = self._quick_stop_unseen = False
-        self._still_enabled = False     # by the status behind 0002h, which may be one of before
-        self._last = 0
+        self._seen_enabled = False      # since 000Fh
+        self._quick_stop_unseen = False
+        self._taken_on_trust = False    # 0000h went out although nothing says that it stands
+        self._last = self._answers = 0  # the word, and how many status words have come behind it
 
     def word(self, sending: ControlAction, *, asked: ControlAction | None) -> int:
         if sending is ControlAction.DISABLE:
@@ -117,9 +118,12 @@ class DriveRules(TableRules):
         if self._quick_stop_unseen:
             return states.QUICK_STOP
         if self.state is State.QUICK_STOP_ACTIVE:
-            ends = self.stays and (self.stands or self.waited_out and asked is not None)
-            return states.DISABLE_VOLTAGE if ends else states.QUICK_STOP
-        if self._may_be_enabled or self.state in (None, State.OPERATION_ENABLED):
+            on_trust = not self.standing.holds
+            if on_trust and (asked is None or not self.standing.untold):
+                return states.QUICK_STOP
+            self._taken_on_trust = on_trust
+            return states.DISABLE_VOLTAGE
+        if self.may_run or self.state in (None, State.OPERATION_ENABLED):
             return self._disable_word
         if self._disable_word == states.DISABLE_VOLTAGE and asked is not ControlAction.ENABLE:
             return states.DISABLE_VOLTAGE
@@ -142,53 +146,51 @@ class DriveRules(TableRules):
         return not word & (_ENABLE_OPERATION | states.FAULT_RESET) and word != states.QUICK_STOP
 
     def left(self, word: int) -> None:
-        self._still_enabled = self._still_enabled and word == self._last
+        if word != self._last:
+            self._answers = 0
+            self._quick_stop_unseen = word == states.QUICK_STOP
+            self._taken_on_trust = self._taken_on_trust and not self._quick_stop_unseen
         self._last = word
         if word & _ENABLE_OPERATION:
-            self._may_be_enabled = True
-        elif word == states.QUICK_STOP:
-            self._quick_stop_unseen = True
+            self._seen_enabled = self._seen_enabled and self.may_run
+            self.may_run = True
 
     def reported(self, raw: int, *, behind: bool) -> None:
-        self.status = raw
-        before, self.state = self.state, states.state_of(raw)
-        if self.state is not before:
-            self.velocity_zero = self.waited_out = False
+        self.status, self.state = raw, states.state_of(raw)
+        enabled = self.state is State.OPERATION_ENABLED
+        self._seen_enabled = self._seen_enabled or enabled
         if not behind:
             return
-        if self._last == states.QUICK_STOP:
-            # it may have been sampled, or on its way, before: a second one was not
-            enabled = self.state is State.OPERATION_ENABLED
-            self._quick_stop_unseen = enabled and not self._still_enabled
-            self._still_enabled = enabled
-        if not self._last & _ENABLE_OPERATION and self.state is not State.OPERATION_ENABLED:
-            self._may_be_enabled = False
+        self._answers += 1
+        # one that has left it knows a later word: status words do not overtake each other
+        known = self._answers > states.STATUS_LAG or self._seen_enabled and not enabled
+        if known or self.state is State.QUICK_STOP_ACTIVE:
+            self._quick_stop_unseen = False
+        if known and not self._last & _ENABLE_OPERATION and not enabled:
+            self.may_run = False
 
     def forget(self) -> None:
         self.state, self.status = None, 0
-        self.velocity_zero = self.waited_out = self.halted = False
-        self._quick_stop_unseen, self._still_enabled = self._last == states.QUICK_STOP, False
+        self.halted = self._taken_on_trust = False
+        self._quick_stop_unseen, self._answers = self._last == states.QUICK_STOP, 0
+        self.standing.forget()
 
     def known_disabled(self) -> None:
         """Record that the drive was asked by SDO, and is not enabled."""
-        self._may_be_enabled = self._quick_stop_unseen = False
-        self._last = 0
-
-    @property
-    def stays(self) -> bool:
-        """A quick stop does not end by itself."""
-        return self.quick_stop_option in _STAYS
-
-    @property
-    def stands(self) -> bool:
-        """A drive in *quick stop active* says that it stands."""
-        return bool(self.status & states.TARGET_REACHED) or self.velocity_zero
+        self.may_run = self._quick_stop_unseen = False
+        self._last = self._answers = 0
 
     @property
     def holds(self) -> Sentence:
-        if self.state is State.QUICK_STOP_ACTIVE and self.stays and self.stands:
+        if self.standing.holds:
             return sentences.quick_stop_holds(State.QUICK_STOP_ACTIVE.value)
-        return NOTHING
+        return together((
+            sentences.quick_stop_holds(State.QUICK_STOP_ACTIVE.value),
+            sentences.nothing_says_standing())) if self.standing.untold else NOTHING
+
+    def proviso(self) -> Sentence:
+        on_trust, self._taken_on_trust = self._taken_on_trust, False
+        return sentences.nothing_says_standing() if on_trust else NOTHING
 
     @property
     def lacking(self) -> Sentence:

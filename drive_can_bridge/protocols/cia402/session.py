@@ -51,6 +51,7 @@ from drive_can_bridge.protocols.cia402.objects import Found, Outcome
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
+from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
@@ -110,7 +111,8 @@ class Cia402Session(Session):
                  heartbeat: BridgeHeartbeat | None = None) -> None:
         options = drive.options
         table = control_table(options)
-        self._rules = DriveRules(table, options, self)
+        self._standing = Standing(drive)
+        self._rules = DriveRules(table, options, self, self._standing)
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
@@ -165,7 +167,6 @@ class Cia402Session(Session):
         """Know nothing of what the drive shows while it is enabled."""
         self._mode_shown: int | None = None
         self._looking = False
-        self._tells_velocity = True
         self._error_code: int | None = None
 
     # -- life cycle -------------------------------------------------------------------------------
@@ -179,6 +180,7 @@ class Cia402Session(Session):
         self._course.stop()
         self._forget_state()
         self._limits.stop()
+        self._standing.forget()
         self._node.begin(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
@@ -410,6 +412,10 @@ class Cia402Session(Session):
             self.duty.happened(Happened.ANSWERED)
         if self._handover is not None:
             self._handover.look(raws[0], now)
+        standing = self._standing
+        standing.status(raws[0], now)
+        if standing.watching:
+            standing.sampled(raws, now)
         self.interlock.status(raws[0], now)
         self._look_at_state(now)
         self.control_changed(now)
@@ -468,10 +474,9 @@ class Cia402Session(Session):
             self._error_code = None
         if self._looking:
             return
-        if state is State.QUICK_STOP_ACTIVE and self._rules.stays and (
-                not self._rules.stands and not self._rules.waited_out):
+        if self._standing.watching and not self._standing.holds:
             self._looking = True
-            self._channel.run(self._look_at_velocity(now), self._looked, now)
+            self._channel.run(self._look_at_axis(), self._looked, now)
         elif self.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
         elif state is State.OPERATION_ENABLED and self._mode_shown != self._mode and (
@@ -502,23 +507,10 @@ class Cia402Session(Session):
                 return
             yield Ask(pause=LOOK_PERIOD)
 
-    def _look_at_velocity(self, since: float) -> Generator[Ask, Reply, None]:
-        """
-        Read 606Ch until a drive that stays in its quick stop stands; without one, wait.
-
-        :param since: when the quick stop was seen.
-        """
-        rules, until = self._rules, since + self.configuration.control_timeout
-        while rules.state is State.QUICK_STOP_ACTIVE and not rules.stands:
-            if self._tells_velocity:
-                reply = yield Ask(states.VELOCITY)
-                self._tells_velocity = reply.abort is None
-                rules.velocity_zero = reply.data is not None and not any(reply.data)
-            elif self._channel.now >= until:
-                rules.waited_out = True
-                self._machine.rules_changed()
-                self.control_changed(self._channel.now)
-                return
+    def _look_at_axis(self) -> Generator[Ask, Reply, None]:
+        """Read what samples do not say as long as it is to be known whether the axis stands."""
+        while self._standing.watching and not self._standing.holds:
+            yield from self._standing.look(self._channel)
             yield Ask(pause=LOOK_PERIOD)
 
     def _look_at_error(self) -> Generator[Ask, Reply, None]:
@@ -652,10 +644,16 @@ class Cia402Session(Session):
         while True:
             reply = yield Ask(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
             if reply.data is not None:
-                state = state_of(int.from_bytes(reply.data, 'little'))
+                raw = int.from_bytes(reply.data[:2], 'little')
+                state = state_of(raw)
+                self._standing.status(raw, self._channel.now)
             known = reply.abort is not None or reply.data is not None
             if known and state not in states.MOVING or self._channel.now >= self._stop_until:
                 return state
+            if self._standing.watching:
+                yield from self._standing.look(self._channel, sampled=False)
+            if self._standing.holds:
+                yield Ask(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
             yield Ask(pause=LOOK_PERIOD)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Ask, Reply]:
@@ -674,13 +672,13 @@ class Cia402Session(Session):
         listens = not book.missed_in_row or (
             book.stop_shown and book.missed_in_row < self.configuration.missed_limit)
         if now < self._stop_until and listens and (
-                self._rules.state in states.MOVING
+                self._rules.state in states.MOVING or self._rules.may_run
                 or self._rules.state and self._machine.word_due):
             self.exchange.cycles_left = 1   # it still brakes, or 0006h has not left
             return
         unheard = self.unshown
         self.exchange.doubt_the_end()
-        if self._rules.state in states.MOVING:
+        if self._rules.state in states.MOVING or self._rules.may_run:
             self.duty.channel(CYCLE, Happened.RUN_LEFT)
             self.duty.happened(Happened.SILENT)     # of what it should have done
         self.exchange.stop()

@@ -23,11 +23,13 @@ from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 
 CONTROL_WORD, STATUS_WORD = 0x6040, 0x6041
 MODE, MODE_SHOWN, MODES_OFFERED = 0x6060, 0x6061, 0x6502
-ERROR_CODE, VELOCITY = 0x603F, 0x606C
+ERROR_CODE, POSITION = 0x603F, 0x6064
+#: of mode vl; and what counts as no velocity
+VELOCITY, VELOCITY_VL, VELOCITY_THRESHOLD = 0x606C, 0x6044, 0x606F
 #: what the drive does at a stop
 STOP_OPTIONS = QUICK_STOP_OPTION, SHUTDOWN_OPTION, DISABLE_OPTION = 0x605A, 0x605B, 0x605C
 ABORT_CONNECTION_OPTION, INTERPOLATION_TIME = 0x6007, 0x60C2
-HOMING_MODE = 6
+HOMING_MODE, HOMING_METHOD = 6, 0x6098
 
 DISABLE_VOLTAGE = 0x0000
 QUICK_STOP = 0x0002
@@ -50,6 +52,9 @@ TARGET_REACHED = 0x0400
 #: by mode: set-point acknowledged (pp), interpolation active (ip), attained (hm)
 BIT_12 = 0x1000
 BIT_13 = 0x2000
+
+#: answered cycles by which a status may be behind its control word
+STATUS_LAG = 3
 
 #: name of the status word among the parameters of a drive
 STATUS_NAME = 'status_word'

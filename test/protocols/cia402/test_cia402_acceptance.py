@@ -58,6 +58,8 @@ def test_one_that_holds_when_found_stands_when_its_velocity_is_0() -> None:
     axis = Axis(objects={(0x605A, 0): b'\6\0'})
     axis.drive.becomes(axis.drive.QUICK_STOP)
     axis.start()
+    assert '605#2B40600000000000' not in axis.take()
+    axis.live(0.5)
     assert '605#2B40600000000000' in axis.take()
     assert axis.session.online
 

@@ -1,10 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Which control words a drive of CiA 402 is sent, in which state, and what is said of it."""
 
+from typing import Any
+
 from builders import INT16, parameter, write
+from literal_servos import LateServo
 import pytest
 from saying import says
-from servo_builders import Axis, ERROR, TABLE
+from servo_builders import Axis, ERROR, OBJECTS, TABLE
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
@@ -188,6 +191,8 @@ class TestQuickStop:
             axis.drive.objects[0x6041, 0] = b'\x07\x06'
         else:
             axis.drive.objects[0x606C, 0] = bytes(4)
+            axis.live(0.45)
+            assert axis.talk.control_outcomes() == []
         axis.live(0.1)
         assert axis.talk.control_outcomes() == [
             ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
@@ -200,20 +205,20 @@ class TestQuickStop:
 
     def test_one_that_holds_and_is_disabled(self) -> None:
         axis = Axis(objects={(0x605A, 0): b'\x06\0'}).enabled()
-        assert [success for _, success, _ in axis.asks(QUICK_STOP)] == [True]
+        assert [success for _, success, _ in axis.asks(QUICK_STOP, 0.6)] == [True]
         assert [success for _, success, _ in axis.asks(DISABLE)] == [True]
         assert axis.words() == ['0200', '0000', '0600']
 
     @pytest.mark.parametrize('heard', [True, False])
     def test_one_that_users_have_made_hold(self, heard: bool) -> None:
         option = parameter('quick_stop_option', None, index=0x605A, type=INT16)
-        axis = Axis(table=(*TABLE, option), control_timeout=0.5, parameter_timeout=0.05).enabled()
+        axis = Axis(table=(*TABLE, option), control_timeout=0.7, parameter_timeout=0.05).enabled()
         axis.mute = not heard
         axis.deliver(axis.talk.submits(write((option, 6)), axis.now))
         axis.mute = False
         axis.live(0.2)
         assert 'then holds' in axis.session.facts()['stops_by']
-        assert axis.asks(QUICK_STOP) == [
+        assert axis.asks(QUICK_STOP, 0.6) == [
             ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
         axis.take()
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
@@ -221,11 +226,11 @@ class TestQuickStop:
 
     def test_one_that_is_silent_before_it_has_told_everything_again(self) -> None:
         option = parameter('quick_stop_option', None, index=0x605A, type=INT16)
-        axis = Axis(table=(*TABLE, option), control_timeout=0.5, parameter_timeout=0.05).enabled()
+        axis = Axis(table=(*TABLE, option), control_timeout=0.7, parameter_timeout=0.05).enabled()
         axis.drive.instead = {'405b6000': ''}
         axis.deliver(axis.talk.submits(write((option, 6)), axis.now))
         axis.live(0.5)
-        assert axis.asks(QUICK_STOP) == [
+        assert axis.asks(QUICK_STOP, 0.6) == [
             ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
 
     def test_an_old_status_is_none_behind_a_quick_stop(self) -> None:
@@ -283,7 +288,7 @@ class TestQuickStop:
         axis.live(0.3)
         assert axis.words() == ['0F00', '0200'][1:]
         axis.drive.objects[0x606C, 0] = bytes(4)
-        axis.live(0.3)
+        axis.live(0.8)
         assert axis.words()[:3] == ['0200', '0000', '0600']
         assert axis.session.stopped
 
@@ -295,13 +300,18 @@ class TestQuickStop:
         assert axis.take().count('605#406C600000000000') == 1
 
 
+#: what is answered where nothing says that it stands
+UNTOLD = says('state_reached', parts=[says('state_reached'), says('nothing_says_standing')])
+
+
 class TestOneThatHoldsAndDoesNotTellWhetherItStands:
-    """605Ah 6, no 606Ch, and bit 10 never: for users a time stands for it, and for nobody else."""
+    """No 606Ch, 6044h, 6064h, bit 10 never: for users a time stands for it, and nobody else."""
 
     @staticmethod
     def braking(since: float) -> Axis:
-        axis = Axis(objects={(0x605A, 0): b'\x06\0'}, control_timeout=0.5).enabled()
-        del axis.drive.objects[0x606C, 0]
+        axis = Axis(objects={(0x605A, 0): b'\x06\0'}, control_timeout=0.5, response=()).enabled()
+        for place in (0x606C, 0), (0x6064, 0):
+            del axis.drive.objects[place]
         axis.drive.becomes(axis.drive.QUICK_STOP)
         axis.live(since)
         assert axis.words()[-1] == '0200'
@@ -310,10 +320,11 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
     @pytest.mark.parametrize('since', [0.6, 5.0])
     def test_it_is_disabled_and_enabled_behind_control_timeout(self, since: float) -> None:
         axis = self.braking(since)
-        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
+        assert axis.asks(DISABLE) == [('disable', True, UNTOLD)]
         assert axis.words() == ['0000', '0600']
+        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
         axis = self.braking(since)
-        assert axis.asks(ENABLE) == [('enable', True, State.OPERATION_ENABLED.value)]
+        assert axis.asks(ENABLE) == [('enable', True, UNTOLD)]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
 
     def test_not_before(self) -> None:
@@ -334,16 +345,21 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
             assert axis.words() == ['0200']
             axis.live(0.2)
             assert axis.words() == ['0200', '0000', '0600']
-            assert axis.asks(ENABLE)[-1] == ('enable', True, State.OPERATION_ENABLED.value)
+            assert axis.talk.control_outcomes()[-1] == ('disable', True, UNTOLD)
+            assert axis.asks(ENABLE) == [('enable', True, State.OPERATION_ENABLED.value)]
 
-    def test_a_quick_stop_is_not_answered_as_holding(self) -> None:
-        axis = Axis(objects={(0x605A, 0): b'\x06\0'}, control_timeout=0.5).enabled()
-        del axis.drive.objects[0x606C, 0]
-        (_, success, why), = axis.asks(QUICK_STOP, 5.0)
+    def test_a_quick_stop_is_answered_as_holding_when_it_is_asked_for_again(self) -> None:
+        axis = self.braking(0.6)
+        axis.asks(ENABLE)
+        axis.take()
+        (_, success, why), = axis.asks(QUICK_STOP, 0.6)
         assert not success
         assert 'still braking' in why
+        assert axis.asks(QUICK_STOP) == [('quick_stop', True, says('quick_stop_holds', parts=[
+            says('quick_stop_holds'), says('nothing_says_standing')]))]
+        axis.live(5.0)
         assert axis.words() == ['0200']
-        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
+        assert axis.asks(DISABLE) == [('disable', True, UNTOLD)]
 
     def test_the_end_of_the_bridge_waits_for_no_time(self) -> None:
         axis = self.braking(5.0)
@@ -352,6 +368,80 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
         assert axis.session.stopped
         assert axis.words() == ['0200']
         assert any(note.danger for note in axis.talk.events(Noted))
+
+
+@pytest.mark.parametrize('late', [1, 2, 3])
+class TestAStatusThatIsLate:
+    """By so many cycles: a state machine that is slower than the period, or a filter."""
+
+    @staticmethod
+    def meet(late: int, **options: Any) -> tuple[Axis, LateServo]:
+        axis = Axis(**options)
+        drive = axis.drive = LateServo(5, OBJECTS)
+        drive.late_status = late
+        axis.online()
+        axis.drive.told.clear()
+        return axis, drive
+
+    @staticmethod
+    def first_enable_word(axis: Axis) -> None:
+        axis.deliver(axis.talk.asks(ENABLE, axis.now))
+        while not any(text.startswith('205#0F00') for text in axis.take()):
+            axis.live(0.001)
+
+    def test_a_disable_right_behind_the_enable_word(self, late: int) -> None:
+        """
+        The drive is enabled when it comes: it is disabled by 0007h, and 0006h may let it coast.
+
+        It is not called disabled by a status of before, either.
+        """
+        axis, drive = self.meet(late)
+        self.first_enable_word(axis)
+        axis.deliver(axis.talk.asks(DISABLE, axis.now))
+        while ('disable', True) not in [each[:2] for each in axis.talk.control_outcomes()]:
+            axis.live(0.001)
+        assert drive.state in (drive.ON, drive.READY)
+        axis.live(0.1)
+        assert drive.told[-3:] == [0x0F, 0x07, 0x06]
+
+    def test_a_quick_stop_and_a_disable_right_behind_the_enable_word(self, late: int) -> None:
+        axis, drive = self.meet(late, disable_word='disable_voltage')
+        drive.braking = 40
+        self.first_enable_word(axis)
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.02)
+        axis.asks(DISABLE, 0.2)
+        assert drive.told[-1] == 0x02
+        assert drive.state == drive.QUICK_STOP
+        axis.live(0.5)
+        assert drive.told[-1] == 0x00
+        assert drive.cut_short == 0
+
+    def test_a_disable_while_the_status_says_enabled_behind_a_quick_stop(self, late: int) -> None:
+        axis, drive = self.meet(late, disable_word='disable_voltage')
+        drive.braking = 40
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+        axis.deliver(axis.talk.asks(QUICK_STOP, axis.now))
+        axis.live(0.025)
+        axis.asks(DISABLE, 0.2)
+        assert drive.told[-1] == 0x02
+        assert drive.cut_short == 0
+
+    def test_a_fault_that_is_reset_is_gone_before_anything_is_said(self, late: int) -> None:
+        axis, drive = self.meet(late)
+        drive.becomes(drive.FAULT)
+        axis.live(0.1)
+        (_, success, _), = axis.asks(ControlAction.RESET_FAULT)
+        assert success and drive.state != drive.FAULT
+        assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
+
+    def test_the_end_right_behind_the_enable_word(self, late: int) -> None:
+        axis, drive = self.meet(late)
+        self.first_enable_word(axis)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(2.0)
+        assert axis.session.stopped
+        assert drive.told[-3:] == [0x0F, 0x07, 0x06]
 
 
 class TestOneThatFallsOutBeforeItsEnableIsConfirmed:
