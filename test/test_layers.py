@@ -34,7 +34,7 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
-        'exchange', 'process', 'ros.messages', 'ros.recognition'},
+        'exchange', 'process', 'ros.client', 'ros.messages', 'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS

@@ -7,7 +7,6 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-import re
 from typing import Any
 
 from drive_can_bridge.cli.command import (
@@ -15,7 +14,10 @@ from drive_can_bridge.cli.command import (
 )
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern
-from drive_can_bridge.process.locks import bridges, Present, short
+from drive_can_bridge.process.environment import nobody
+from drive_can_bridge.process.local_stop import Answer, begun, LocalStop, RUNNING
+from drive_can_bridge.process.local_way import matches
+from drive_can_bridge.process.presence import short
 from drive_can_bridge.resources import what_is_missing
 
 STOP = 'stop'
@@ -28,7 +30,8 @@ _WORDS = {
     'disable': ('DRIVE …', '+', 'disable drives', 'Calls ~/enable with false.'),
     'reset': ('DRIVE …', '+', 'reset the faults of drives', 'Calls ~/reset_fault.'),
 }
-_UP_TO_WILD = re.compile(r'[^*?[]*')
+#: s between two looks at what has arrived
+LOOK_PERIOD = 0.002
 
 
 def define(parser: ArgumentParser) -> None:
@@ -65,17 +68,10 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: no bridge, no ROS.
     """
     _check(args)
+    if args.subcommand == STOP:
+        return _stop(args)
+    graph, control = _ros(args)
     try:
-        from drive_can_bridge.ros.client.calls import ClientNode
-        client_node = ClientNode('client')     # is being discovered while the rest is imported
-        from drive_can_bridge.ros.client import control
-        from drive_can_bridge.ros.client.search import Graph
-    except ImportError as error:
-        raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
-    graph = Graph(args.clock, client_node)
-    try:
-        if args.subcommand == STOP:
-            return _stop(args, graph)
         from drive_can_bridge.cli.output import waiting     # a stop has no time for that
         try:
             with waiting('waiting for the bridge'):
@@ -85,6 +81,22 @@ def run(args: Namespace) -> int:
             raise WrongUsage(str(error)) from None
     finally:
         graph.close()
+
+
+def _ros(args: Namespace) -> tuple[Any, Any]:
+    """
+    Become part of the ROS graph; return that, and what tells drives there.
+
+    :raises DriveCanError: no ROS.
+    """
+    try:
+        from drive_can_bridge.ros.client.calls import ClientNode
+        client_node = ClientNode('client')     # is being discovered while the rest is imported
+        from drive_can_bridge.ros.client import control
+        from drive_can_bridge.ros.client.search import Graph
+    except ImportError as error:
+        raise DriveCanError(what_is_missing(f'drive_can {args.subcommand}', error)) from error
+    return Graph(args.clock, client_node), control
 
 
 def _check(args: Namespace) -> None:
@@ -101,50 +113,91 @@ def _check(args: Namespace) -> None:
                 raise WrongUsage(f'{word!r}: takes full names, no patterns')
 
 
-def _stop(args: Namespace, graph: Any) -> int:
-    from drive_can_bridge.ros.client.control import Answer, Stop
-    domain = graph.client_node.context.get_domain_id()
-    present = [each for each in bridges() if _concerns(each, args.namespace, args.words)]
-    stop = Stop(graph, args.namespace, args.words, [
-        each.name for each in present if each.domain == domain and each.has_place])
+def _stop(args: Namespace) -> int:
+    """Stop drives: of this host by the local way, and through ROS where that does not reach."""
+    local = begun(args.namespace, args.words)
+    ros = _RosStop(args, local)
+    now = args.clock.now
     try:
-        graph.wait(stop.look, float('inf'))
+        while not local.look(now()) and not ros.look(now()):
+            args.clock.wait(now() + LOOK_PERIOD)
+        return _show(args, ros.answers())
     except KeyboardInterrupt:
         complain('interrupted; this is known:')
-        _show(args, stop.answers())
+        _show(args, ros.answers())
         raise
-    known = {short(name) for name in stop.seen}
-    unseen = [Answer(each.name, False,
-                     f'{each.silence(domain)}: its drives may still be running', bridge=True)
-              for each in present if each.domain != domain or each.name not in known]
-    return _show(args, [*unseen, *stop.answers()])
+    except DriveCanError:   # no ROS: what was reached without is told all the same
+        if local.answers():
+            _show(args, ros.answers())
+        raise
+    finally:
+        local.close()
+        ros.close()
 
 
-def _concerns(present: Present, namespace: str | None, words: Sequence[str]) -> bool:
-    """Tell whether a bridge of this host may have one of the drives that are meant."""
-    if namespace is not None or not present.has_place:
-        return present.may_be_in(namespace)
-    place = present.name.rpartition('/')[0]
-    return not words or any(not word.startswith('/') or _may_mean(word, f'{place}/')
-                            for word in words)
+class _RosStop:
+    """The part of a stop that goes through ROS, begun where there is need of it."""
 
+    def __init__(self, args: Namespace, local: LocalStop) -> None:
+        self._args = args
+        self._local = local
+        self._graph: Any = None
+        self._stop: Any = None
 
-def _may_mean(word: str, place: str) -> bool:
-    """Tell whether a full name, or a pattern of some, may mean a drive in a namespace."""
-    literal = _UP_TO_WILD.match(word)[0]    # type: ignore[index]  # matches anything
-    if literal.startswith(place):
-        return '/' not in literal[len(place):]
-    return is_pattern(word) and place.startswith(literal)
+    def look(self, now: float) -> bool:
+        """Go on; return whether all is done, of the local part, too."""
+        args, local = self._args, self._local
+        if self._stop is None:
+            if not local.wants_ros(now):
+                return False
+            self._graph, control = _ros(args)
+            self._stop = control.Stop(self._graph.client_node, args.namespace, args.words, [
+                each.name for each in local.present
+                if each.domain == local.domain and each.has_place])
+        for name, told in local.known.items():
+            self._stop.know(name, told.drives, told.seen)
+        self._stop.leave(local.handled)
+        return self._stop.look(now) and local.over(now)
+
+    def answers(self) -> list[Answer]:
+        """Return what became of all."""
+        args, local, stop = self._args, self._local, self._stop
+        told, known, drives = list(local.answers()), set(local.known), local.drives
+        heard = set() if stop is None else {short(name) for name in stop.heard}
+        told = [Answer(each.name, False, f'{each.silence(local.domain)}: its drives {RUNNING}',
+                       bridge=True)
+                for each in local.unheard
+                if each.domain != local.domain or each.name not in heard] + told
+        if stop is not None:
+            named = {answer.name for answer in told if answer.bridge}
+            told += [answer for answer in stop.answers(local.present)
+                     if not answer.bridge or short(answer.name) not in named]
+            known, drives = known | stop.seen, [*drives, *stop.drives]
+        nodes = {answer.name for answer in told if not answer.bridge}
+        there = ', '.join(node.lstrip('/') for node in dict.fromkeys(drives)) or 'none'
+        told += [Answer(word, False, f'no such drive; there are: {there}') for word in args.words
+                 if known and not any(matches(word, node) for node in nodes)]
+        if not known and not told:
+            told.append(Answer('', False, nobody(args.namespace), bridge=True))
+        return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
+                        for name in known]
+
+    def close(self) -> None:
+        """Leave the graph."""
+        if self._graph is not None:
+            self._graph.close()
 
 
 def _show(args: Namespace, answers: Sequence[Any]) -> int:
     """Print what became of it, failures first; return the exit code."""
     for answer in sorted(answers, key=lambda each: each.ok):
-        name = answer.name.lstrip('/')
+        name, elsewhere = answer.name.lstrip('/'), answer.domain is not None
         if args.json:
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
-                        'message': answer.text})
+                        'message': answer.text,
+                        **({'domain': answer.domain} if elsewhere else {})})
         else:
             verdict = '' if answer.ok or args.subcommand != STOP else 'NOT STOPPED'
-            say(': '.join(filter(None, (name, verdict, answer.text))))
+            say((f'[domain {answer.domain}] ' if elsewhere else '')
+                + ': '.join(filter(None, (name, verdict, answer.text))))
     return 0 if answers and all(answer.ok for answer in answers) else FAILED

@@ -1,6 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 # PYTHON_ARGCOMPLETE_OK
-"""The executable ``drive_can``: signals wait until :mod:`.main` is there to take them."""
+"""
+The executable ``drive_can``: signals wait until :mod:`.main` is there to take them.
+
+A stop does not: what it needs to be sent by the local way is all that is imported before.
+"""
 
 import sys
 
@@ -10,6 +14,9 @@ from drive_can_bridge.process.beginning import begin
 def main() -> int:
     """Run the command; return the exit code."""
     begin()
+    if sys.argv[1:2] == ['stop']:
+        from drive_can_bridge.process.local_stop import begin as begin_stop
+        begin_stop(sys.argv[2:])    # and go on: there may be bridges elsewhere
     from drive_can_bridge.cli.main import main as run
     return run()
 

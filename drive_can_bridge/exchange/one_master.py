@@ -12,7 +12,8 @@ from collections.abc import Iterable, Sequence
 
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.process.locks import BRIDGE, Held, holder, HostLock, take
+from drive_can_bridge.process.locks import Held, holder, HostLock, take
+from drive_can_bridge.process.presence import BRIDGE
 from drive_can_bridge.transport.bus_identity import identity_of
 
 #: what to do for commands that have only the direct way

@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The ROS environment of the demo: which domain, and how far its traffic gets."""
 
+from collections.abc import Sequence
 import os
 import shlex
 
@@ -60,3 +61,13 @@ def export_command() -> str:
     settings = [f'{name}={shlex.quote(os.environ[name])}' for name in _SHARED
                 if os.environ.get(name)]
     return f'export {" ".join(settings)}' if settings else ''
+
+
+def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
+    """Say that there is no bridge, or none that answers."""
+    where = '' if namespace is None else f' in namespace {namespace or "/"}'
+    domain = os.environ.get(DOMAIN_ID) or '0'
+    if silent:
+        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
+                f'{"does" if len(silent) == 1 else "do"} not')
+    return f'no configured bridge is running{where} (ROS domain {domain})'

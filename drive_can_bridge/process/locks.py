@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Locks that all processes of this host respect, of any user, and which bridges have drives here.
+Locks that all processes of this host respect, of any user.
 
 A lock is a socket in the abstract name space of Linux, bound to a name that is made of its key.
 The kernel lets one process have a name, and takes it away when that process ends, however it ends.
@@ -10,25 +10,19 @@ names belong to the network namespace, as CAN interfaces do.
 
 Beside each lock its holder has a second name that says who it is; ``/proc/net/unix`` shows it to
 everybody.
-
-Beside its locks a bridge has a name in the same name space that says what it is called in the ROS
-graph. It goes with the process, as the locks do: whether it answers or not, it can be named.
 """
 
 from collections.abc import Sequence
 import errno
-from fnmatch import fnmatchcase
 import hashlib
 import os
 from pathlib import Path
 import re
 import socket
 import time
-from typing import NamedTuple
 
-#: all names begin with this
-PREFIX = 'drive_can_bridge'
-SOCKETS = Path('/proc/net/unix')
+from drive_can_bridge.process.presence import PREFIX, TABLE
+
 #: characters of a holder's name that have room in that of a socket
 _WHO_MAX = 40
 #: s until the new holder of a lock has also said who it is
@@ -120,7 +114,7 @@ def _holder(digest: str) -> Held:
     wanted = re.compile(rf'@{PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
     while True:
         try:
-            found = wanted.search(SOCKETS.read_text(encoding='utf-8', errors='replace'))
+            found = wanted.search(Path(TABLE).read_text(encoding='utf-8', errors='replace'))
         except OSError:
             found = None
         if found is not None:
@@ -128,83 +122,3 @@ def _holder(digest: str) -> Held:
         if time.monotonic() > deadline:
             return Held(None, '')
         time.sleep(0.005)
-
-
-#: what a bridge calls itself where it locks drives
-BRIDGE = 'drive_can_bridge'
-#: characters that have room in the name of a socket, and how many of longer ones are kept
-_ROOM, _KEPT = 70, 60
-_LINE = re.compile(rf'@{PREFIX}/(?:who/[0-9a-f]+/(\d+)/{BRIDGE}|bridge/(\d+)/(\d+)(/\S+))$',
-                   re.MULTILINE)
-
-
-class Present(NamedTuple):
-    """
-    A bridge of this host.
-
-    :param domain: its ROS domain; None: not known.
-    :param name: its full name; '' where it is not known, cut where it is very long.
-    """
-
-    process: int
-    domain: int | None
-    name: str
-
-    @property
-    def has_place(self) -> bool:
-        """Its namespace is known."""
-        return bool(self.name) and '~' not in self.name
-
-    def may_be_in(self, namespace: str | None) -> bool:
-        """Tell whether it may run in a namespace, or one of a pattern; None: anywhere."""
-        return (namespace is None or not self.has_place
-                or fnmatchcase(self.name.rpartition('/')[0], namespace))
-
-    def silence(self, domain: int) -> str:
-        """Say that it does not answer in a ROS domain."""
-        where = f'process {self.process}'
-        if self.domain not in (None, domain):
-            where += f', ROS domain {self.domain}'
-        return f'this bridge of this host ({where}) does not answer here'
-
-
-class Presence:
-    """
-    Tells others on this host that this process is a bridge, until it is withdrawn.
-
-    :param name: full name of its node.
-    """
-
-    def __init__(self, domain: int, name: str) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        try:
-            self._socket.bind(f'\0{PREFIX}/bridge/{os.getpid()}/{domain}{short(name)}')
-        except OSError:     # two by one name: told already
-            pass
-
-    def withdraw(self) -> None:
-        """Tell it no more."""
-        self._socket.close()
-
-
-def bridges() -> list[Present]:
-    """Return the bridges that hold drives on this host."""
-    try:
-        text = SOCKETS.read_text(encoding='utf-8', errors='replace')
-    except OSError:
-        return []
-    holding, told = set[int](), set[Present]()
-    for found in _LINE.finditer(text):
-        if found[1]:
-            holding.add(int(found[1]))
-        else:
-            told.add(Present(int(found[2]), int(found[3]), found[4]))
-    named = {each.process for each in told}
-    return sorted(told) + [Present(process, None, '') for process in sorted(holding - named)]
-
-
-def short(name: str) -> str:
-    """Return a name as it is told: a very long one is cut, and still differs from others."""
-    if len(name) <= _ROOM:
-        return name
-    return f'{name[:_KEPT]}~{hashlib.sha256(name.encode()).hexdigest()[:8]}'

@@ -57,7 +57,8 @@ from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.rcl.services import RclServices
 from drive_can_bridge.ros.rcl.unfit import Unfit
-from drive_can_bridge.ros.recognition import BRIDGES, bridges_among
+from drive_can_bridge.ros.recognition import (
+    BRIDGES, bridges_among, drives_among, Entries)
 from drive_can_bridge.ros.requests import Requests
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorServices, ExecutorThread, ServiceThread
@@ -133,10 +134,27 @@ class NodeParameters:
     def _prepare(self, names: Sequence[str]) -> None:
         """Have a value that is being asked for: looking at the graph is not cheap."""
         if BRIDGES in names:
-            own = self._node.get_fully_qualified_name()
-            seen = {own, *bridges_among(self._node.get_service_names_and_types())}
-            self.announce(BRIDGES, sorted(name for name in seen for _ in range(
-                max(1, self._node.count_services(f'{name}/change_state')))))
+            self.announce(BRIDGES, self.bridges())
+
+    def bridges(self) -> list[str]:
+        """Return the full names of all bridges that are seen, one as often as there are some."""
+        return self._bridges_of(self._node.get_service_names_and_types())
+
+    def around(self) -> tuple[list[str], list[str]]:
+        """Return the same, and the full names of the drives that are seen around them."""
+        services = self._node.get_service_names_and_types()
+        bridges = self._bridges_of(services)
+        return bridges, drives_among(
+            services, self._node.get_topic_names_and_types, bridges, ())
+
+    def _bridges_of(self, services: Entries) -> list[str]:
+        seen = {self._node.get_fully_qualified_name(), *bridges_among(services)}
+        return sorted(name for name in seen for _ in range(
+            max(1, self._node.count_services(f'{name}/change_state'))))
+
+    def get(self, request: Any, response: Any) -> Any:
+        """Do what ``get_parameters`` does, for who came another way. In the executor's thread."""
+        return self._services._get_parameters_callback(request, response)
 
     def announce(self, name: str, value: Any) -> None:
         """Change a read-only parameter: what the bridge itself has found out."""
@@ -398,7 +416,8 @@ class BridgeNode(LifecycleNode):
         self._runtime = BridgeRuntime(
             self, self.log, configuration, self._spinner, self._control_thread_of,
             self._parameter_thread, self._stamps, self._steady, open_bus=self._open_bus,
-            announce=self._node_parameters.announce, dismiss=self._dismiss, fatal=self._fatal)
+            announce=self._node_parameters.announce, seen=self._node_parameters.around,
+            get=self._node_parameters.get, dismiss=self._dismiss, fatal=self._fatal)
         self._node_parameters.pass_on()     # since they are declared
         try:
             self._runtime.open()

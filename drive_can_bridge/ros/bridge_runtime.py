@@ -28,13 +28,15 @@ from drive_can_bridge.core.sentences import nothing_recorded
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.exchange.exchange import BusExchange, stop_all
 from drive_can_bridge.exchange.one_master import InUse, Ownership
-from drive_can_bridge.process.locks import BRIDGE, Presence
+from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
 from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, Report
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import Joints
+from drive_can_bridge.ros.local_way import LocalWay
 from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.passing import Passing
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorThread, PeriodicThread, ServiceThread
 from drive_can_bridge.trace.flight import FlightRecorder
@@ -204,9 +206,12 @@ class BridgeRuntime:
     :param stamps: of all messages.
     :param open_bus: opens a bus; None: python-can, by its configuration.
     :param announce: changes a read-only parameter of the bridge.
+    :param seen: returns the full names of all bridges in the graph, and of the drives around them.
+    :param get: answers ``get_parameters`` of the bridge.
     :param dismiss: takes drives out of the graph; their exchanges are closed.
     :param fatal: takes the reason when the bridge cannot go on; from any thread.
     :ivar drives: by name, in the order of the configuration.
+    :ivar local_way: answers processes of this host.
     :raises ConfigurationError: somebody else has a drive.
     """
 
@@ -215,6 +220,8 @@ class BridgeRuntime:
                  parameter_thread: ServiceThread, stamps: Stamps, clock: Clock, *,
                  open_bus: Callable[[BusConfiguration], EndPoint] | None,
                  announce: Callable[[str, str], None],
+                 seen: Callable[[], tuple[list[str], list[str]]],
+                 get: Callable[[Any, Any], Any],
                  dismiss: Callable[[Iterable[DriveNode]], None],
                  fatal: Callable[[str], None]) -> None:
         self.configuration = configuration
@@ -231,8 +238,9 @@ class BridgeRuntime:
         with ExitStack() as closing:    # the last first
             closing.callback(self.exchanges.clear)
             closing.callback(self._own().release)
-            closing.callback(Presence(node.context.get_domain_id(),
-                                      node.get_fully_qualified_name()).withdraw)
+            domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
+            presence = Presence(domain, name)
+            closing.callback(presence.withdraw)
             closing.callback(dismiss, self.drives.values())
             self._flight = FlightWatch(node, log, list(configuration.buses.values()), spinner,
                                        clock)
@@ -257,6 +265,12 @@ class BridgeRuntime:
             closing.callback(self._reporting.stop)
             self._attendance = Attendance(log, list(self.drives.values()), clock)
             closing.callback(self._attendance.end)
+            self._passing = Passing(node, clock)
+            closing.callback(self._passing.end)
+            self.local_way = LocalWay(
+                presence, domain, name, self.drives, seen=seen, get=get, spinner=spinner,
+                pass_on=self._passing.begin, warn=log.warning, clock=clock)
+            closing.callback(self.local_way.close)
             self._closing = closing.pop_all()
 
     def _drives_of(self, bus: BusConfiguration) -> list[DriveConfiguration]:

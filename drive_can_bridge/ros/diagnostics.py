@@ -24,7 +24,7 @@ from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.ros.commands import how_to_enable, how_to_reset
-from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.drive_node import control_state, DriveNode
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.middleware import publisher
 from drive_can_bridge.ros.stamps import Stamps
@@ -220,8 +220,7 @@ class DriveReporter:
                 command_age = session.setpoints.age(now)
                 more = session.facts()
                 if session.control is not None:
-                    known = session.control.state if session.active else 'unknown'
-                    more = {'control_state': known, **more}
+                    more = {'control_state': control_state(session), **more}
                 if session.fault_watch is not None:
                     more = {**more, 'fault_code': session.fault_watch.text}
         self._latencies = statistics.latency.count, statistics.latency.total

@@ -16,7 +16,7 @@ from std_msgs.msg import Bool
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlCompleted, ControlRequest
+from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.events import (
@@ -132,11 +132,13 @@ class DriveNode(DriveListener):
 
         def submit(request: Any) -> Question[Any]:
             return Question(partial(self._submit, request))
-        self._services.append(ParameterServices(
+        self._parameters = ParameterServices(
             self.node, parameter_thread, directory, stamps, submit=submit,
             write_refusal=session.services.write_refusal, role=session.roles.role,
             active=lambda: self.exchange.active, restore=drive.profile.restore,
-            failed=self._parameter_failed).services)
+            failed=self._parameter_failed).services
+        self._control_thread, self._parameter_thread = control_thread, parameter_thread
+        self._services.append(self._parameters)
         self._services.append(control_services(
             self.node, control_thread, submit, controlled=session.control is not None,
             homing=getattr(drive.options, 'homing', False)))
@@ -319,6 +321,41 @@ class DriveNode(DriveListener):
 
     # -- users ------------------------------------------------------------------------------------
 
+    @property
+    def full_name(self) -> str:
+        """Its name in the ROS graph."""
+        return str(self.node.get_fully_qualified_name())
+
+    @property
+    def told_online(self) -> bool:
+        """What ``~/online`` says."""
+        return self._told_online
+
+    def offers(self, action: ControlAction) -> bool:
+        """Tell whether it has a service for this."""
+        return action is ControlAction.QUICK_STOP or self.session.control is not None
+
+    def command(self, action: ControlAction,
+                completed: Callable[[ControlCompleted], None]) -> None:
+        """Do what a control service does, for who came another way. From any thread."""
+        self._control_thread.begin(partial(self._submit, ControlRequest(action), completed))
+
+    def tell_condition(self, answer: Callable[[dict[str, str]], None]) -> None:
+        """Say whether it runs, as diagnostics do; {}: its bus hangs. From any thread."""
+        def look() -> None:
+            session, facts = self.session, dict[str, str]()
+            with self.exchange.entered() as entered:
+                if entered:
+                    facts['state'] = session.state.value
+                    if session.control is not None:
+                        facts['control_state'] = control_state(session)
+            answer(facts)
+        self._parameter_thread.begin(look)
+
+    def call(self, service: str, request: Any, answer: Callable[[Any], None]) -> None:
+        """Do what a parameter service does, for who came another way. From any thread."""
+        self._parameters.call(service, request, answer)
+
     def _submit(self, request: Request | ControlRequest, completed: Completed) -> None:
         """Hand a request to the session; what became of it is told from any thread."""
         self._asked[request] = completed    # its outcome may come before the next line
@@ -346,6 +383,12 @@ class DriveNode(DriveListener):
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
+
+
+def control_state(session: Session) -> str:
+    """Return what is known of a drive with control."""
+    known = session.control
+    return known.state if known is not None and session.active else 'unknown'
 
 
 class IdentityReader:

@@ -13,7 +13,7 @@ Callbacks that are coroutines wait for answers without an executor, too: one thr
 coroutine, the one that answers goes on with it.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from functools import partial
@@ -220,6 +220,10 @@ class _Taker:
     def change(self) -> None:
         """Have it look what is served."""
         self.changed = True
+        self.wake()
+
+    def wake(self) -> None:
+        """Have it look what there is to do."""
         try:
             with self.guard:
                 self.guard.trigger_guard_condition()
@@ -254,6 +258,7 @@ class ServiceThread:
         self._served: dict[Service, tuple[Callback, Callable[[], None]]] = {}
         self._stopped_threads: Counter[Service] = Counter()
         self._jobs: Mailbox[Callable[[], None] | None] = Mailbox(clock)
+        self._begun: deque[Callable[[], None]] = deque()
         self._taker = _Taker(context)
         self._superseded: set[_Taker] = set()
         self._ending = False
@@ -278,6 +283,11 @@ class ServiceThread:
     def later(self, job: Callable[[], None]) -> None:
         """Have the thread that answers do something. From any thread."""
         self._jobs.put(job)
+
+    def begin(self, job: Callable[[], None]) -> None:
+        """Have the thread that takes requests begin what has come another way. From any thread."""
+        self._begun.append(job)
+        self._taker.wake()
 
     def forget(self, services: list[Service]) -> None:
         """Stop to serve them; they may be destroyed then."""
@@ -341,6 +351,8 @@ class ServiceThread:
                 for handle in handles:
                     waiting.add_service(handle)
                 waiting.wait(-1)
+                while self._begun:
+                    self._begun.popleft()()
                 for pointer in waiting.get_ready_entities('service'):
                     self._take(taker, present[pointer])
                 throttle.keep()
@@ -376,6 +388,7 @@ class ServiceThread:
                 self._superseded.discard(taker)
                 raise
             self._taker, self._threads[0] = successor, thread
+            successor.wake()    # for what was to be begun meanwhile
         if for_ever:
             self._superseded.discard(taker)
             self._stopped_threads[service] += 1
@@ -394,14 +407,14 @@ class ServiceThread:
     def _send(self, service: Service, request: Any, header: Any, answered: Callable[[], None],
               message: Any) -> None:
         if isinstance(message, Exception):
-            message = _response_to(service, request, message)
+            message = response_to(service.srv_type, request, message)
         try:
             self._send_response(service, message, header)
         except GONE:   # service or context are gone
             pass
         except Exception as error:  # the answer cannot be sent as it is
             with suppress(*GONE):
-                self._send_response(service, _response_to(service, request, error), header)
+                self._send_response(service, response_to(service.srv_type, request, error), header)
             raise
         finally:
             answered()
@@ -423,9 +436,8 @@ class ServiceThread:
         return True
 
 
-def _response_to(service: Service, request: Any, error: Exception) -> Any:
+def response_to(kind: Any, request: Any, error: Exception) -> Any:
     """Return what tells a caller that there is no answer, where the response has words for it."""
-    kind: Any = service.srv_type
     response, text = kind.Response(), f'internal error: {type(error).__name__}: {error}'
     if hasattr(response, 'message'):
         response.message = text
@@ -497,6 +509,7 @@ class CoroutineServices:
                  callbacks: Mapping[str, tuple[Any, Serve]]) -> None:
         self._thread = thread
         self.calls = 0
+        self._callbacks = callbacks
         self._counting = threading.Lock()
         self._running = threading.Lock()
         self._services: dict[Service, Callback] = {
@@ -504,6 +517,20 @@ class CoroutineServices:
                                 qos_profile=qos_profile_parameters):
             partial(self._begin, callback, kind.Response)
             for name, (kind, callback) in callbacks.items()}
+
+    def call(self, name: str, request: Any, answer: Answer) -> None:
+        """
+        Begin a call that has come another way than by ROS. From any thread.
+
+        :param answer: takes the response, from any thread.
+        """
+        kind, callback = self._callbacks[name]
+
+        def answered(message: Any) -> None:
+            self._ended()
+            answer(response_to(kind, request, message) if isinstance(message, Exception)
+                   else message)
+        self._thread.begin(partial(self._begin, callback, kind.Response, request, answered))
 
     def serve(self) -> None:
         """Begin to serve."""

@@ -11,7 +11,7 @@ import pytest
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.exchange.one_master import InUse, Ownership
-from drive_can_bridge.process.locks import BRIDGE
+from drive_can_bridge.process.presence import BRIDGE
 
 ADVICE = 'leave --params-file away to go through it'
 CAN = BusConfiguration('main', 'socketcan', f'nowhere{os.getpid()}')

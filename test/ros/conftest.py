@@ -19,6 +19,7 @@ from world import World, world
 MISSING = importlib.util.find_spec('rclpy') is None
 if TYPE_CHECKING or not MISSING:
     from bridges import Bridge, StartBridge
+    from by_hand import command, Lines, Run
     from clients import Client, ClientContext, is_client
     from leaks import assert_nothing_left
 
@@ -93,6 +94,18 @@ def bridge(client: 'Client', tmp_path: Path, bench: World | None) -> Iterator['S
         assert_nothing_left(client)
     else:
         assert all(map(is_client, client.nodes()))
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 'Run':
+    """Run a command; return exit code, lines, and standard error."""
+    return command(capsys, monkeypatch)
+
+
+@pytest.fixture
+def locally(monkeypatch: pytest.MonkeyPatch) -> 'Lines':
+    """Let commands reach bridges of this process by the local way, from now on."""
+    return Lines(monkeypatch)
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can stop``, ``enable``, ``disable``, ``reset``: told by hand, through bridges."""
 
-from collections.abc import Callable
 import json
 import os
 from pathlib import Path
@@ -9,6 +8,7 @@ import re
 from typing import Any
 
 from bridges import LIFT, parameters, StartBridge
+from by_hand import Run
 from clients import Client, LATCHED, wait_until
 from graph_builders import answer, hang, offer
 import pytest
@@ -16,30 +16,12 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from transcripts import replayed, shown, stories
 
-from drive_can_bridge.cli import control
 from drive_can_bridge.cli.main import main
-from drive_can_bridge.process.locks import bridges, Presence
-from drive_can_bridge.ros.client import calls, search
+from drive_can_bridge.process.presence import Presence
+from drive_can_bridge.ros.client import calls
 
 HOIST = {**LIFT, 'station': 3}
-Run = Callable[..., tuple[int, list[str], str]]
 STORIES = stories(__file__, 'by_hand.yaml')
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run a command; return exit code, lines, and standard error."""
-    # others may use this host meanwhile
-    for module in (control, search):
-        monkeypatch.setattr(module, 'bridges', lambda: [
-            each for each in bridges() if each.process == os.getpid()])
-
-    def started(*words: str) -> tuple[int, list[str], str]:
-        capsys.readouterr()
-        code = main(words)
-        told = capsys.readouterr()
-        return code, told.out.splitlines(), told.err
-    return started
 
 
 def replay(story: str, run: Run) -> None:
@@ -147,10 +129,13 @@ def test_one_that_holds_drives_of_this_host_is_named(
         documents = [json.loads(line) for line in lines]
         assert code == 1
         assert [(each.get('bridge'), each.get('drive'), each['ok']) for each in documents] == [
-            ('drive_can_bridge', None, False), ('b/bridge', None, False), (None, 'lift', True)]
-        assert f'domain {domain + 1}' in documents[0]['message']
-        assert run('stop', '/lift')[0] == 1     # that of the other domain may be called so, too
-        assert run('stop', '--namespace', 'a')[0] == 1
+            ('b/bridge', None, False), ('drive_can_bridge', None, False), (None, 'lift', True)]
+        assert f'domain {domain + 1}' in documents[1]['message']
+        # with a name, or a namespace, only what was named counts: nobody else cries
+        assert run('stop', '/lift') == (0, ['lift: ready'], '')
+        assert run('stop', '--namespace', '') == (0, ['lift: ready'], '')
+        # a drive of the other one may be called so
+        assert [line.partition(':')[0] for line in run('stop', 'lift')[1]] == ['b/bridge', 'lift']
     finally:
         here.withdraw()
         elsewhere.withdraw()
@@ -165,7 +150,7 @@ def test_which_hung_bridge_may_have_a_drive_that_is_meant(
         client: Client, run: Run, word: str, may: bool) -> None:
     answer(client, '/x/bridge', drives='lift')()
     drive(client, '/x/lift')
-    hung = Presence(client.node.context.get_domain_id() + 1, '/cell1/drive_can_bridge')
+    hung = Presence(client.node.context.get_domain_id(), '/cell1/drive_can_bridge')
     try:
         _, lines, _ = run('stop', word)
     finally:

@@ -288,6 +288,11 @@ class NodeCalls:
         self._hosts[host].ask(service, request, done, now, patience,
                               unasked or partial(done, None))
 
+    def close(self) -> None:
+        """Ask nobody any more."""
+        while self._hosts:
+            self._hosts.popitem()[1].close()
+
     def offered(self, host: str, service: str) -> bool:
         """Tell whether a service that was asked for is offered."""
         return host in self._hosts and self._hosts[host].offered(service)

@@ -6,65 +6,42 @@ A stop waits for nobody: a drive is told as soon as it is seen in the graph, bef
 asked for anything. What the bridges say afterwards shows whether that were all.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.text import is_pattern
+from drive_can_bridge.process.local_stop import (
+    Answer, does_not_answer, may_match, RUNNING, stop_answer, STOP_TIMEOUT, twins)
+from drive_can_bridge.process.local_way import matches, meant
+from drive_can_bridge.process.presence import Present, short
 from drive_can_bridge.ros.client.calls import (
-    ClientNode, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
+    HasHandle, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.search import (
-    find_bridges, find_drives, Graph, nobody, Search)
+    find_bridges, find_drives, Graph, Search, Seeing)
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
-#: s that a drive may take to stop; after how many it is told once more: DDS may lose an answer
-STOP_TIMEOUT, STOP_AGAIN = 10.0, 1.0
+#: s after which a drive is told to stop once more: DDS may lose an answer
+STOP_AGAIN = 1.0
 #: s that it may take to hear whether a drive is online
 _ONLINE_TIMEOUT = 5.0
 #: s that anything else may take: it is the bridge that says when it is over
 CONTROL_TIMEOUT = 120.0
-_RUNNING = 'may still be running'
-
-
-class Answer(NamedTuple):
-    """
-    What became of a drive, or of a bridge.
-
-    :param name: full name; or what was asked for and is nobody's.
-    :param ok: it did what was wanted.
-    :param bridge: it is one.
-    """
-
-    name: str
-    ok: bool
-    text: str
-    bridge: bool = False
 
 
 class UnknownDrive(Exception):
     """A word names no drive."""
 
 
-def meant(words: Sequence[str], node: str) -> bool:
-    """Tell whether words mean a drive: none means all."""
-    return not words or any(matches(word, node) for word in words)
-
-
-def matches(word: str, node: str) -> bool:
-    """Tell whether a word, a pattern or a full name means a drive."""
-    return fnmatchcase(node if word.startswith('/') else node.rpartition('/')[2], word)
-
-
 class _Stopping:
     """One drive that is told to stop."""
 
-    def __init__(self, client_node: ClientNode, node: str, now: float) -> None:
+    def __init__(self, client_node: HasHandle, node: str, now: float) -> None:
         self.node = node
         self.answer: Answer | None = None
         self._client_node = client_node
@@ -80,9 +57,9 @@ class _Stopping:
         self._said = response
         if response is None:
             what = 'no answer' if self._service.ready else 'nobody offers its ~/quick_stop'
-            self.answer = Answer(self.node, False, f'{what}: {_RUNNING}')
+            self.answer = Answer(self.node, False, f'{what}: {RUNNING}')
         elif not response.success:
-            self.answer = Answer(self.node, False, response.message)
+            self.answer = stop_answer(self.node, False, response.message, False)
 
     def look(self, now: float) -> None:
         """Take what has arrived."""
@@ -96,42 +73,59 @@ class _Stopping:
         if self._said is None:
             self._since = now
         elif self.answer is None:
-            said = self._said.message or 'stopped'
+            said = self._said.message
             if self._online is not None:
-                self.answer = Answer(self.node, self._online, said if self._online else
-                                     f'{said}; not online: {_RUNNING}')
+                self.answer = stop_answer(self.node, True, said, self._online)
             elif now - self._since > _ONLINE_TIMEOUT:
-                self.answer = Answer(self.node, False,
-                                     f'{said}; nobody says whether it is online')
+                self.answer = Answer(self.node, False, f'{said or "stopped"}; nobody says whether '
+                                                       'it is online')
 
     def _take_online(self, message: Bool) -> None:
         self._online = message.data
+
+    def close(self) -> None:
+        """Wait for nothing any more."""
+        self._service.close()
+        if self._inbox is not None:
+            self._inbox.close()
 
 
 class Stop:
     """
     A stop of drives, begun for each one as soon as it is seen.
 
+    :param client_node: of ours.
     :param namespace: of the bridges that are meant; None: all.
     :param words: names, patterns or full names of the drives; none: all.
     :param expected: bridges that are there, whether they are in the graph or not.
+    :param only: the bridges that are meant; None: all.
+    :param patience: s that a bridge has to answer; None: a few.
     """
 
-    def __init__(self, graph: Graph, namespace: str | None, words: Sequence[str],
-                 expected: Iterable[str]) -> None:
-        self._client_node = graph.client_node
+    def __init__(self, client_node: Seeing, namespace: str | None, words: Sequence[str],
+                 expected: Iterable[str], *, only: Container[str] | None = None,
+                 patience: float | None = None) -> None:
+        self._client_node = client_node
         check_is_valid_srv_type(Trigger)    # takes its time, while the graph is being discovered
         self._words = words
-        self._namespace = namespace
-        self._search = Search(graph.client_node, namespace, expected)
+        self._search = Search(client_node, namespace, expected, only=only, patience=patience)
         self._drives: dict[str, _Stopping] = {}
+        self._elsewhere: set[str] = set()
+
+    def leave(self, nodes: Iterable[str]) -> None:
+        """Leave drives to who stops them another way."""
+        self._elsewhere.update(nodes)
+
+    def know(self, name: str, drives: Sequence[str], others: Sequence[str]) -> None:
+        """Have it known of a bridge what it has said another way."""
+        self._search.know(name, drives, others)
 
     def look(self, now: float) -> bool:
         """Go on; return whether all is done."""
         self._search.look(now)
-        known = [node for each in self._search.found.values() for node in each.nodes]
-        for node in (*self._seen(), *known):
-            if node not in self._drives and meant(self._words, node):
+        for node in (*self._seen(), *self.drives):
+            if (node not in self._drives and node not in self._elsewhere
+                    and meant(self._words, node)):
                 self._drives[node] = _Stopping(self._client_node, node, now)
         for drive in self._drives.values():
             drive.look(now)
@@ -142,36 +136,50 @@ class Stop:
         """Return drives that are new in the graph, in the namespaces of bridges."""
         if self._search.settled:
             return []
+        return self._around({*self._drives, *self._elsewhere})
+
+    def _around(self, known: Collection[str]) -> list[str]:
         return drives_among(self._search.services, self._client_node.topics, self._search.found,
-                            self._drives)
+                            known)
 
     @property
     def seen(self) -> set[str]:
         """The bridges of which :meth:`answers` tells."""
         return set(self._search.found)
 
-    def answers(self) -> list[Answer]:
-        """Return what became of it so far: bridges that do not answer, then drives."""
-        found, names = self._search.found, self._search.names
-        told = [Answer(name, False, f'this bridge does not answer: its drives {_RUNNING}',
-                       bridge=True)
-                for name in found if not found[name].answered]
-        told += [Answer(name, False, f'{names.count(name)} bridges are called so, and one answer '
-                                     f'hides the other: drives {_RUNNING}', bridge=True)
-                 for name in found if names.count(name) > 1]
-        told += [drive.answer or Answer(node, False, f'no answer yet: {_RUNNING}')
-                 for node, drive in self._drives.items()]
-        told += [Answer(word, False, f'no such drive; there are: '
-                                     f'{", ".join(self._everybody()) or "none"}')
-                 for word in self._words
-                 if found and not any(matches(word, node) for node in self._drives)]
-        if not found:
-            told.append(Answer('', False, nobody(self._namespace), bridge=True))
-        return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
-                        for name in found]
+    @property
+    def heard(self) -> set[str]:
+        """Those that have answered."""
+        return {name for name, each in self._search.found.items() if each.answered}
 
-    def _everybody(self) -> list[str]:
-        return [node.lstrip('/') for each in self._search.found.values() for node in each.nodes]
+    @property
+    def drives(self) -> list[str]:
+        """Full names of the drives of all bridges that have said so."""
+        return [node for each in self._search.found.values() for node in each.nodes]
+
+    def answers(self, present: Iterable[Present] = ()) -> list[Answer]:
+        """
+        Return what became of it so far: bridges that do not answer, then drives.
+
+        :param present: what this host shows of bridges.
+        """
+        found, names = self._search.found, self._search.names
+        silent = [name for name in found if not found[name].answered]
+        around = self._around(self.drives) if silent and self._words else []
+        shown = {each.name: each for each in present}
+        told = [Answer(name, False, does_not_answer(), bridge=True) for name in silent
+                if may_match(shown.get(short(name), Present(0, None, name, 0)), around,
+                             self._words)]
+        told += [twins(name, names.count(name)) for name in found if names.count(name) > 1]
+        return told + [drive.answer or Answer(node, False, f'no answer yet: {RUNNING}')
+                       for node, drive in self._drives.items() if node not in self._elsewhere
+                       or drive.answer is not None]
+
+    def close(self) -> None:
+        """Ask nobody any more."""
+        self._search.close()
+        for drive in self._drives.values():
+            drive.close()
 
 
 @dataclass(frozen=True, slots=True)

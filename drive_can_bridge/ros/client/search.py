@@ -12,12 +12,11 @@ No thread, no executor: everything happens while somebody waits, a little at a t
 comes through.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 import math
-import os
-from typing import Any
+from typing import Any, Protocol
 
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSProfile
@@ -25,7 +24,8 @@ from rclpy.qos import QoSProfile
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, NoBridge, SilentBridge, WhichBridge
 from drive_can_bridge.core.text import is_ros_name
-from drive_can_bridge.process.locks import bridges, short
+from drive_can_bridge.process.environment import nobody
+from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
@@ -182,22 +182,38 @@ class Found:
         return tuple(f'{namespace_of(self.name)}/{drive}' for drive in self.drives or ())
 
 
+class Seeing(Protocol):
+    """A node that can say what it sees in the graph."""
+
+    handle: Any
+
+    def services(self) -> Entries:
+        """Return all services that have been discovered, with their types."""
+
+    def topics(self) -> Entries:
+        """Return all topics that have been discovered, with their types."""
+
+
 class Search:
     """
     Looks for bridges, and asks each one that it sees.
 
     :param namespace: of those that are meant, ``/cell``, '' for the root; None: all.
     :param expected: full names of bridges that are known to be there.
+    :param only: those that are looked for; None: all.
+    :param patience: s that a bridge has to answer; None: a few.
     :ivar found: by full name, whether they have answered or not.
     :ivar services: all that have been discovered.
     """
 
-    def __init__(self, client_node: ClientNode, namespace: str | None,
-                 expected: Iterable[str] = ()) -> None:
+    def __init__(self, client_node: Seeing, namespace: str | None,
+                 expected: Iterable[str] = (), *, only: Container[str] | None = None,
+                 patience: float | None = None) -> None:
         self._client_node = client_node
         self._namespace = namespace
         self._expected = list(expected)
-        self._calls = NodeCalls(client_node, _ANSWER_TIMEOUT)
+        self._only = only
+        self._calls = NodeCalls(client_node, patience or _ANSWER_TIMEOUT)
         self.found: dict[str, Found] = {}
         self.services: Entries = ()
         self._looked_at = self._changed_at = self._began = -1.0
@@ -212,12 +228,12 @@ class Search:
     @property
     def settled(self) -> bool:
         """All bridges are known, and each one has answered, or is silent."""
-        return (any(each.answered for each in self.found.values())
+        return ((any(each.answered for each in self.found.values()) or self._only is not None)
                 and all(each.answered or each.silent for each in self.found.values()))
 
     def over(self, now: float) -> bool:
         """Tell whether nobody is there, or nobody who answers."""
-        return (all(each.silent for each in self.found.values())
+        return (all(each.silent for each in self.found.values()) and self._only is None
                 and now > min(self._changed_at + _QUIET, self._began + _LONGEST))
 
     def look(self, now: float) -> bool:
@@ -236,9 +252,20 @@ class Search:
         self._see(bridges_among(services), now)
         return True
 
+    def know(self, name: str, drives: Sequence[str], others: Sequence[str]) -> None:
+        """Have it known of a bridge what it has said another way: it is not asked."""
+        found = self.found.setdefault(name, Found(name))
+        found.drives = tuple(drive.rpartition('/')[2] for drive in drives)
+        found.others = tuple(others)
+
+    def close(self) -> None:
+        """Ask nobody any more."""
+        self._calls.close()
+
     def _see(self, names: Iterable[str], now: float) -> None:
         for name in filter(is_ros_name, names):     # anybody may tell anything
-            if name not in self.found and self._namespace in (None, namespace_of(name)):
+            if (name not in self.found and self._namespace in (None, namespace_of(name))
+                    and (self._only is None or name in self._only)):
                 self.found[name] = Found(name)
                 self._ask(self.found[name], now)
 
@@ -329,16 +356,6 @@ def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],
     hung = [f'{each.name}: {each.silence(domain)}, and holds its drives' for each in bridges()
             if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
     return SilentBridge('; '.join(hung)) if hung else NoBridge(nobody(pattern))
-
-
-def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
-    """Say that there is no bridge, or none that answers."""
-    where = '' if namespace is None else f' in namespace {namespace or "/"}'
-    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if silent:
-        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
-                f'{"does" if len(silent) == 1 else "do"} not')
-    return f'no configured bridge is running{where} (ROS domain {domain})'
 
 
 def _which(names: Sequence[str]) -> str:

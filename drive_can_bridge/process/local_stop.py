@@ -1,0 +1,350 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+``drive_can stop`` by the local way: the bridges of this host are asked by their sockets.
+
+``drive_can stop`` imports this before it has stopped anything, so nothing is imported here that
+takes time.
+"""
+
+from collections import namedtuple
+from collections.abc import Iterable, Sequence
+
+from drive_can_bridge.process.local_way import (
+    ANYWHERE, END, Line, meant, NO, PATIENCE, Rubbish)
+from drive_can_bridge.process.presence import (
+    bridges, in_namespace, own_domain, Present, short, switched_on)
+
+#: s after which the way through ROS is taken, too, where a bridge has said nothing yet
+SOON = 0.15
+#: s that a drive may take to stop
+STOP_TIMEOUT = 10.0
+RUNNING = 'may still be running'
+
+
+class Answer(namedtuple('Answer', 'name ok text bridge domain', defaults=(False, None))):
+    """
+    What became of a drive, or of a bridge.
+
+    :ivar name: full name; or what was asked for and is nobody's.
+    :ivar ok: it did what was wanted.
+    :ivar bridge: it is one.
+    :ivar domain: its ROS domain, where that is not the one of this shell.
+    """
+
+    __slots__ = ()
+
+
+def stop_answer(node: str, success: bool, message: str, online: bool) -> Answer:
+    """Return what became of a drive that was told to stop."""
+    if not success:
+        return Answer(node, False, message)
+    said = message or 'stopped'
+    return Answer(node, online, said if online else f'{said}; not online: {RUNNING}')
+
+
+class _Told:
+    """
+    A bridge of this host.
+
+    :ivar line: to it; None: there is none.
+    :ivar busy: it takes no calls just now.
+    :ivar name: as it says itself; '' until then.
+    :ivar drives: all of its drives.
+    :ivar seen: the bridges that it sees.
+    :ivar around: the drives that it sees in the graph.
+    :ivar answers: of its drives.
+    :ivar ended: these were all.
+    :ivar passed: what became of others that it has passed a stop on to; None: was not asked to.
+    """
+
+    def __init__(self, present: Present) -> None:
+        self.present = present
+        self.line: Line | None = None
+        self.busy = False
+        self.name = ''
+        self.drives: list[str] = []
+        self.seen: list[str] = []
+        self.around: list[str] = []
+        self.answers: dict[str, Answer] = {}
+        self.passed: list[Answer] | None = None
+        self.ended = False
+
+    def ask(self, *words: str) -> None:
+        """Ask it, if it listens."""
+        try:
+            self.busy = False
+            self.line = Line(self.present)
+            self.line.ask(*words)
+        except BlockingIOError:
+            self.hang_up()
+            self.busy = True
+        except OSError:     # ended just now, an older one, or switched off
+            self.hang_up()
+
+    @property
+    def here(self) -> bool:
+        """It has said who it is, and is believed."""
+        return bool(self.name)
+
+    @property
+    def failed(self) -> bool:
+        """It was to pass a stop on, and has not said what became of all of that."""
+        return self.passed is not None and self.line is None and not self.ended
+
+    @property
+    def quiet(self) -> bool:
+        """It may still answer, and has not said who it is."""
+        return not self.here and (self.busy or self.line is not None and self.line.believed)
+
+    def look(self) -> None:
+        """Take what it has said."""
+        line = self.line
+        while line is not None and line is self.line:
+            try:
+                message = line.take()
+                if message is None:
+                    return
+                if not line.believed:   # was asked all the same: it may be what it says
+                    continue
+                self._take(message)
+            except (OSError, Rubbish, ValueError):
+                self.hang_up()
+
+    def _take(self, message: Sequence[str]) -> None:
+        kind, *words = message
+        if kind == 'bridge':
+            self.name, self.seen = words[0], words[2:]
+        elif kind == 'drives':
+            self.drives = words
+        elif kind == 'around':
+            self.around = words
+        elif kind == 'drive':
+            name, success, online, text = words
+            self.answers[name] = stop_answer(name, success == '1', text, online == '1')
+        elif kind == 'passed':
+            name, ok, text, bridge = words
+            self.passed = self.passed or []
+            self.passed.append(Answer(name, ok == '1', text, bridge == '1'))
+        elif kind == END:
+            self.ended = True
+            self.hang_up()
+        elif kind == NO:
+            self.hang_up()
+
+    def hang_up(self) -> None:
+        """Ask it nothing more."""
+        line, self.line = self.line, None
+        if line is not None:
+            line.close()
+
+
+class LocalStop:
+    """
+    A stop of drives of this host; made, it has been sent.
+
+    Without words and namespace it goes to all bridges of this host, else to those of one domain.
+
+    :param namespace: of the bridges that are meant; None: all.
+    :param words: names, patterns or full names of drives; none: all.
+    """
+
+    def __init__(self, namespace: str | None, words: Sequence[str]) -> None:
+        self.domain = own_domain()
+        self._namespace = namespace
+        self._words = list(words)
+        self._began: float | None = None
+        self._question = ['stop', ANYWHERE if namespace is None else namespace, *self._words]
+        everywhere = not words and namespace is None
+        self._told = [_Told(each) for each in bridges()
+                      if everywhere or each.domain in (None, self.domain)
+                      and each.may_be_in(namespace)]
+        #: connections by which stops are passed on
+        self._passing: list[_Told] = []
+        if switched_on():
+            for each in self._told:
+                if each.present.domain is not None:
+                    each.ask(*self._question)
+
+    def look(self, now: float) -> bool:
+        """Take what was said; return whether all that anybody knows of have answered."""
+        if self._began is None:
+            self._began = now
+        waited = now - self._began
+        for each in (*self._told, *self._passing):
+            if each.busy and waited < PATIENCE:
+                each.ask(*self._question)
+            each.look()
+        if waited >= SOON or not any(each.quiet for each in self._told):
+            self._pass_on()
+        return self._knows_own_domain and self.over(now)
+
+    def over(self, now: float) -> bool:
+        """Tell whether nothing more is to be expected of this host."""
+        waited = now - (now if self._began is None else self._began)
+        if any(each.quiet for each in self._told) and waited < PATIENCE:
+            return False
+        return waited > STOP_TIMEOUT + PATIENCE or not any(
+            each.line is not None and (each.here or each.passed is not None)
+            for each in (*self._told, *self._passing))
+
+    def wants_ros(self, now: float) -> bool:
+        """Tell whether there may be bridges that only ROS reaches, or that have said nothing."""
+        own = [each for each in self._told if each.present.domain in (None, self.domain)]
+        if any(each.quiet for each in own) and now - (self._began or now) < SOON:
+            return False
+        return (not self._knows_own_domain or not all(each.here for each in own)
+                or any(each.failed for each in self._passing
+                       if each.present.domain == self.domain))
+
+    @property
+    def _knows_own_domain(self) -> bool:
+        """Somebody has said which bridges there are in the domain of this shell."""
+        return any(each.here and each.present.domain == self.domain for each in self._told)
+
+    def _pass_on(self) -> None:
+        """Have bridges of other hosts told by one of this host that knows them."""
+        for each in self._told:
+            domain = each.present.domain
+            same = [other for other in self._told if other.present.domain == domain]
+            local = {other.present.name for other in same}
+            asked = {name for other in self._passing for name in other.seen
+                     if other.present.domain == domain}
+            names = [name for name in dict.fromkeys(each.seen) if short(name) not in local
+                     and name not in asked and (
+                         self._namespace is None or in_namespace(name, self._namespace))]
+            if names:
+                passing = _Told(each.present)
+                passing.seen, passing.passed = names, []
+                passing.ask('pass', *names, '', *(node for other in same for node in other.drives),
+                            '', *self._words)
+                self._passing.append(passing)
+
+    # -- what has become of it --------------------------------------------------------------------
+
+    @property
+    def present(self) -> list[Present]:
+        """The bridges of this host that may be meant, asked or not."""
+        return [each.present for each in self._told]
+
+    @property
+    def known(self) -> dict[str, _Told]:
+        """The bridges in the domain of this shell that have said who they are, by full name."""
+        return {each.name: each for each in self._told
+                if each.here and each.present.domain == self.domain}
+
+    @property
+    def handled(self) -> set[str]:
+        """Drives that have their stop from here, and those of which nothing is wanted."""
+        return {node for each in self.known.values() for node in each.drives} | {
+            answer.name for each in self._passing for answer in each.passed or ()
+            if each.present.domain == self.domain and not answer.bridge}
+
+    @property
+    def drives(self) -> list[str]:
+        """Full names of all drives that are known in the domain of this shell."""
+        return [node for each in (*self._told, *self._passing)
+                if each.present.domain == self.domain for node in each.drives]
+
+    @property
+    def unheard(self) -> list[Present]:
+        """The bridges of this host that have not said who they are, and may be meant."""
+        known = set(self.drives)
+        around = [node for each in self.known.values() for node in each.around
+                  if node not in known]
+        return [each.present for each in self._told
+                if not each.here and may_match(each.present, around, self._words)]
+
+    def answers(self) -> list[Answer]:
+        """Return what became of drives, and of bridges that others see."""
+        found: list[Answer] = []
+        for each in self._told:
+            domain = None if each.present.domain == self.domain else each.present.domain
+            told = [each.answers.get(node, Answer(node, False, f'no answer: {RUNNING}'))
+                    for node in each.drives if meant(self._words, node)]
+            if each.here and each.seen.count(each.name) > 1:
+                told.append(twins(each.name, each.seen.count(each.name)))
+            found += [answer._replace(domain=domain) for answer in told]
+        for each in self._passing:
+            domain = None if each.present.domain == self.domain else each.present.domain
+            told = each.passed or []
+            if each.failed and domain is not None:  # else ROS shows what became of them
+                told = [Answer(name, False, does_not_answer(), bridge=True) for name in each.seen]
+            found += [answer._replace(domain=domain) for answer in told]
+        return found
+
+    def close(self) -> None:
+        """Hang up."""
+        for each in (*self._told, *self._passing):
+            each.hang_up()
+
+
+#: what has been sent before anything else was done: words, and the stop
+_early: list[tuple[tuple[str | None, list[str]], LocalStop]] = []
+
+
+def begin(arguments: Sequence[str]) -> None:
+    """
+    Send a stop as soon as it is clear that one is meant: before anything else is imported.
+
+    :param arguments: those of ``drive_can stop``; with any that need a closer look it is not sent.
+    """
+    namespace: str | None = None
+    words: list[str] = []
+    left = list(arguments)
+    while left:
+        word = left.pop(0)
+        option, given, value = word.partition('=')
+        if option == '--namespace' and (given or left):
+            namespace = plain_namespace(value if given else left.pop(0))
+            if namespace is None:
+                return
+        elif word.startswith('-'):
+            if word not in ('--yes', '--json'):
+                return
+        else:
+            words.append(word)
+    _early.append(((namespace, words), LocalStop(namespace, words)))
+
+
+def plain_namespace(text: str) -> str | None:
+    """Return a namespace as nodes have it, '' for the root; None: it needs a closer look."""
+    name = '/' + text.strip('/')
+    if not name.isascii() or not name.replace('/', '').replace('_', '').isalnum() and name != '/':
+        return None
+    return name if name != '/' else ''
+
+
+def begun(namespace: str | None, words: Sequence[str]) -> LocalStop:
+    """Return the stop that was sent for this, or send it."""
+    while _early:
+        asked, stop = _early.pop()
+        if asked == (namespace, list(words)):
+            return stop
+        stop.close()
+    return LocalStop(namespace, words)
+
+
+def twins(name: str, number: int) -> Answer:
+    """Say that bridges cannot be told apart."""
+    return Answer(name, False, f'{number} bridges are called so, and one answer hides the other: '
+                               f'drives {RUNNING}', bridge=True)
+
+
+def does_not_answer() -> str:
+    """Say it of a bridge."""
+    return f'this bridge does not answer: its drives {RUNNING}'
+
+
+def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> bool:
+    """
+    Tell whether words may mean a drive of a bridge that does not answer.
+
+    They do not where the graph shows as many drives of it as it has locks, and none is meant.
+
+    :param around: drives in the graph that are nobody else's.
+    """
+    if not words or not present.may_mean(words):
+        return not words
+    its = [node for node in around if present.has_place
+           and node.rpartition('/')[0] == present.name.rpartition('/')[0]]
+    return not 0 < present.locks <= len(its) or any(meant(words, node) for node in its)

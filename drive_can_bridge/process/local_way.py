@@ -1,0 +1,206 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The local way to a bridge: what is said on its socket, and the end of whoever asks.
+
+The socket is of the type SEQPACKET. A *message* is a list of texts; it travels in as many packets
+as it needs, each of at most :data:`PACKET` bytes. The first byte of a packet says whether more of
+its message follows; the rest are the texts in UTF-8 with a zero between two of them.
+
+What is asked begins with the version of all this, and an action; it is answered by messages, of
+which the last is ``end``:
+
+====================================== ============================================================
+asked                                  answered
+====================================== ============================================================
+``stop`` PLACE WORD…                   ``bridge`` NAME DOMAIN BRIDGE…, ``drives`` NAME…;
+                                       ``drive`` NAME OK ONLINE TEXT for each that is meant;
+                                       ``around`` NAME…: drives that it sees; ``end``.
+                                       PLACE: a namespace, or a pattern of some, ``*`` for all
+``pass`` BRIDGE… '' NAME… '' WORD…     ``drives`` NAME…; ``passed`` NAME OK TEXT IS_BRIDGE for
+                                       each; ``end``: a stop for bridges of other hosts, but for
+                                       drives that have theirs already
+``who``                                ``bridge`` …, ``drives`` …, ``end``
+``enable``, ``disable``, ``reset``     ``drive`` NAME OK ONLINE TEXT for each; ``end``
+NAME…                                  (``unoffered`` NAME: it has no such service)
+``get`` NODE NAME…                     ``value`` TEXT for each; ``end``
+``describe`` NODE NAME…                ``described`` NAME TEXT FACTS MINIMUM MAXIMUM for each;
+                                       ``end``
+``list`` NODE                          ``names`` NAME…; ``end``
+``set`` NODE NAME VALUE                ``result`` OK TEXT; ``end``
+``status`` NODE                        ``fact`` KEY VALUE for each; ``end``
+anything                               ``no`` TEXT: not by this way
+====================================== ============================================================
+
+``drive_can stop`` imports this before it has stopped anything, so nothing is imported here that
+takes time.
+"""
+
+from collections.abc import Callable, Sequence
+import os
+import socket
+import sys
+
+from drive_can_bridge.process.presence import Present
+
+VERSION = '1'
+#: bytes of a packet; of all packets of what is asked
+PACKET, ASKED_MAX = 4096, 65536
+#: s that a bridge may take to begin to answer
+PATIENCE = 1.0
+END, NO = 'end', 'no'
+#: what stands for a namespace: any
+ANYWHERE = '*'
+_MORE, _LAST = b'+', b'.'
+_ZERO = '\0'
+#: bytes of ``struct ucred``: process, user, group
+_CREDENTIALS = 12
+_KINDS: dict[str, Callable[[str], object]] = {
+    'b': lambda text: text == '1', 'i': int, 'd': float, 's': str,
+    'l': lambda text: tuple(text.split('\n')) if text else ()}
+
+
+def meant(words: Sequence[str], node: str) -> bool:
+    """Tell whether words mean a drive: none means all."""
+    return not words or any(matches(word, node) for word in words)
+
+
+def matches(word: str, node: str) -> bool:
+    """Tell whether a word, a pattern or a full name means a drive."""
+    name = node if word.startswith('/') else node.rpartition('/')[2]
+    if name == word:
+        return True
+    from fnmatch import fnmatchcase
+    return fnmatchcase(name, word)
+
+
+class Rubbish(Exception):
+    """What has come is no packet of this way."""
+
+
+def packets_of(message: Sequence[str]) -> list[bytes]:
+    """Return the packets of a message; a zero in a text becomes a blank."""
+    content = _ZERO.join(text.replace(_ZERO, ' ') for text in message).encode(
+        'utf-8', 'surrogateescape')
+    room = PACKET - 1
+    pieces = [content[at:at + room] for at in range(0, len(content), room)] or [b'']
+    return [*(_MORE + piece for piece in pieces[:-1]), _LAST + pieces[-1]]
+
+
+class Inbound:
+    """
+    Puts messages together of packets.
+
+    :param limit: bytes of a message.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._content = bytearray()
+
+    def take(self, packet: bytes) -> list[str] | None:
+        """
+        Take a packet; return the message that it is the end of.
+
+        :raises Rubbish: it is none.
+        """
+        if len(packet) > PACKET or packet[:1] not in (_MORE, _LAST):
+            raise Rubbish
+        self._content += packet[1:]
+        if len(self._content) > self._limit:
+            raise Rubbish
+        if packet[:1] == _MORE:
+            return None
+        content, self._content = bytes(self._content), bytearray()
+        try:
+            return content.decode('utf-8', 'surrogateescape').split(_ZERO)
+        except UnicodeDecodeError:
+            raise Rubbish from None
+
+
+def value_text(value: object) -> str:
+    """Write a value with its type: a bool, a number, a text or a list of texts; '' for none."""
+    if isinstance(value, bool):
+        return f'b{value:d}'
+    if isinstance(value, int):
+        return f'i{value}'
+    if isinstance(value, float):
+        return f'd{value!r}'
+    if isinstance(value, str):
+        return f's{value}'
+    if isinstance(value, (list, tuple)):
+        return 'l' + '\n'.join(map(str, value))
+    return ''
+
+
+def value_of(text: str) -> object:
+    """
+    Read what :func:`value_text` has written; None for none.
+
+    :raises Rubbish: it is nothing of the kind.
+    """
+    try:
+        return _KINDS[text[0]](text[1:]) if text else None
+    except (KeyError, ValueError):
+        raise Rubbish from None
+
+
+def user_of(peer: socket.socket) -> int:
+    """Return the user at the other end, as the kernel knows it since it has begun to listen."""
+    found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS)
+    return int.from_bytes(found[4:8], sys.byteorder)
+
+
+def trusted_users() -> tuple[int, int]:
+    """Return root, and the user of this process: nobody else is believed, or obeyed."""
+    return 0, os.geteuid()
+
+
+class Line:
+    """
+    A connection to a bridge of this host.
+
+    :raises OSError: nobody listens there, or nobody takes calls now (``BlockingIOError``).
+    :ivar believed: the bridge is root's, or of our user.
+    """
+
+    def __init__(self, bridge: Present) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            self.socket.setblocking(False)
+            self.socket.connect(bridge.address)
+            self.believed = user_of(self.socket) in trusted_users()
+        except BaseException:
+            self.socket.close()
+            raise
+        self._inbound = Inbound(1 << 26)
+
+    def ask(self, *words: str) -> None:
+        """
+        Ask.
+
+        :raises OSError: the bridge has gone, or takes nothing.
+        """
+        for packet in packets_of([VERSION, *words]):
+            self.socket.send(packet)
+
+    def take(self) -> list[str] | None:
+        """
+        Return a message that has arrived; None: nothing has.
+
+        :raises OSError: the other end has gone.
+        :raises Rubbish: it is no bridge.
+        """
+        while True:
+            try:
+                packet = self.socket.recv(PACKET + 1)
+            except BlockingIOError:
+                return None
+            if not packet:
+                raise ConnectionResetError
+            message = self._inbound.take(packet)
+            if message is not None:
+                return message
+
+    def close(self) -> None:
+        """Hang up."""
+        self.socket.close()

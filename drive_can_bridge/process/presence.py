@@ -1,0 +1,159 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Which bridges have drives on this host.
+
+Beside its locks (:mod:`.locks`) a bridge has a name in the abstract name space of Linux that says
+what it is called in the ROS graph. It goes with the process, as the locks do: whether the bridge
+answers or not, it can be named. Behind that name it listens (:mod:`.local_server`), unless
+``DRIVE_CAN_LOCAL`` is ``off``.
+
+``drive_can stop`` imports this before it has stopped anything, so nothing is imported here that
+takes time.
+"""
+
+from collections import namedtuple
+from collections.abc import Sequence
+import os
+import socket
+
+#: all names begin with this
+PREFIX = 'drive_can_bridge'
+#: what a bridge calls itself where it locks drives
+BRIDGE = 'drive_can_bridge'
+#: what the kernel shows of all sockets
+TABLE = '/proc/net/unix'
+#: switches the local way off: the value ``off``
+SWITCH = 'DRIVE_CAN_LOCAL'
+#: characters that have room in the name of a socket, and how many of longer ones are kept
+_ROOM, _KEPT = 70, 60
+
+
+def switched_on() -> bool:
+    """Tell whether bridges listen on this host, and commands ask them there."""
+    return os.environ.get(SWITCH, '').strip().lower() != 'off'
+
+
+def own_domain() -> int | None:
+    """Return the ROS domain of this shell; None: what it says is none."""
+    try:
+        return int(os.environ.get('ROS_DOMAIN_ID') or '0', 0)
+    except ValueError:
+        return None
+
+
+def in_namespace(name: str, namespace: str) -> bool:
+    """Tell whether a node is in a namespace, or one of a pattern."""
+    place = name.rpartition('/')[0]
+    if place == namespace:
+        return True
+    from fnmatch import fnmatchcase
+    return fnmatchcase(place, namespace)
+
+
+class Present(namedtuple('Present', 'process domain name locks')):
+    """
+    A bridge of this host.
+
+    :ivar process: number of its process.
+    :ivar domain: its ROS domain; None: not known.
+    :ivar name: its full name; '' where it is not known, cut where it is very long.
+    :ivar locks: how many locks its process holds, each of them that of a drive, or of a port.
+    """
+
+    __slots__ = ()
+
+    @property
+    def address(self) -> str:
+        """Where it listens."""
+        return f'\0{PREFIX}/bridge/{self.process}/{self.domain}{self.name}'
+
+    @property
+    def has_place(self) -> bool:
+        """Its namespace is known."""
+        return bool(self.name) and '~' not in self.name
+
+    def may_be_in(self, namespace: str | None) -> bool:
+        """Tell whether it may run in a namespace, or one of a pattern; None: anywhere."""
+        return (namespace is None or not self.has_place
+                or in_namespace(self.name, namespace))
+
+    def may_mean(self, words: Sequence[str]) -> bool:
+        """Tell whether words, patterns or full names may mean a drive of it; none mean all."""
+        place = f'{self.name.rpartition("/")[0]}/'
+        return not words or not self.has_place or any(
+            not word.startswith('/') or _may_mean(word, place) for word in words)
+
+    def silence(self, domain: int | None) -> str:
+        """Say that it does not answer in a ROS domain."""
+        where = f'process {self.process}'
+        if self.domain not in (None, domain):
+            where += f', ROS domain {self.domain}'
+        return f'this bridge of this host ({where}) does not answer here'
+
+
+class Presence:
+    """
+    Tells others on this host that this process is a bridge, until it is withdrawn.
+
+    :param name: full name of its node.
+    :ivar socket: not connected, and nobody listens there yet.
+    :ivar taken: somebody else has the name.
+    """
+
+    def __init__(self, domain: int, name: str) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.taken = False
+        try:
+            self.socket.bind(Present(os.getpid(), domain, short(name), 0).address)
+        except OSError:     # two by one name: told already
+            self.taken = True
+
+    def withdraw(self) -> None:
+        """Tell it no more."""
+        self.socket.close()
+
+
+def bridges() -> list[Present]:
+    """Return the bridges that hold drives on this host."""
+    try:
+        with open(TABLE, encoding='utf-8', errors='replace') as table:
+            names = [line.rstrip('\n').partition(f' @{PREFIX}/')[2] for line in table]
+    except OSError:     # no Linux, or no /proc
+        return []
+    holding: dict[int, int] = {}
+    told: set[tuple[int, int, str]] = set()
+    for name in filter(None, names):
+        kind, _, rest = name.partition('/')
+        words = rest.split('/', 2)
+        if len(words) < 3:
+            continue
+        if kind == 'who' and words[2] == BRIDGE and _is_number(words[1]):
+            holding[int(words[1])] = holding.get(int(words[1]), 0) + 1
+        elif kind == 'bridge' and words[2] and _is_number(words[0]) and _is_number(words[1]):
+            if not any(map(str.isspace, words[2])):
+                told.add((int(words[0]), int(words[1]), f'/{words[2]}'))
+    named = {process for process, *_ in told}
+    return [Present(*each, holding.get(each[0], 0)) for each in sorted(told)] + [
+        Present(process, None, '', locks) for process, locks in sorted(holding.items())
+        if process not in named]
+
+
+def _may_mean(word: str, place: str) -> bool:
+    """Tell whether a full name, or a pattern of some, may mean a drive in a namespace."""
+    literal = word[:min((word.find(wild) for wild in '*?[' if wild in word), default=len(word))]
+    if literal.startswith(place):
+        return '/' not in literal[len(place):]
+    return literal != word and place.startswith(literal)
+
+
+def _is_number(text: str) -> bool:
+    """Tell whether a text may stand for a process, or a domain: anybody may write anything."""
+    return text.isascii() and text.isdecimal() and len(text) < 10
+
+
+def short(name: str) -> str:
+    """Return a name as it is told: a very long one is cut, and still differs from others."""
+    if len(name) <= _ROOM:
+        return name
+    import hashlib
+    return f'{name[:_KEPT]}~{hashlib.sha256(name.encode()).hexdigest()[:8]}'

@@ -1,0 +1,97 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""``drive_can stop`` by the local way: who is asked, by which way, and what is said of them."""
+
+import json
+import os
+from typing import Any
+
+from bridges import LIFT, parameters, StartBridge
+from by_hand import Lines, Run
+from clients import wait_until
+import pytest
+
+from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.process.presence import Presence
+from drive_can_bridge.ros.client import calls
+
+HOIST = {**LIFT, 'station': 3}
+
+
+@pytest.fixture
+def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no command become part of the graph."""
+    def begin(*_: Any) -> None:
+        raise AssertionError('went through ROS')
+    monkeypatch.setattr(calls.ClientNode, '__init__', begin)
+
+
+def states(bridge: Any) -> list[str]:
+    """Return whether drives run: 'online' where they are enabled, armed or not."""
+    return [{'not armed': 'online'}.get(each.session.state.value, each.session.state.value)
+            for each in bridge.node.drives.values()]
+
+
+@pytest.mark.usefixtures('no_ros')
+def test_ros_is_not_needed_where_all_are_here(
+        bridge: StartBridge, run: Run, locally: Lines) -> None:
+    one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
+    two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
+    for each in (one, two):
+        each.online()
+        each.node.drives['lift'].command(ControlAction.ENABLE, lambda _: None)
+    wait_until(lambda: states(one) + states(two) == ['online', 'disabled', 'online'])
+    locally(one, two)
+    assert run('stop') == (0, ['a/lift: ready', 'a/hoist: ready', 'b/lift: ready'], '')
+    assert states(one) + states(two) == ['disabled'] * 3
+    assert sorted(locally.asked) == [['stop', '*']] * 2
+    assert run('stop', '--namespace', 'b')[1] == ['b/lift: ready']
+    assert run('stop', 'l*', '/a/hoist')[1] == ['a/lift: ready', 'a/hoist: ready', 'b/lift: ready']
+    assert run('stop', 'crane', 'hoist') == (1, [
+        'crane: NOT STOPPED: no such drive; there are: a/lift, a/hoist, b/lift',
+        'a/hoist: ready'], '')
+
+
+@pytest.mark.usefixtures('no_ros')
+def test_other_domains_are_stopped_too_unless_something_is_named(
+        bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/a'))
+    domain = here.context.get_domain_id()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain + 1))
+    there = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    for each in (here, there):
+        each.online()
+    locally(here, there)
+    assert run('stop') == (0, ['a/lift: ready', f'[domain {domain + 1}] b/lift: ready'], '')
+    documents = [json.loads(line) for line in run('stop', '--json')[1]]
+    assert documents == [
+        {'drive': 'a/lift', 'ok': True, 'message': 'ready'},
+        {'drive': 'b/lift', 'ok': True, 'message': 'ready', 'domain': domain + 1}]
+    locally.asked.clear()
+    assert run('stop', 'lift') == (0, ['a/lift: ready'], '')
+    assert locally.asked == [['stop', '*', 'lift']]
+
+
+def test_one_that_hangs_is_named_after_a_second(
+        bridge: StartBridge, run: Run, locally: Lines, bench: Any) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    domain = one.context.get_domain_id()
+    hung, elsewhere = Presence(domain, '/b/bridge'), Presence(domain + 1, '/c/bridge')
+    locally(one, hung=('/b/bridge', '/c/bridge'))
+    silent = 'does not answer here: its drives may still be running'
+    try:
+        began = bench.clock.now()
+        assert run('stop') == (1, [
+            f'b/bridge: NOT STOPPED: this bridge of this host (process {os.getpid()}) {silent}',
+            f'c/bridge: NOT STOPPED: this bridge of this host (process {os.getpid()}, ROS domain '
+            f'{domain + 1}) {silent}',
+            'lift: ready'], '')
+        assert 1.0 <= bench.clock.now() - began < 1.1
+        # only what was named counts
+        assert run('stop', '/lift') == (0, ['lift: ready'], '')
+        assert run('stop', '--namespace', '') == (0, ['lift: ready'], '')
+        assert run('stop', 'lift')[0] == 1      # the hung one may have a drive of that name
+    finally:
+        hung.withdraw()
+        elsewhere.withdraw()
