@@ -149,17 +149,19 @@ class Question(NamedTuple):
         bytes.
     :param fits: tells whether the data of such a frame answer it.
     :param quiet: s of silence that follow when there is no answer.
+    :param shortest: data bytes of an answer at least, where it need not have eight.
     """
 
     frame: Frame
     response: int
     fits: Callable[[bytes], bool] = lambda data: True
     quiet: float = 0.0
+    shortest: int = LENGTH
 
     def answers(self, frame: Frame) -> bool:
         """Tell whether a frame from the bus is an answer to it."""
         return (frame.identifier == self.response and frame.extended == self.frame.extended
-                and len(frame.data) == LENGTH and self.fits(frame.data))
+                and self.shortest <= len(frame.data) <= LENGTH and self.fits(frame.data))
 
 
 class Finding(NamedTuple):

@@ -83,6 +83,8 @@ def describe(code: int) -> str:
 REQUEST_BASE = 0x600
 RESPONSE_BASE = 0x580
 LENGTH = 8
+#: data bytes of an answer that names its object, where the device leaves away what is not used
+SHORTEST = 4
 EXPEDITED_MAX = 4
 SEGMENT_MAX = 7
 DEVICE_TYPE = 0x1000
@@ -194,19 +196,21 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Messa
     Decode a request or a response.
 
     :param segments: they are expected: else no head is that of one.
-    :raises RemoteProtocolError: it is none, or malformed.
+    :raises RemoteProtocolError: it is none, or malformed. A response may be shorter than eight
+        bytes where it holds what its head promises: some devices leave the rest away.
     """
-    if len(data) != LENGTH:
-        raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {LENGTH}')
-    head = data[0]
+    head = data[0] if data else 0
     kind = next((kind for kind in Kind if head & kind.value.mask == kind.value.code
                  and kind.value.is_sent_by(direction)
                  and (segments or 'index' in kind.value.names)), None)
+    least = LENGTH if kind is None or direction is _REQUEST else _promised(kind, head)
+    if not least <= len(data) <= LENGTH:
+        raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {least}')
     if kind is None:
         raise RemoteProtocolError(f'SDO command {head:02X}h is no ' + (
             'request that is known here' if direction is _REQUEST
             else 'answer that was asked for'))
-    fields = kind.value.unpack(data)
+    fields = kind.value.unpack(data.ljust(LENGTH, b'\0'))
     content, number = fields.get('data', b''), fields.get('number', 0)
     if 'index' not in fields:
         if content:
@@ -219,6 +223,19 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Messa
     return Message(kind, (fields['index'], fields['subindex']), content,
                    number if sized or kind is Kind.ABORT else 0,
                    last=sized if content else 'number' not in fields or kind is Kind.ABORT)
+
+
+def _promised(kind: Kind, head: int) -> int:
+    """Return how many bytes a response has at least, by its head."""
+    if kind is Kind.UPLOADED:
+        return LENGTH - (head >> 2 & 0x03 if head & _SIZED else 0)
+    if kind is Kind.SEGMENT:
+        return LENGTH - (head >> 1 & 0x07)
+    if kind is Kind.SEGMENT_TAKEN:
+        return 1
+    if kind is Kind.DOWNLOADED or kind is Kind.UPLOAD_BEGUN and not head & _SIZED:
+        return SHORTEST
+    return LENGTH
 
 
 def decode_upload(data: bytes) -> Uploaded:

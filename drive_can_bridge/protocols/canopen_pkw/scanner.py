@@ -207,7 +207,7 @@ class PkwProber(Prober):
             return None     # some other PDO
         answer = yield Question(
             sdo.encode_upload(node, sdo.RPDO4_MAPPING, 1), sdo.RESPONSE_BASE + node,
-            lambda data: _uploaded(data) is not None)
+            lambda data: _uploaded(data) is not None, shortest=sdo.SHORTEST)
         uploaded = None if answer is None else _uploaded(answer.data)
         return None if uploaded is None or uploaded.value is None else uploaded.value >> 16
 

@@ -18,6 +18,7 @@ from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX
+from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.protocols.transactor import Transactor
 
@@ -55,12 +56,32 @@ class Reply(NamedTuple):
     :param abort: the code of a refusal.
     :param sent: False for a write that the bus refused.
     :param sized: the drive has told how long the object is.
+    :param padded: the drive answers with four bytes whatever the size, its status word, too; None:
+        that has not been asked for yet.
     """
 
     data: bytes | None = None
     abort: int | None = None
     sent: bool = True
     sized: bool = True
+    padded: bool | None = None
+
+    def word(self, length: int, *, signed: bool) -> int | None:
+        """
+        Return what was read as a word of so many bytes; None: it has another length.
+
+        More bytes are taken of a drive only that fills all up to four, where those are 00 or, of
+        what is signed, the sign.
+        """
+        data = self.data
+        if data is None:
+            return None
+        content, rest = data[:length], data[length:] if self.sized else b''
+        sign = b'\xFF' if signed and content and content[-1] & 0x80 else b'\0'
+        if len(content) < length or rest and not (
+                self.padded and set(rest) in ({0}, set(sign))):
+            return None
+        return int.from_bytes(content, 'little')
 
 
 SILENT, NOT_SENT, DONE = Reply(), Reply(sent=False), Reply(b'')
@@ -88,6 +109,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._toggle = 0
         self._collected: bytearray | None = None    # of an object that takes segments
         self._abandoned = False                     # no further one is asked for
+        self._padded: bool | None = None            # four bytes answer everything
         # the last upload that nothing has answered yet, and until when something may
         self._open_upload: tuple[Ask | None, float] = None, -math.inf
 
@@ -133,7 +155,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self.finish()
         if found.kind is Kind.ABORT:
             return Reply(abort=found.number)
-        return Reply(found.data, sized=found.last)
+        if found.object == (STATUS_WORD, 0) and found.kind is Kind.UPLOADED and found.last:
+            self._padded = len(found.data) > 2
+        return self._answered(found.data, sized=found.last)
 
     def decode(self, answer: bytes) -> Message:
         """
@@ -162,7 +186,10 @@ class SdoTransactor(Transactor[Ask, Reply]):
             self._give_up(_TOO_LONG, self.step)     # not the drive's word: what came is the reply
         data = bytes(self._collected)
         self.finish()
-        return Reply(data)
+        return self._answered(data, sized=True)
+
+    def _answered(self, data: bytes, *, sized: bool) -> Reply:
+        return Reply(data, sized=sized, padded=self._padded)
 
     def _ask_segment(self, now: float) -> Reply | bool:
         if self._abandoned:

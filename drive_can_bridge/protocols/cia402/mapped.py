@@ -36,7 +36,7 @@ def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: Reply,
     """
     wanted = {(each.index or 0, each.subindex or 0): each for one in pdos
               for each in one.parameters}
-    tells_size = status.sized and status.data is not None and len(status.data) == 2
+    judged = status.padded is False     # sizes mean something
     found: dict[Parameter, int] = {}
     missing: list[Sentence] = []
     for place, parameter in wanted.items():
@@ -46,7 +46,7 @@ def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: Reply,
             missing.append(sentences.of_object(named(parameter), sentences.no_such_object()))
         elif reply.data is None:
             continue
-        elif tells_size and reply.sized and len(reply.data) != length:
+        elif judged and reply.sized and len(reply.data) != length:
             missing.append(sentences.of_object(named(parameter), sentences.other_length(
                 len(reply.data), parameter.type.value)))
         else:

@@ -82,14 +82,15 @@ class Objects:
         """
         Read a number; None: the drive refuses.
 
-        :param length: its bytes, where the drive does not tell.
+        :param length: its bytes, where the drive does not tell, or answers with four always.
         :raises End: nobody answers.
         """
         reply = yield from self.transfer(Ask(index, subindex))
         self.abort = reply.abort
         if reply.data is None:
             return None
-        data = reply.data if reply.sized else reply.data[:length]
+        word = reply.word(length, signed=signed)
+        data = reply.data if word is None else word.to_bytes(length, 'little')
         return int.from_bytes(data, 'little', signed=signed)
 
     def put(self, index: int, subindex: int, value: int, length: int,

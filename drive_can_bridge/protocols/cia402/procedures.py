@@ -19,6 +19,7 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.pdo import is_map, width
+from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 
 NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
@@ -51,16 +52,21 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         super().__init__(channel, retry, OneByOne())
 
     def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
-        found = yield from self._upload(span)
-        if isinstance(found, Failure):
-            return found
-        data, sized = found
-        wanted = width(span)
+        reply = yield from self._upload(span)
+        if isinstance(reply, Failure):
+            return reply
+        data, wanted = reply.data or b'', width(span)
         if not _own_width(span):
             return (int.from_bytes(data, 'little'),)
-        if sized and len(data) != wanted and span.type is not ParameterType.BOOL:
+        if span.type is ParameterType.BOOL:
+            return (data[0],)
+        if len(data) > wanted and reply.padded is None and reply.sized:
+            status = yield Ask(STATUS_WORD)     # is that its way with everything?
+            reply = reply._replace(padded=status.padded)
+        word = reply.word(wanted, signed=span.type.signed)
+        if word is None:
             return Failure(sentences.other_length(len(data), span.type.value))
-        return (int.from_bytes(data[:wanted], 'little'),)
+        return (word,)
 
     def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
         (parameter, raw), = items
@@ -85,7 +91,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
                 if not parameter.width_known:
                     return Failure(sentences.width_unknown())
             else:
-                length = len(found[0])
+                length = len(found.data or b'')
             low, high = -1 << 8 * length - 1, (1 << 8 * length) - 1
             if not low <= raw <= high:
                 return Failure(sentences.not_in_bits(raw, 8 * length, low, high))
@@ -100,9 +106,8 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             return refused(reply.abort)
         return self.retry.unanswered(1, timeout) if reply.sent else Failure(sentences.not_sent())
 
-    def _upload(self, parameter: Parameter,
-                ) -> Generator[Ask, Reply, 'tuple[bytes, bool] | Failure']:
-        """Read an object of at most four bytes; tell whether the drive has said how many."""
+    def _upload(self, parameter: Parameter) -> Generator[Ask, Reply, Reply | Failure]:
+        """Read an object of one to four bytes."""
         reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
         if reply.abort is not None:
             return refused(reply.abort)
@@ -110,7 +115,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             return self.retry.unanswered()
         if not 1 <= len(reply.data) <= EXPEDITED_MAX:
             return Failure(sentences.too_long(len(reply.data)))
-        return reply.data, reply.sized
+        return reply
 
 
 def _own_width(parameter: Parameter) -> bool:

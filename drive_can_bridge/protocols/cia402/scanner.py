@@ -262,7 +262,7 @@ class Cia402Prober(Prober):
         node, place = self.drive.station, (index, subindex)
         data = yield from self.ask(Question(
             sdo.encode_upload(node, index, subindex), sdo.RESPONSE_BASE + node,
-            lambda data: _answer(data, place) is not None))
+            lambda data: _answer(data, place) is not None, shortest=sdo.SHORTEST))
         answer = None if data is None else _answer(data, place)
         text = f'{index:04X}h' + (f'.{subindex:02X}h' if subindex else '')
         if answer is None:
