@@ -440,12 +440,17 @@ class Channel(Generic[StepT, ReplyT]):
         ready = self._transactor.ready_at(step, stop=stop)
         if not stop:
             ready = max(ready, self._held_until)
+        if queue.priority is Priority.USERS:
+            ready = max(ready, self._transactor.held_until(step, self.now))
         return ready if key is None else max(ready, self._quarantine.ready_at(key))
 
     def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
         """Tell whether others go on while the step of this queue is in quarantine."""
         if self._transactor.anonymous or queue.step is None:
             return False
+        if queue.priority is Priority.USERS and (
+                self._transactor.held_until(queue.step, self.now) > self.now):
+            return True
         key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
 

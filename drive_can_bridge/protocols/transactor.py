@@ -137,6 +137,10 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """
         return -math.inf
 
+    def held_until(self, step: StepT, now: float) -> float:
+        """Return until when a step of a user waits, while others go on."""
+        return -math.inf
+
     def time_lost(self, now: float) -> ReplyT | bool:
         """
         Record that nobody listened until now.

@@ -30,14 +30,18 @@ no notice of one that has the function byte of the request that it was busy with
 Other writes cannot be written again to be sure, and some device may acknowledge one long after it
 has answered others, function 00h among them. So as long as that may happen, the next one to the
 same address gets the other toggle, behind function 00h where it is that of the last request. Where
-both toggles are taken, an answer that may be a late one is not believed. It may come for a while,
-and until the device has answered something newer: one that queues requests, and stands still for
-seconds, gets on with what it was sent. An answer proves nothing newer than the oldest request that
-it fits: of a queue of reads of one register, every other one looks the same.
+both toggles are taken, a user's write waits until one is free, and of another the first answer,
+which may be a late one, is not believed. It may come for a while, and until the device has
+answered something newer: one that queues requests, and stands still for seconds, gets on with what
+it was sent. An answer proves nothing newer than the oldest request that it fits: of a queue of
+reads of one register, every other one looks the same. So that this comes to an end however many
+answers were lost, a register that nobody has asked for is read behind function 00h: its answer
+fits nothing else, and shows that nothing older comes. That is done where more is in doubt than the
+next answer.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from functools import partial
 from itertools import dropwhile
@@ -53,7 +57,7 @@ from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
-from drive_can_bridge.protocols.channel import Channel, LATE_MAX
+from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.transactor import Transactor
 
 #: s that an answer to function 00h is waited for at most
@@ -62,6 +66,8 @@ SYNCHRONISATION_TIMEOUT = 0.1
 OPEN_MAX = 16
 #: so many requests that were not answered are remembered: those of a minute of silence
 ASKED_MAX = 256
+#: registers that are read to have an answer that fits nothing else: what identifies the device
+ASIDE = range(64, 96)
 #: s until the bus is asked again to take a write that waits for nobody
 REFUSED_PAUSE = 0.01
 
@@ -173,6 +179,9 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._abandoned = False
         self._refused_at: float | None = None   # the bus did not take the request
         self._late = False                      # at first
+        self._preparing = False                 # the request is not that of the step
+        #: where an answer to a write was not believed: the next one is
+        self._disbelieved: set[Address] = set()
 
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
@@ -191,14 +200,25 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def begin(self, step: Step, now: float) -> None:
         self.expect(step, math.inf)     # until its request is made
-        if _is_blind(step) or (
-                self._synchronised and self._next_toggle(step, now) != self._toggle):
+        if _is_blind(step):
             self._send_step(step, now)
-            return
-        self._request = pkw.idle_request()
-        self.deadline = self._until = now + min(self.retry.timeout, SYNCHRONISATION_TIMEOUT)
-        self._asked.append(self._request)
-        self._send(self._request, self._left)
+        elif not self._synchronised:
+            self._prepare(pkw.idle_request(), now)
+        elif self._is_doubtful(step, now):
+            self._ask_aside(step, now)
+        elif self._next_toggle(step, now) != self._toggle:
+            self._send_step(step, now)
+        else:
+            self._prepare(pkw.idle_request(), now)
+
+    def held_until(self, step: Step, now: float) -> float:
+        if isinstance(step, Read) or step.blind:
+            return -math.inf
+        late = [-math.inf, -math.inf]
+        for until, request in self._still_late(now):
+            if request.address == step.address:
+                late[request.toggle] = max(late[request.toggle], until)
+        return min(late)
 
     def abandon(self, until: float) -> None:
         """Wait for the answer under way until then at most; the step is not gone on with."""
@@ -212,27 +232,24 @@ class MailboxTransactor(Transactor[Step, Reply]):
         late_until = self._take_late(answer, now)
         if request is None or step is None:
             return False
-        if request.code == Function.NONE:
-            if answer.code != Function.NONE:
-                return False
-            self._synchronised = True
-            if self._abandoned:
-                self.finish()
-                return Silence(sent=False)
-            self._send_step(step, now)
-            return True
+        if self._preparing:
+            return _fits(answer, request) and self._prepared(request, step, now)
         if not pkw.answers(answer, request):
             return False
         if late_until is not None and not _is_blind(step):
             # the other of the two may come as long; not longer: one of them may be lost
             self._late_until = min(self._late_until, late_until)
+            self._disbelieved.add(request.address)
             return False
+        self._disbelieved.discard(request.address)
         if isinstance(step, Read):
             self._open.clear()
-        elif step.blind and any(each.words != request.words and each.address == request.address
-                                for each in since):
+        elif step.blind and _conflicts(since, request):
             if not self._abandoned and self._refused_at is None:
-                self._send_step(step, now)
+                if _conflicts(self._open, request):
+                    self._ask_aside(step, now)
+                else:
+                    self._send_step(step, now)
             return False
         self._synchronised = True
         self.finish()
@@ -248,17 +265,17 @@ class MailboxTransactor(Transactor[Step, Reply]):
             return self._try_again(step, self._refused_at, now)
         if now < self._until:
             return False
-        sent = request.code != Function.NONE
-        if sent or self._abandoned or isinstance(step, Write):
+        sent = not self._preparing
+        if sent or self._abandoned or isinstance(step, Write) and not step.blind:
             self.forget()
-            return Silence(sent)
+            return Silence(sent or _is_blind(step))     # it was, before what was asked aside
         self._send_step(step, now)
         return False
 
     def forget(self) -> None:
         """Expect nothing any more; what the device's last function byte is, is unknown."""
         request, step = self._request, self.step
-        if request is not None and request.code != Function.NONE and self._refused_at is None and (
+        if request is not None and not self._preparing and self._refused_at is None and (
                 isinstance(step, Write) and not step.blind):
             self._given_up.append((self._late_until, request))
         self.finish()
@@ -267,8 +284,53 @@ class MailboxTransactor(Transactor[Step, Reply]):
     def finish(self) -> None:
         super().finish()
         self._request = None
-        self._abandoned = self._late = False
+        self._abandoned = self._late = self._preparing = False
         self._refused_at = None
+
+    def _prepare(self, request: Message, now: float) -> None:
+        """Ask something else before the step."""
+        self._preparing, self._request = True, request
+        patience = STOP_PATIENCE if _is_blind(self.step) else SYNCHRONISATION_TIMEOUT
+        self.deadline = self._until = now + min(self.retry.timeout, patience)
+        self._asked.append(request)
+        self._send(request, self._left)
+
+    def _prepared(self, request: Message, step: Step, now: float) -> Reply | bool:
+        """Take the answer to what was asked before the step."""
+        self._synchronised = True
+        if self._abandoned:
+            self.finish()
+            return Silence(sent=_is_blind(step))
+        if request.code != Function.NONE:
+            self._open.clear()
+            if isinstance(step, Write) and step.address in self._disbelieved:
+                self._given_up = deque(
+                    (each for each in self._given_up if each[1].address != step.address),
+                    maxlen=ASKED_MAX)
+        elif self._is_doubtful(step, now):
+            self._ask_aside(step, now)
+            return True
+        self._send_step(step, now)
+        return True
+
+    def _is_doubtful(self, step: Step, now: float) -> bool:
+        """Tell whether answers to given-up writes would make more than the next one doubtful."""
+        if isinstance(step, Read) or step.blind:
+            return False
+        late = [each[1] for each in self._still_late(now) if each[1].address == step.address]
+        asked = set(map(id, self._asked))
+        return len({each.toggle for each in late}) == 2 and (
+            step.address in self._disbelieved or any(id(each) in asked for each in late))
+
+    def _ask_aside(self, step: Step, now: float) -> None:
+        """Read what nobody has asked for, if there is something, before the step."""
+        asked = {request.word for request in self._asked}
+        word = next((word for word in ASIDE if word not in asked), None)
+        if word is None:
+            self._send_step(step, now)
+            return
+        self._toggle = not self._toggle
+        self._prepare(pkw.read_request(Address(word), 1, self._toggle), now)
 
     def _writes_since(self, answer: Message) -> list[Message]:
         """Take an answer: it is to the oldest write that it fits. Return that and those since."""
@@ -347,6 +409,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         return False
 
     def _send_step(self, step: Step, now: float) -> None:
+        self._preparing = False
         # after function 00h, too: a late answer to the request before never fits
         self._toggle = self._next_toggle(step, now)
         left, self._request = self._left, self._make_request(step, self._toggle)
@@ -370,7 +433,13 @@ def _fits(answer: Message, request: Message) -> bool:
             pkw.answers(answer, request))
 
 
-def _is_blind(step: Step) -> bool:
+def _conflicts(written: Iterable[Message], request: Message) -> bool:
+    """Tell whether something else was written to the registers of a request."""
+    return any(each.words != request.words and each.address == request.address
+               for each in written)
+
+
+def _is_blind(step: Step | None) -> bool:
     return isinstance(step, Write) and step.blind
 
 

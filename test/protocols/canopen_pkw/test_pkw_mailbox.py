@@ -411,6 +411,69 @@ def test_lost_answers_are_not_waited_for_for_ever(box: Box) -> None:
     assert box.hears('8C02002A00000000', 2.56) == Answered((0, 0))
 
 
+def test_lost_handshakes_cost_no_more_than_one_question(box: Box) -> None:
+    """What a lost one leaves in doubt, a register shows that nobody has asked for."""
+    box.box.forget()
+    for now in (1.0, 2.0):
+        assert box.begin(FIRST, now) == [IDLE]
+        assert box.box.handle_timer(now + 0.1) == Silence(sent=False)
+    gives_up(box, FIRST, 3.0)
+    gives_up(box, FIRST, 4.0)
+    assert box.begin(SECOND, 20.0) == [IDLE]
+    assert box.hears(IDLE, 20.01) is True       # it may be that to one of the others
+    assert box.take() == ['4000002500000000']
+    assert box.hears('4000004E02000106', 20.02) is True
+    write, = box.take()
+    assert write[:6] == '8C0200'
+    assert box.hears(write[:8] + '00000000', 20.03) == Answered((0, 0))
+
+
+def test_behind_an_answer_that_was_not_believed_the_next_one_is() -> None:
+    """Where nobody waits until a toggle is free: what commands a drive."""
+    box = Box(timeout=0.1)
+    for now in (1.0, 1.11):
+        box.asks(FIRST, now)
+        assert box.box.handle_timer(now + 0.1) == Silence(sent=True)
+    assert box.box.held_until(SECOND, 1.22) == pytest.approx(1.7)
+    sent = box.asks(SECOND, 1.22)[-1]
+    assert box.hears(sent[:8] + '00000000', 1.23) is False
+    assert box.box.handle_timer(1.33) == Silence(sent=True)
+    aside = box.asks(SECOND, 1.34)[-1]
+    assert aside[:4] == '4000'
+    assert box.hears(aside, 1.35) is True
+    write, = box.take()
+    assert box.hears(write[:8] + '00000000', 1.36) == Answered((0, 0))
+
+
+def test_a_stop_is_believed_behind_a_register_that_nobody_has_asked_for() -> None:
+    """However many other values were written before it in vain."""
+    box = Box(timeout=0.1)
+    for number in range(7):
+        box.begin(blind(100 + number), 1.0 + 0.2 * number)
+        assert box.box.handle_timer(1.1 + 0.2 * number) == Silence(sent=True)
+    stop, = box.begin(blind(0), 3.0)
+    assert box.hears(stop[:8] + '00000000', 3.002) is False
+    aside, = box.take()
+    assert aside[:4] == '4000'
+    assert box.hears(aside, 3.004) is True
+    again, = box.take()
+    assert (again[:6], again[8:]) == (stop[:6], '00000000')
+    assert box.hears(again, 3.006) == Answered((0, 0))
+
+
+def test_a_stop_waits_for_that_register_for_a_moment_only() -> None:
+    box = Box(timeout=0.1)
+    for number in range(7):
+        box.begin(blind(100 + number), 1.0 + 0.2 * number)
+        box.box.handle_timer(1.1 + 0.2 * number)
+    stop, = box.begin(blind(0), 3.0)
+    assert box.hears(stop[:8] + '00000000', 3.002) is False
+    box.take()
+    assert box.box.handle_timer(3.052) is False
+    again, = box.take()
+    assert (again[:6], again[8:]) == (stop[:6], '00000000')
+
+
 def test_write_that_had_to_make_room_has_its_time_to_be_late(box: Box) -> None:
     assert box.begin(FIRST, 1.0) == ['8C02002A2C000000']
     box.box.abandon(1.05)
