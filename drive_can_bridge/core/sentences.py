@@ -430,7 +430,9 @@ limit_unread = Text(
     '{what} has not been read back yet',
     do='wait; where it lasts, look at the cable and raise parameter_timeout')
 object_refused = Text(
+    '{what} ({meant}) refused by the drive: {why}',
     '{what} refused by the drive: {why}',
+    fields='what why meant',
     do='take other parameters, or PDOs that fit what the drive has (mapping verify, assume)')
 object_differs = Text(
     '{what} is {found} instead of {wanted}',
@@ -666,8 +668,14 @@ drive_to_correct = Text(
     do='correct the drive or the configuration')
 maps_not_kept = Text(
     '{why}; the drive does not keep the maps that are written: correct the drive or the '
-    'configuration',
+    'configuration, or set mapping: assume (nothing is checked then: another content is taken for '
+    'what the lists say)',
     do='correct the drive or the configuration')
+maps_fixed = Text(
+    '{why}; the bridge cannot write that mapping: list what the drive maps, in its order, or set '
+    'mapping: assume (nothing is checked then: another content is taken for what the lists say, '
+    'and nobody knows what stops the drive when the bridge dies)',
+    do='list what the drive maps; drive_can probe shows it')
 fault = Text(
     '{which}: remove its cause, then {reset}',
     'fault: remove its cause, then {reset}',

@@ -93,13 +93,18 @@ class Objects:
         data = reply.data if word is None else word.to_bytes(length, 'little')
         return int.from_bytes(data, 'little', signed=signed)
 
-    def put(self, index: int, subindex: int, value: int, length: int,
+    def put(self, index: int, subindex: int, value: int, length: int, meant: str = '',
             ) -> Generator[Ask, Reply, Sentence]:
-        """Write a number; return the refusal. :raises End: nobody answers."""
+        """
+        Write a number; return the refusal.
+
+        :param meant: what it stands for there.
+        :raises End: nobody answers.
+        """
         data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
         reply = yield from self.transfer(Ask(index, subindex, data, attempts=self._attempts))
         return NOTHING if reply.abort is None else sentences.object_refused(
-            at_object(index, subindex), sdo.describe(reply.abort))
+            what=at_object(index, subindex), why=sdo.describe(reply.abort), meant=meant)
 
     def must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
         """Write a number. :raises End: nobody answers, or the drive refuses."""

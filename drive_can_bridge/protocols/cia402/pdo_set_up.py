@@ -5,12 +5,12 @@ from collections.abc import Callable, Generator, Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
-from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
+from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos, same_mapping
 
 
 class PdoSetUp:
@@ -46,7 +46,7 @@ class PdoSetUp:
             refusal = yield from self._write(wanted, identifier, transmit=transmit)
             difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
             if refusal and difference:
-                raise differs(refusal)
+                raise differs(together((difference, refusal)), sentences.maps_fixed)
             if difference:
                 raise differs(difference, sentences.maps_not_kept)
 
@@ -88,16 +88,24 @@ class PdoSetUp:
         return NOTHING, identifier
 
     def _other_content(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
-        """Return in what a PDO holds something else."""
-        entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
+        """Return in what a PDO holds something else, by its meaning."""
+        mapping, needed = wanted.communication + pdo.MAPPING_OFFSET, len(wanted.entries)
         count = yield from self._objects.read(mapping, 0, 1)
-        if count != len(entries):
-            return _difference(mapping, 0, count or 0, len(entries))
-        for place, entry in enumerate(entries, 1):
+        if count is None:
+            return sentences.object_refused(
+                at_object(mapping), sdo.describe(self._objects.abort or 0))
+        if count < needed:
+            return _difference(mapping, 0, count, needed)
+        for place, entry in enumerate(wanted.entries, 1):
             found = (yield from self._objects.read(mapping, place)) or 0
-            if found != entry:
+            if not same_mapping([found], [entry]):
                 return sentences.object_differs(
-                    at_object(mapping, place), pdo.entry_text(found), pdo.entry_text(entry))
+                    at_object(mapping, place), pdo.entry_text(found),
+                    f'{pdo.entry_text(entry)} ({wanted.parameters[place - 1].name})')
+        for place in range(needed + 1, min(count, pdo.ENTRIES_MAX) + 1):
+            behind = yield from self._objects.read(mapping, place)
+            if behind or behind is None and not self._objects.absent:
+                return _difference(mapping, 0, count, needed)
         return NOTHING
 
     def _timers(self) -> list[tuple[int, int]]:
@@ -119,18 +127,21 @@ class PdoSetUp:
         fixed = yield from self._objects.put(at, pdo.COB_ID, identifier | pdo.INVALID, 4)
         undo: list[tuple[int, int]] = []
         refusal = NOTHING if fixed else (yield from self._map(wanted, undo))
-        refusal = refusal or (yield from self._pace(at, fixed=bool(fixed), transmit=transmit))
+        remedy = sentences.maps_fixed
+        if not refusal:
+            refusal = yield from self._pace(at, fixed=bool(fixed), transmit=transmit)
+            remedy = sentences.drive_to_correct if refusal else remedy
         if not fixed:
             refusal = refusal or (yield from self._objects.put(
                 at, pdo.COB_ID, wanted.identifier | kept, 4))
         if refusal and not fixed:       # as it was found
             for place, content in reversed(undo):
-                if (yield from self._put_entry(at + pdo.MAPPING_OFFSET, place, content)):
+                if (yield from self._put_entry(wanted, place, content)):
                     break       # it stays off, rather than with something else in it
             else:
                 yield from self._objects.put(at, pdo.COB_ID, identifier, 4)
         if refusal:
-            raise differs(refusal)
+            raise differs(refusal, remedy)
         return fixed
 
     def _map(self, wanted: Pdo, undo: list[tuple[int, int]]) -> Generator[Ask, Reply, Sentence]:
@@ -143,12 +154,18 @@ class PdoSetUp:
         entries, mapping = wanted.entries, wanted.communication + pdo.MAPPING_OFFSET
         count = (yield from self._objects.read(mapping, 0, 1)) or 0
         held = {0: count}
-        for place in range(1, min(count, len(entries)) + 1):
+        for place in range(1, min(count, pdo.ENTRIES_MAX) + 1):
             held[place] = (yield from self._objects.read(mapping, place)) or 0
-        if held == dict(enumerate((len(entries), *entries))):
+        if same_mapping(list(held.values())[1:], entries):
             return NOTHING
-        for place, content in (0, 0), *enumerate(entries, 1), (0, len(entries)):
-            refusal = yield from self._put_entry(mapping, place, content)
+        steps = [(0, 0), *enumerate(entries, 1), (0, len(entries))]
+        while steps:
+            place, content = steps.pop(0)
+            refusal = yield from self._put_entry(wanted, place, content)
+            if refusal and not place and not content and len(held) > len(entries):
+                # the count is fixed: what is not needed is to be empty
+                steps = list(enumerate([*entries, *[0] * (len(held) - 1 - len(entries))], 1))
+                continue
             if refusal:
                 return refusal
             if place in held:       # what was beyond the count was nothing
@@ -156,9 +173,16 @@ class PdoSetUp:
                 held[place] = content
         return NOTHING
 
-    def _put_entry(self, mapping: int, place: int, content: int,
+    def _put_entry(self, wanted: Pdo, place: int, content: int,
                    ) -> Generator[Ask, Reply, Sentence]:
-        return (yield from self._objects.put(mapping, place, content, 4 if place else 1))
+        """Write an entry; a refusal names the parameters that were meant."""
+        names = [each.name for each in wanted.parameters]
+        if 0 < place <= len(names):
+            entry = wanted.entries[place - 1]
+            names = [names[place - 1], at_object(entry >> 16, entry >> 8 & 0xFF)]
+        return (yield from self._objects.put(
+            wanted.communication + pdo.MAPPING_OFFSET, place, content, 4 if place else 1,
+            ', '.join(names)))
 
     def _pace(self, at: int, *, fixed: bool, transmit: bool) -> Generator[Ask, Reply, Sentence]:
         """Write when a PDO is sent; return the refusal of what it cannot do without."""

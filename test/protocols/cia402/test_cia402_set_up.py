@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from saying import says
 from servo_builders import Axis, FITS, POSITION, TORQUE, VELOCITY
+from stacks import EightEntries, SignedLengths
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
@@ -102,7 +103,9 @@ class TestConfigure:
 
     def test_a_fixed_mapping_that_does_not(self) -> None:
         axis = meet(refuses={(0x1600, 1): 0x06040041})
-        assert differs(axis) == says('object_refused', what='1600h.01h', why=describe(0x06040041))
+        text = differs(axis)
+        assert text == says('object_refused', what='1600h.01h', why=describe(0x06040041))
+        assert text.startswith('1600h.01h (control_word, 6040h.00h) refused by the drive: ')
         axis.drive.fixed.clear()
         axis.live(1.1)
         assert axis.session.online      # looked at again
@@ -178,9 +181,9 @@ class TestRemedy:
         ({}, {}, {'nmt_start': False, 'heartbeat_producer': 0.0}, 'drive_to_correct'),
         # or not taken
         ({}, fixed((0x1800, 2)), {}, 'drive_to_correct'),
-        ({}, fixed((0x1600, 1)), {}, 'drive_to_correct'),
-        ({}, fixed((0x1400, 1)), {}, 'drive_to_correct'),
-        ({}, fixed((0x1800, 1)), {}, 'drive_to_correct'),
+        ({}, fixed((0x1600, 1)), {}, 'maps_fixed'),
+        ({}, fixed((0x1400, 1)), {}, 'maps_fixed'),
+        ({}, fixed((0x1800, 1)), {}, 'maps_fixed'),
         ({}, fixed((0x6060, 0)), {}, 'drive_to_correct'),
         ({(0x1005, 0): bytes.fromhex('81000000')}, fixed((0x1005, 0)), {}, 'drive_to_correct'),
         ({(0x1800, 5): bytes(2)}, fixed((0x1800, 5)), {'transmission': 'event'},
@@ -540,6 +543,56 @@ class TestHeldAxes:
         axis.commands(1003.0, 1100.0)
         axis.live(0.02)
         assert '205#0F004C040000' in axis.take()
+
+
+class TestByMeaning:
+    """What is read back is compared by what it means."""
+
+    @pytest.mark.parametrize('make', [SignedLengths, EightEntries])
+    @pytest.mark.parametrize('mapping', ['configure', 'verify'])
+    def test_what_fits_is_cycled_and_not_written(self, make: Any, mapping: str) -> None:
+        axis = Axis(make=make, objects=FITS, mapping=mapping)
+        axis.start()
+        assert axis.session.online, axis.session.offline_advice
+        assert not any(text[2:4] in ('16', '1A') for text in written(axis))
+
+    @pytest.mark.parametrize('make', [SignedLengths, EightEntries])
+    def test_what_does_not_fit_is_written(self, make: Any) -> None:
+        axis = Axis(make=make, objects={
+            **FITS, (0x1600, 2): bytes.fromhex('20007A60'), (0x1600, 3): bytes.fromhex('08006060'),
+            (0x1600, 0): b'\3'})
+        axis.start()
+        assert axis.session.online, axis.session.offline_advice
+        assert axis.drive.mapped(0x1600) == [(0x6040, 0, 2), (0x60FF, 0, 4)]
+
+    def test_what_is_behind_and_not_empty_differs(self) -> None:
+        axis = Axis(make=EightEntries, mapping='verify', objects={
+            **FITS, (0x1600, 5): bytes.fromhex('08006060')})
+        axis.start()
+        assert differs(axis) == says('object_differs', what='1600h.00h')
+
+    def test_an_entry_that_cannot_be_read_is_no_empty_one(self) -> None:
+        axis = Axis(mapping='verify', objects={**FITS, (0x1600, 0): b'\3'})
+        axis.drive.instead = {'40001603': '8000160322000008'}
+        axis.start()
+        assert differs(axis) == says('object_differs', what='1600h.00h')
+
+    def test_advice_leads_in_no_circle(self) -> None:
+        """Verify says configure, which says what else there is, and what that costs."""
+        fits_not = {**FITS, (0x1600, 2): bytes.fromhex('20007A60')}
+        told = []
+        for mapping in ('verify', 'configure'):
+            axis = Axis(objects=fits_not, mapping=mapping)
+            axis.drive.fixed = dict.fromkeys(FITS, 0x06010002)
+            axis.start()
+            text = differs(axis)
+            assert '1600h.02h is 607Ah.00h 32 bits instead of 60FFh.00h 32 bits ' \
+                   '(target_velocity)' in text
+            told.append(str(axis.session.remedy(text)))
+        assert 'mapping: configure' in told[0]
+        assert 'mapping: configure' not in told[1]
+        assert 'mapping: assume' in told[1] and 'nothing is checked then' in told[1]
+        assert '06010002h' in told[1]
 
 
 class TestFixedEntries:
