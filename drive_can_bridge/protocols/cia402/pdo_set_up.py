@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.messages import NOTHING, Sentence, together
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply
@@ -46,7 +46,8 @@ class PdoSetUp:
             refusal = yield from self._write(wanted, identifier, transmit=transmit)
             difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
             if refusal and difference:
-                raise differs(together((difference, refusal)), sentences.maps_fixed)
+                raise differs(sentences.object_refused(
+                    **{**refusal.fields, 'meant': difference}), sentences.maps_fixed)
             if difference:
                 raise differs(difference, sentences.maps_not_kept)
 
@@ -159,15 +160,17 @@ class PdoSetUp:
         if same_mapping(list(held.values())[1:], entries):
             return NOTHING
         steps = [(0, 0), *enumerate(entries, 1), (0, len(entries))]
+        count_fixed = NOTHING
         while steps:
             place, content = steps.pop(0)
             refusal = yield from self._put_entry(wanted, place, content)
             if refusal and not place and not content and len(held) > len(entries):
-                # the count is fixed: what is not needed is to be empty
+                count_fixed = refusal       # what is not needed is to be empty
                 steps = list(enumerate([*entries, *[0] * (len(held) - 1 - len(entries))], 1))
                 continue
             if refusal:
-                return refusal
+                return count_fixed if count_fixed and (
+                    count_fixed.fields['why'] == refusal.fields['why']) else refusal
             if place in held:       # what was beyond the count was nothing
                 undo.append((place, held[place]))
                 held[place] = content
