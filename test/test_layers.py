@@ -49,6 +49,8 @@ INTERNAL: dict[str, set[str]] = {
     'demo': {'', 'process'},
     'client.drive': {'', 'core', 'process'},
     'client.bridge': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
+    'client.jog': {
+        '', 'core', 'client.bridge', 'ros.client', 'ros.messages', 'ros.recognition'},
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.bridge', 'client.drive'},
@@ -56,8 +58,8 @@ INTERNAL: dict[str, set[str]] = {
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
         'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
-        'demo', 'client', 'client.drive', 'backup', 'ros', 'ros.client', 'ros.monitor',
-        'ros.demo'},
+        'demo', 'client', 'client.drive', 'client.jog', 'backup', 'ros', 'ros.client',
+        'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -80,6 +82,7 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
     'client.bridge': {'rcl_interfaces'},
+    'client.jog': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
     # an optional extra
@@ -91,7 +94,8 @@ EXTERNAL: dict[str, set[str]] = {
 #: Layer: edges that may be used inside functions only, so that importing the layer stays cheap and
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
-        ('cli', 'view'), ('cli', 'panel'), ('client', 'client.bridge')}
+        ('cli', 'view'), ('cli', 'panel'), ('cli', 'client.jog'),
+        ('client', 'client.bridge')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

@@ -45,6 +45,7 @@ GROUPS: dict[str, dict[str, str]] = {
         'enable': 'enable drives',
         'disable': 'disable drives',
         'reset': 'reset the faults of drives',
+        'jog': 'hold a setpoint for a while',
     },
     'Look': {
         'monitor': 'show all bridges and their drives, live',
@@ -79,6 +80,7 @@ EXAMPLES: dict[str, tuple[str, str]] = {
     'enable': ('enable lift', 'enable /cell1/lift'),
     'disable': ('disable lift', "disable 'lift*' --namespace /cell1"),
     'reset': ('reset lift', 'reset lift conveyor'),
+    'jog': ('jog axis 60', 'jog conveyor speed_setpoint 300 --for 5'),
     'monitor': ('monitor', 'monitor --json'),
     'panel': ('panel', 'panel --port 8081 --allow-writes'),
     'record': ('record -p robot.yaml -o trace.log',

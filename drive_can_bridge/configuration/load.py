@@ -148,6 +148,11 @@ def _bridge(configuration: BridgeConfiguration) -> Iterator[DeclaredParameter]:
         yield DeclaredParameter(
             identity_name(drive.name), '', 'Found out by the bridge when the drive comes online: '
             'the section identity of its profile. Empty while not known.', False)
+        yield DeclaredParameter(f'{prefix}setpoints', '', 'JSON, made when it is asked for: what '
+                                'may be commanded, its neutral value, and whether it is armed.',
+                                False)
+        yield DeclaredParameter(f'{prefix}commanders', '', 'JSON, made when it is asked for: who '
+                                'publishes commands to this drive, each as "node topic".', False)
         yield DeclaredParameter(f'{prefix}profile_sha256', drive.profile.sha256,
                                 'SHA-256 of the file of the profile, as it was read.', False)
         yield DeclaredParameter(f'{prefix}restore', restore_text(drive.profile.restore),
@@ -267,7 +272,7 @@ def _forget_findings(tree: Tree) -> None:
         del tree.data['bridges']
     drives = tree.data.get('drives')
     for drive in drives.values() if isinstance(drives, dict) else ():
-        for key in ('identity', 'profile_sha256', 'restore'):
+        for key in ('identity', 'profile_sha256', 'restore', 'setpoints', 'commanders'):
             if isinstance(drive, dict) and isinstance(drive.get(key), str):
                 del drive[key]
 

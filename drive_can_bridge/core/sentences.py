@@ -704,5 +704,52 @@ answer_late = Text(
     seconds=lambda late: f'{1e3 * late:.{int(1e3 * late < 1.0)}f}',
     do='choose a longer period, or see what else the computer does')
 
+# -- a setpoint held by hand (drive_can jog) ------------------------------------------------------
+
+jog_no_setpoint = Text(
+    'nothing of it can be commanded: it has no cyclic_request',
+    do='put the setpoint into cyclic_request of the drive')
+jog_which = Text(
+    'which setpoint? It has {names: and }: name one', do='name the setpoint')
+jog_unknown = Text(
+    '{name} cannot be commanded; there are: {names:, }', do='name one of those')
+jog_limit = Text(
+    '{name} is a limit, and moves nothing: publish it to {topic}',
+    do='publish the limit as a message')
+jog_position = Text(
+    '{name} is a position, and where it would go from where the axis is, jog does not know: '
+    'publish to {topic}',
+    do='move positions by a node, or by ros2_control')
+jog_timeout = Text(
+    'its command_timeout is {timeout:g} s, so that nothing would stop the drive when this process '
+    'dies; allowed are 0 < command_timeout <= {longest:g} s (drives.{drive}.command_timeout)',
+    do='set command_timeout of the drive')
+jog_not_ready = Text(
+    'is {state}: {advice}', 'is {state}', do='bring it online, and enable it')
+jog_commanded = Text(
+    'is commanded by others: {who:, }; two who command one drive move it by turns',
+    do='end who else publishes commands to the drive')
+jog_not_told = Text(
+    'its bridge does not say what can be commanded: it is inactive, or older than jog',
+    do='activate the bridge, or start it again after an update')
+jog_not_armed = Text(
+    'was not armed within {seconds:g} s of neutral commands', do='see diagnostics of the drive')
+jog_no_longer = Text('is no longer {state}', do='see diagnostics of the drive')
+jog_neutral_again = Text(
+    'the bridge sends {sent} instead of {wanted}: the setpoint is not armed any more',
+    do='see the log of the bridge')
+jog_not_taken = Text(
+    'the bridge did not send {wanted} within {seconds:g} s', do='see the log of the bridge')
+jog_late = Text(
+    'this process stood still for {seconds:.1f} s, longer than command_timeout',
+    do='see what else the computer does')
+jog_unanswered = Text(
+    'no exchange that carried {value} was answered', do='see diagnostics of the drive')
+jog_neutral_unseen = Text(
+    'neutral was published, and not seen to be sent: command_timeout stops it',
+    do='see diagnostics of the drive')
+jog_interrupted = Text('interrupted', do='nothing: the drive got neutral')
+jog_done = Text('{value} was sent and answered, then neutral', do='nothing')
+
 #: all sentences there are, by their codes
 CODES = catalogue(globals())

@@ -54,6 +54,7 @@ from drive_can_bridge.ros.answers import Answers
 from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
+from drive_can_bridge.ros.joints import COMMANDS
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.rcl.services import RclServices
 from drive_can_bridge.ros.rcl.unfit import Unfit
@@ -81,13 +82,15 @@ class NodeParameters:
 
     :param changed: takes (name, value) of each parameter that was changed.
     :param refusal: says why a value that is allowed in itself cannot be set now; '' if it can.
+    :param current: returns a value that is made when it is asked for; None: it is none of these.
     """
 
     def __init__(self, node: Node, changed: Callable[[str, Any], None],
-                 refusal: Callable[[str, Any], str]) -> None:
+                 refusal: Callable[[str, Any], str], current: Callable[[str], Any]) -> None:
         self._node = node
         self._changed = changed
         self._refusal = refusal
+        self._made = current
         self._dynamic: list[str] = []
         self._announcing = False
         node.declare_parameter(
@@ -135,6 +138,10 @@ class NodeParameters:
         """Have a value that is being asked for: looking at the graph is not cheap."""
         if BRIDGES in names:
             self.announce(BRIDGES, self.bridges())
+        for name in dict.fromkeys(names):
+            made = self._made(name)
+            if made is not None and self._node.has_parameter(name):
+                self.announce(name, made)
 
     def bridges(self) -> list[str]:
         """Return the full names of all bridges that are seen, one as often as there are some."""
@@ -271,7 +278,7 @@ class BridgeNode(LifecycleNode):
         self._leaving: list[DriveNode] = []
         self._runtime: BridgeRuntime | None = None
         self._node_parameters = NodeParameters(self, self._parameter_changed,
-                                               self._parameter_refusal)
+                                               self._parameter_refusal, self._made_parameter)
         _guard_transitions(self, self.log.warning, self._transition_lock,
                            lambda: 'the bridge is being stopped' if self._ending else '')
         spinner.executor.add_node(self)
@@ -331,6 +338,11 @@ class BridgeNode(LifecycleNode):
             for setpoint in drive.session.setpoints.held:
                 return rearm_would_jump(setpoint.parameter.name)
         return ''
+
+    def _made_parameter(self, name: str) -> Any:
+        runtime = self._runtime
+        return None if runtime is None else runtime.made_parameter(
+            name, self.resolve_topic_name(COMMANDS))
 
     def _parameter_changed(self, name: str, value: Any) -> None:
         runtime = self._runtime

@@ -8,6 +8,7 @@ The flight recorder, too: what makes it write, and ``~/save_trace``.
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
+import json
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -353,6 +354,19 @@ class BridgeRuntime:
     def drive_of(self, name: str) -> DriveNode | None:
         """Return the drive that a parameter of the bridge is about."""
         return self.drives.get(name.rpartition('.')[0].removeprefix('drives.'))
+
+    def made_parameter(self, name: str, joint_commands: str) -> object:
+        """
+        Return the value of a parameter that is made when it is asked for; None: of no other.
+
+        :param joint_commands: the topic with the commands for all joints.
+        """
+        drive = self.drive_of(name)
+        key = name.rpartition('.')[2]
+        if drive is None or key not in ('setpoints', 'commanders'):
+            return None
+        return drive.commands.setpoints_text() if key == 'setpoints' else (
+            json.dumps(drive.commands.commanders(joint_commands)))
 
     # -- from the exchanges (BusListener) ---------------------------------------------------------
 

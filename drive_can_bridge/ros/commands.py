@@ -11,6 +11,7 @@ group that no executor ever runs.
 
 from collections.abc import Callable
 from functools import partial
+import json
 from typing import NamedTuple
 
 from rclpy.node import Node
@@ -127,6 +128,25 @@ class CommandIntake:
     def destroy(self) -> None:
         """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
         self._topics.destroy()
+
+    def setpoints_text(self) -> str:
+        """Write what may be commanded as JSON, for clients of the bridge."""
+        return json.dumps([{
+            'name': item.parameter.name, 'limit': item.parameter.limit, 'armed': item.armed,
+            **({'neutral_from': item.parameter.neutral_from} if item.parameter.neutral_from else
+               {'neutral': item.parameter.value_from_raw(item.parameter.neutral_raw)}),
+        } for item in self._session.setpoints.items])
+
+    def commanders(self, joint_commands: str) -> list[str]:
+        """
+        Return who publishes commands to this drive, ``node topic``, as this process sees it.
+
+        :param joint_commands: the topic with the commands for all joints of the bridge.
+        """
+        topics = [*self._topics.names, *((joint_commands,) if self._joint_targets else ())]
+        return sorted(f'{each.node_namespace.rstrip("/")}/{each.node_name} {topic}'
+                      for topic in topics
+                      for each in self._node.get_publishers_info_by_topic(topic))
 
     # -- inside -----------------------------------------------------------------------------------
 

@@ -272,6 +272,11 @@ class PolledTopics:
         self._topics.append(CommandTopic(subscription, use=take, old=old, aged=aged,
                                          unreadable=unreadable, read=read))
 
+    @property
+    def names(self) -> list[str]:
+        """Full names of the topics."""
+        return [topic.subscription.topic_name for topic in self._topics]
+
     def take(self, now: float) -> None:
         """Hand over all that waits, oldest first."""
         look = self._look()

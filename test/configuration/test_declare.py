@@ -48,6 +48,8 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('drives.conveyor.parameter_retries', 2),
         ('drives.conveyor.verify_writes', True),
         ('drives.conveyor.identity', ''),
+        ('drives.conveyor.setpoints', ''),
+        ('drives.conveyor.commanders', ''),
         ('drives.conveyor.profile_sha256', sha256),
         ('drives.conveyor.restore', '{"before": [], "after": []}'),
         ('drives.conveyor.mapping', 'verify'),

@@ -370,7 +370,8 @@ def test_no_line_has_all_that_a_file_has(tmp_path: Path, text: str) -> None:
 
 def test_what_a_bridge_finds_out_by_itself_may_stand_in_a_file(tmp_path: Path) -> None:
     """``ros2 param dump`` writes it."""
-    found = '        identity: a=1\n        profile_sha256: 0a\n        restore: "{}"\n'
+    found = ('        identity: a=1\n        profile_sha256: 0a\n        restore: "{}"\n'
+             '        setpoints: ""\n        commanders: "[]"\n')
     text = FILE.replace('    buses:\n', '    bridges: [/drive_can_bridge]\n    buses:\n')
     text = text.replace('        station: 1\n', f'        station: 1\n{found}')
     assert list(load(tmp_path, text).drives) == ['conveyor', 'lift']

@@ -79,6 +79,7 @@ class ClientNode:
 
     :param purpose: part of the node's name.
     :ivar handle: of the node, as rclpy has it.
+    :ivar full_name: of the node in the graph.
     :raises DriveCanError: ROS does not start.
     """
 
@@ -87,15 +88,17 @@ class ClientNode:
         if why:
             raise DriveCanError(f'ROS does not start: {why}')
         self.context = Context()
+        # a leading underscore hides a node from "ros2 node list"
+        name = f'_drive_can_{purpose}_{os.getpid()}'
+        self.full_name = f'/{name}'
         try:
             # takes no signals, and no log file: a stop has to work where nothing can be written
             self.context.init([], initialize_logging=False)
             context: Any = self.context.handle
             with context:
-                # a leading underscore hides a node from "ros2 node list"; no arguments of the
-                # process, no /rosout
+                # no arguments of the process, no /rosout
                 self.handle: Any = rclpy_implementation.Node(
-                    f'_drive_can_{purpose}_{os.getpid()}', '', context, None, False, False)
+                    name, '', context, None, False, False)
         except Exception as error:  # rcl fails in several types
             reason = str(error).partition(', at ')[0]
             raise DriveCanError(f'ROS does not start: {reason}') from error
@@ -443,6 +446,30 @@ def log_quality() -> QoSProfile:
     """Return what suits ``/rosout``: what was said shortly before we came, too."""
     return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.RELIABLE,
                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def undemanding_quality() -> QoSProfile:
+    """Quality of a subscription that any publisher offers."""
+    return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class Outbox:
+    """A publisher of the newest message only."""
+
+    def __init__(self, node: HasHandle, message_type: Any, topic: str) -> None:
+        check_is_valid_msg_type(message_type)
+        with node.handle:
+            self._handle: Any = rclpy_implementation.Publisher(
+                node.handle, message_type, topic, QoSProfile(depth=1).get_c_qos_profile())
+
+    def publish(self, message: Any) -> None:
+        """Publish a message."""
+        with self._handle:
+            self._handle.publish(message)
+
+    def close(self) -> None:
+        """Publish nothing any more."""
+        self._handle.destroy_when_not_in_use()
 
 
 class Inbox:
