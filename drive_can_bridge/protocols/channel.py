@@ -26,7 +26,9 @@ anew.
 *Stops* wait for no quarantine where answers say what they answer. One to the same question may
 still be on its way then, and proves nothing of the stop. So as many answers as may be late ones
 are not believed; after each, the step is done again at once, which makes no difference to a drive
-that has heard it. A question is answered once at most: the next answer is to the stop.
+that has heard it. A question is answered once at most: the next answer is to the stop. Where more
+than one may be late, something else is asked behind the first (:meth:`.Transactor.aside`): when
+that is answered, nothing older comes any more, however many answers were lost.
 """
 
 from collections import deque
@@ -103,6 +105,10 @@ class Quarantine:
             return False
         self._until[key] = now + CATCHING_UP, False
         return True
+
+    def over(self, key: Hashable) -> None:
+        """Record that no answer to the question comes any more."""
+        self._begun = deque((each for each in self._begun if each[1] != key), maxlen=REMEMBERED)
 
     def time_lost(self, before: float, now: float) -> None:
         """Listen on where nobody did at the end of a quarantine, or while answers may come."""
@@ -198,6 +204,7 @@ class Channel(Generic[StepT, ReplyT]):
             priority: _Queue(priority, transactor) for priority in Priority}
         stop, control, setpoints, own, users = self._queues.values()
         self._stop = stop
+        self._aside: _Queue[StepT, ReplyT] = _Queue(Priority.STOP, transactor)  # amid a stop
         self._orders = (control, setpoints, own, users), (control, setpoints, users, own)
         self._users_next = False
         self._serving: _Queue[StepT, ReplyT] | None = None  # whose step is under way
@@ -259,6 +266,8 @@ class Channel(Generic[StepT, ReplyT]):
             self._serving = None
             self._transactor.abandon(math.inf)
         queue.clear()
+        if queue is self._stop:
+            self._clear_aside()
 
     def clear(self) -> None:
         """
@@ -269,7 +278,7 @@ class Channel(Generic[StepT, ReplyT]):
         step = self._expect_late()
         if step is not None and self._deadline < math.inf:  # else nothing answers it
             self._given_up.append((self._deadline, step))
-        for queue in self._queues.values():
+        for queue in (*self._queues.values(), self._aside):
             queue.clear()
         self._transactor.forget()
         self._serving = None
@@ -315,6 +324,8 @@ class Channel(Generic[StepT, ReplyT]):
         if self._serving is self._stop and self._doubtful:
             self._doubtful -= 1
             self._hurried, reply = True, self._transactor.silent
+            if self._doubtful and step is not None:
+                self._ask_aside(self._transactor.doubted(step))
         self._end(reply)
         self.advance(now)
         return True
@@ -406,10 +417,12 @@ class Channel(Generic[StepT, ReplyT]):
 
     def _order(self) -> tuple[_Queue[StepT, ReplyT], ...]:
         """Return the queues in the order in which they are served now."""
-        return self._orders[self._users_next] if self._stop.idle else (self._stop,)
+        return self._orders[self._users_next] if self._stop.idle else (self._aside, self._stop)
 
     def _choose(self, now: float) -> _Queue[StepT, ReplyT] | None:
         """Return the queue whose step is to be done next; None when there is nothing to do."""
+        if self._aside.step is not None:
+            return self._aside
         if self._stop.fetch() is not None:
             return self._stop
         if now < self._held_until:
@@ -429,14 +442,14 @@ class Channel(Generic[StepT, ReplyT]):
     def _key(self, queue: _Queue[StepT, ReplyT], step: StepT) -> Hashable | None:
         """Return which quarantine, if it has begun, concerns the step of a queue."""
         transactor = self._transactor
-        if not transactor.anonymous and (queue.repeated or queue is self._stop):
+        if not transactor.anonymous and (queue.repeated or queue.priority is Priority.STOP):
             return None
         return transactor.key(step)
 
     def _ready_at(self, queue: _Queue[StepT, ReplyT], step: StepT,
                   key: Hashable | None) -> float:
         """Return when the step of a queue may be done."""
-        stop = queue is self._stop
+        stop = queue.priority is Priority.STOP
         ready = self._transactor.ready_at(step, stop=stop)
         if not stop:
             ready = max(ready, self._held_until)
@@ -453,6 +466,28 @@ class Channel(Generic[StepT, ReplyT]):
             return True
         key = self._key(queue, queue.step)
         return key is not None and self._quarantine.ready_at(key) > self.now
+
+    def _ask_aside(self, doubted: Hashable) -> None:
+        """Ask something between two attempts at a stop, to learn that nothing older comes."""
+        transactor = self._transactor
+        step = transactor.aside(lambda key: self._quarantine.late(key, self.now) > 0)
+        if step is None:
+            return
+
+        def asking() -> Generator[StepT, ReplyT, None]:
+            reply = yield step
+            if not transactor.unanswered(step, reply):
+                self._doubtful = 0
+                self._quarantine.over(doubted)
+        self._aside.waiting.append((asking(), lambda _: None))
+        self._aside.fetch()
+
+    def _clear_aside(self) -> None:
+        if self._serving is self._aside:
+            self._expect_late()
+            self._serving = None
+            self._transactor.abandon(math.inf)
+        self._aside.clear()
 
     def _expect_late(self) -> StepT | None:
         """Record that the answer under way is not waited for any more; return to what it is."""

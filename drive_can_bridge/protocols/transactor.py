@@ -137,6 +137,16 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
         """
         return -math.inf
 
+    def aside(self, is_late: Callable[[Hashable], bool]) -> StepT | None:
+        """
+        Return what is asked, once, to learn that nothing older comes; None: there is nothing.
+
+        Drives answer in order.
+
+        :param is_late: tells whether answers to others, by key, may be mistaken for that to it.
+        """
+        return None
+
     def held_until(self, step: StepT, now: float) -> float:
         """Return until when a step of a user waits, while others go on."""
         return -math.inf

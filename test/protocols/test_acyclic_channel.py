@@ -169,6 +169,14 @@ def test_quarantine_that_nobody_listened_through_is_prolonged() -> None:
     assert line.at(1.2103) == ['A']
 
 
+def lose(line: Line, count: int) -> None:
+    """Ask something again and again in vain, each time at once."""
+    for _ in range(count):
+        assert line.asks('A', now=1.0) == ['A']
+        line.channel.clear()
+        line.channel._quarantine._until.clear()
+
+
 class TestStopsInQuarantine:
     """A word may be answered until two time-outs after it was asked; stops are words, too."""
 
@@ -226,6 +234,45 @@ class TestStopsInQuarantine:
         assert line.results == [[None]]
         assert line.answer('there', 1.24) == []
         assert line.results == [[None], ['there']]
+
+    @pytest.mark.parametrize('lost', [2, 3, 7])
+    def test_however_many_were_lost_the_second_answer_is_believed(self, lost: int) -> None:
+        """Behind the answer to something else, which shows that nothing older comes."""
+        line = Line()
+        line.postman.aside = lambda is_late: (  # type: ignore[method-assign]
+            next((each for each in 'AB' if not is_late(each)), None))
+        lose(line, lost)
+        assert line.asks('A', now=1.01, priority=Priority.STOP) == ['A']
+        assert line.answer('first', 1.02) == ['B']
+        assert line.answer('', 1.03) == ['A']
+        assert line.answer('second', 1.04) == []
+        assert line.results == [['second']]
+        # what was lost before is not counted again
+        assert line.asks('A', now=1.05, priority=Priority.STOP) == ['A']
+        assert line.answer('third', 1.06) == ['A']
+        assert line.answer('fourth', 1.07) == []
+
+    def test_where_nobody_answers_to_that_answers_are_counted(self) -> None:
+        line = Line()
+        line.postman.aside = lambda is_late: 'B'    # type: ignore[method-assign]
+        lose(line, 2)
+        line.asks('A', now=1.01, priority=Priority.STOP)
+        assert line.answer('first', 1.02) == ['B']
+        assert line.channel.next_timer() == pytest.approx(1.12)
+        assert line.at(1.1201) == ['A']
+        assert line.answer('second', 1.13) == ['A']
+        assert line.answer('third', 1.14) == []
+        assert line.results == [['third']]
+
+    def test_what_is_cancelled_asks_nothing_else(self) -> None:
+        line = Line()
+        line.postman.aside = lambda is_late: 'B'    # type: ignore[method-assign]
+        lose(line, 2)
+        line.asks('A', now=1.01, priority=Priority.STOP)
+        assert line.answer('first', 1.02) == ['B']
+        line.channel.cancel(Priority.STOP)
+        assert line.answer('', 1.03) == []
+        assert line.asks('C', now=1.3) == ['C']
 
     def test_a_late_answer_to_its_own_attempt_is_as_good(self) -> None:
         line = Line()

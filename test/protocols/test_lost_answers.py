@@ -1,7 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """However many answers were lost, the next question that is answered is believed, or the next."""
 
+from collections.abc import Generator
 from random import Random
+from typing import Any
 
 import builders
 from builders import Conversation, EEPROM, parameter, RO, text_of
@@ -10,7 +12,12 @@ from test_late_answers import KINDS, Partner, REGISTERS, TIMEOUT
 
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import ReadRequest, WriteRequest
+from drive_can_bridge.core.outbox import Outbox
+from drive_can_bridge.core.process_image import LastSent
+from drive_can_bridge.core.requests import ReadRequest, RetryPolicy, WriteRequest
+from drive_can_bridge.protocols.channel import Channel, Priority
+from drive_can_bridge.protocols.cia402.channel import Ask, SdoTransactor
+from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Read
 
 STATUS = parameter('system_status_1', 455, access=RO)
 REGISTER = parameter('register_652', 652, storage=EEPROM)
@@ -145,3 +152,86 @@ def test_a_users_read_is_believed(kind: type[Partner], lost: int) -> None:
         story.asks(read)
     outcomes = [story.asks(read) for _ in range(5)]
     assert all(isinstance(outcome, int) for outcome in outcomes[1:]), outcomes
+
+
+# -- stops: what shows that the drive has heard one -----------------------------------------------
+
+
+class Sdo:
+    """Node 5 by SDO; what is told is 6040h := 0."""
+
+    def __init__(self) -> None:
+        self.outbox = Outbox()
+        word = parameter('word', None, index=0x6040, subindex=0)
+        self.channel: Channel[Any, Any] = Channel(
+            SdoTransactor(5, self.outbox, RetryPolicy(TIMEOUT, attempts=1), LastSent((word,))))
+        self.lost = self.step = Ask(0x6040, 0, bytes(2))
+        self.told = '2B40600000000000'
+        self.answers = {
+            self.told: bytes.fromhex('6040600000000000'),
+            '4000100000000000': bytes.fromhex('4300100092010200')}
+
+    def sent(self, now: float) -> list[str]:
+        frames = self.outbox.take()
+        self.outbox.left(now)
+        return [frame.data.hex().upper() for frame in frames]
+
+
+class Numbers:
+    """Frames whose identifiers are number and count."""
+
+    together = 4
+
+    def encode_read(self, number: int, count: int) -> Frame:
+        return Frame(number << 4 | count, b'', True)
+
+    def encode_write(self, number: int, words: tuple[int, ...]) -> Frame:
+        raise NotImplementedError
+
+    def decode(self, frame: Frame, asked: tuple[int, int] | None) -> tuple[int, ...]:
+        raise NotImplementedError
+
+
+class Station:
+    """One with 29-bit identifiers; what is read back is P50."""
+
+    def __init__(self) -> None:
+        self.found: list[Frame] = []
+        self.channel: Channel[Any, Any] = Channel(ParameterTransactor(
+            Numbers(), send=lambda frame, left: self.found.append(frame),
+            retry=RetryPolicy(TIMEOUT, attempts=1), eeprom_gap=0.02))
+        self.lost, self.step = Read(50), Read(50, attempts=1, late_will_do=True)
+        self.told = '321'
+        self.answers: dict[str, Any] = {self.told: (0,), '7A1': (50,)}
+
+    def sent(self, now: float) -> list[str]:
+        found, self.found = self.found, []
+        return [f'{frame.identifier:X}' for frame in found]
+
+
+def asking(step: Any) -> Generator[Any, Any, Any]:
+    return (yield step)
+
+
+@pytest.mark.parametrize('lost', [0, 1, 2, 3, 6])
+@pytest.mark.parametrize('kind', [Sdo, Station])
+def test_a_stop_is_believed_at_the_second_answer(kind: type[Sdo | Station], lost: int) -> None:
+    talk = kind()
+    for _ in range(lost):
+        talk.channel.run(asking(talk.lost), lambda _: None, 1.0)
+        assert talk.sent(1.0) == [talk.told]
+        talk.channel.clear()
+        talk.channel._quarantine._until.clear()     # each of them may be asked at once
+        talk.channel._transactor.free_at = 0.0      # type: ignore[attr-defined]
+    results: list[Any] = []
+    talk.channel.run(asking(talk.step), results.append, 1.01, Priority.STOP)
+    now, sent, answered = 1.01, talk.sent(1.01), []
+    while sent:
+        text, = sent
+        answered.append(text)
+        talk.channel.receive(talk.answers[text], now := now + 0.002)
+        talk.channel.advance(now := now + 0.002)
+        sent = talk.sent(now)
+    assert len(results) == 1
+    assert answered.count(talk.told) == min(lost + 1, 2)
+    assert len(answered) == min(lost + 1, 3)

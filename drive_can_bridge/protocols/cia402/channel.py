@@ -6,7 +6,7 @@ An answer says which object it is about, so that only the late answer to a trans
 object could be mistaken for that to another one.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
@@ -17,11 +17,13 @@ from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import Kind, Message
-from drive_can_bridge.protocols.channel import Channel, LATE_MAX
+from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.protocols.transactor import Transactor
 
+#: what every node has: device type, error register, identity; a refusal will do, too
+ASIDE = (0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1)
 #: bytes of an object that are read at most
 LENGTH_MAX = 256
 _TIMED_OUT, _TOO_LONG, _BROKEN_OFF = 0x05040000, 0x05040005, 0x08000000
@@ -232,6 +234,10 @@ class SdoTransactor(Transactor[Ask, Reply]):
 
     def repeatable(self, step: Ask, *, users: bool) -> bool:
         return not users or step.data is None
+
+    def aside(self, is_late: Callable[[Hashable], bool]) -> Ask | None:
+        return next((Ask(*place, attempts=1, timeout=min(STOP_PATIENCE, self.retry.timeout))
+                     for place in ASIDE if not is_late(place)), None)
 
     def abandon(self, until: float) -> None:
         self._abandoned = self.busy

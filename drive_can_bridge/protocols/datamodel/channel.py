@@ -32,7 +32,8 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.access import SentWrites
-from drive_can_bridge.protocols.channel import Channel
+from drive_can_bridge.protocols.channel import Channel, STOP_PATIENCE
+from drive_can_bridge.protocols.datamodel.options import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
 from drive_can_bridge.protocols.polled_exchange import Chunk, TOLERANCE
 from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 
@@ -40,6 +41,8 @@ from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
 #: the next read
 SPACING = 0.001
+#: numbers that every drive has whose answers say what they answer
+ASIDE = REQUEST_MAP_BASE, RESPONSE_MAP_BASE
 #: s that a stop waits for an EEPROM at most, whatever the gap may be: it takes 20 ms
 STOP_EEPROM_WAIT = 0.025
 
@@ -209,6 +212,14 @@ class ParameterTransactor(Transactor[Step, Reply]):
         if self.anonymous or not isinstance(step, Read):
             return self.key(step)
         return step.key
+
+    def aside(self, is_late: Callable[[Hashable], bool]) -> Step | None:
+        if self.anonymous:
+            return None
+        timeout = min(STOP_PATIENCE, self.retry.timeout)
+        asides = [Read(number, count, attempts=1, late_will_do=True, timeout=timeout)
+                  for number in ASIDE for count in range(1, 5)]
+        return next((each for each in asides if not is_late(each.key)), None)
 
     def ready_at(self, step: Step, *, stop: bool) -> float:
         # "20 ms between one write and the next", says the manual of writes to the EEPROM, not that
