@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Serial adapters as they are: what each makes of the bytes that it is handed.
+Adapters and gateways as they are: what each makes of the bytes that it is handed.
 
 None of them asks our code anything. What they do was seen, or is in their firmware's source; each
 says which. A firmware is handed bytes as they come (:meth:`Firmware.take`), returns its answer,
@@ -9,8 +9,10 @@ and keeps what it has brought to the bus in ``frames``, as ``201#0F0010270000``.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 import os
 import select
+import socket
 import threading
 import tty
 
@@ -248,3 +250,67 @@ class Attached:
         self._thread.join()
         for each in (self.master, self._slave, self._end, self._stop):
             os.close(each)
+
+
+class Socketcand:
+    """
+    A gateway, socketcand (linux-can, protocol of its doc/protocol.md), until it is closed.
+
+    :param words: what it answers, in order: at first, to ``open``, to ``rawmode``.
+    :ivar port: where it listens, on the loopback.
+    :ivar sent: what it was to bring to the bus.
+    :ivar connections: how often somebody has connected.
+    """
+
+    WORDS = ('< hi >', '< ok >', '< ok >')
+
+    def __init__(self, words: tuple[str, ...] = WORDS) -> None:
+        self.sent: list[str] = []
+        self.connections = 0
+        self._words = words
+        self._listening = socket.create_server(('127.0.0.1', 0))
+        self.port: int = self._listening.getsockname()[1]
+        self._connected: socket.socket | None = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            try:
+                self._connected, _ = self._listening.accept()
+            except OSError:
+                return
+            self.connections += 1
+            with self._connected, suppress(OSError):
+                self._serve(self._connected, list(self._words))
+
+    def _serve(self, connected: socket.socket, words: list[str]) -> None:
+        text = ''
+        if words:
+            connected.sendall(words.pop(0).encode())
+        while data := connected.recv(4096):
+            *messages, text = (text + data.decode()).split('>')
+            for message in messages:
+                if message.startswith('< send '):
+                    self.sent.append(message[7:].strip())
+                elif words:
+                    connected.sendall(words.pop(0).encode())
+
+    def say(self, text: str | bytes) -> None:
+        """Write to who is connected."""
+        assert self._connected is not None
+        self._connected.sendall(text if isinstance(text, bytes) else text.encode())
+
+    def drop(self) -> None:
+        """Close the connection, and go on listening."""
+        if self._connected is not None:
+            with suppress(OSError):     # it is closed
+                self._connected.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Refuse from now on."""
+        with suppress(OSError):     # it was closed before
+            self._listening.shutdown(socket.SHUT_RDWR)
+        self._listening.close()
+        self.drop()
+        self._thread.join()

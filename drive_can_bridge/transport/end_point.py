@@ -44,6 +44,7 @@ class EndPoint(ABC):
 
     :ivar age: s between the reception of the last received frame and the return of ``receive``.
     :ivar punctual: ``receive`` ends when its time-out does, to well below a millisecond.
+    :ivar host_stamps: what a witness sees is stamped by this machine, when it arrived.
     :ivar error_frames: error frames seen.
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
@@ -54,6 +55,7 @@ class EndPoint(ABC):
     def __init__(self) -> None:
         self.age = 0.0
         self.punctual = False
+        self.host_stamps = False
         self.error_frames = 0
         self.rejected_frames = 0
         self.last_error: BusError | None = None

@@ -7,9 +7,12 @@ children, whatever a vendor's library throws.
 """
 
 import errno
+import struct
 
 from drive_can_bridge.core.text import printable
 
+#: what comes of reading a packet that is torn, or none
+_CONTENT = (TypeError, ValueError, LookupError, struct.error)
 _GONE = 'is gone: unplugged?'
 _NO_SOCKETCAN = ('this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one '
                  '(some containers and virtual machines have none)')
@@ -43,9 +46,10 @@ def with_outlook(reason: str, period: float) -> str:
 
 
 def is_malformed(error: BaseException) -> bool:
-    """Tell whether a line was no frame: python-can reads them without looking."""
-    return isinstance(error, (ValueError, IndexError)) or isinstance(
-        error.__cause__, UnicodeDecodeError)
+    """Tell whether what came was no frame: python-can reads packets without looking."""
+    return (isinstance(error, _CONTENT) or isinstance(error.__cause__, _CONTENT)
+            # of python-can's ``serial``, which has no class for it
+            or error.__cause__ is None and 'invalid delimiter' in str(error))
 
 
 def is_misconfiguration(error: BaseException) -> bool:

@@ -2,8 +2,10 @@
 """
 The link to one bus: opened, read by a thread of its own, reopened when lost.
 
-The reader thread is the only one that opens, reads and closes the port, so that none of it ever
-happens with a lock held. The thread that holds the exchange's lock sends.
+The reader thread is the only one that reads and closes the port, so that none of it ever happens
+with a lock held. The thread that holds the exchange's lock sends. Each attempt to open it has a
+thread of its own, because a library may not give it back: that is told, no other is made before,
+nobody waits for it at the end, and what it opens after that is closed.
 
 A bus on which nothing leaves any more (no other node acknowledges, the transmit queue is full) is
 *blocked*: the exchange is told that it is down, and nothing more is put into the queue. Where the
@@ -36,6 +38,10 @@ BLOCKED_TIMEOUTS = 4
 BLOCKED_AFTER = 0.05
 #: looks, and s between them, at the name of a device that has failed
 _GOING, _MOMENT = 10, 0.01
+#: what is told of an attempt that has not come back
+NOT_GIVEN_BACK = 'the adapter or its library does not come back from opening it'
+#: s after which an attempt to open that has not come back is told
+OPEN_TIMEOUT = 2.0
 #: why nothing is sent through a port that is not known to work
 NOT_READ_YET = 'not read yet'
 
@@ -63,6 +69,47 @@ class LinkListener(Protocol):
 
     def link_failed(self, reason: str) -> None:
         """Note that the reader thread ended by a defect of the program."""
+
+
+class _Attempt:
+    """
+    An attempt to open a bus, in a thread of its own.
+
+    :ivar ended: rung at its end.
+    :ivar over: it has come to an end.
+    """
+
+    def __init__(self, open_: Callable[[], EndPoint], clock: Clock, name: str) -> None:
+        self.ended = clock.wake_event()
+        self.over = False
+        self._open = open_
+        self._lock = clock.lock()
+        self._port: EndPoint | None = None
+        self._error: Exception | None = None
+        self._given_up = False
+        clock.worker(self._run, name).start()
+
+    def _run(self) -> None:
+        try:
+            port = self._open()
+        except Exception as error:  # noqa: BLE001  outermost call of a thread: raised by take()
+            self._error = error
+        else:
+            with self._lock:
+                given_up, self._port = self._given_up, port
+            if given_up:
+                port.close()
+        self.over = True
+        self.ended.ring()
+
+    def take(self, *, give_up: bool) -> EndPoint | None:
+        """Return what it has opened, or raise why not; None: it goes on, and nobody waits."""
+        with self._lock:
+            self._given_up = give_up
+            port = self._port
+        if port is None and self._error is not None and self.over:
+            raise self._error
+        return port
 
 
 class Link:
@@ -96,11 +143,13 @@ class Link:
         self._send_timeout = send_timeout
         self._prepare_thread = prepare_thread
         self._port: EndPoint | None = None
+        self._attempt: _Attempt | None = None
         self._loss: str | None = None
         self._blocked: str | None = None
         self._no_room_since: float | None = None
         self._heard = False
         self._closing = self._tried = False
+        self._reported = ''
         self._end, self._first_attempt = clock.wake_event(), clock.wake_event()
         self._thread = clock.worker(self._run, f'bus {bus.name}')
         self.frames_sent = 0
@@ -128,6 +177,9 @@ class Link:
         """Close the bus and end the thread."""
         self._closing = True
         self._end.ring()
+        attempt = self._attempt
+        if attempt is not None:
+            attempt.ended.ring()
         self._thread.join(5.0)
 
     def send(self, frame: Frame) -> bool:
@@ -224,13 +276,12 @@ class Link:
                 self._end.wait(self._now() + RECEIVE_TIMEOUT)
 
     def _keep_open(self) -> None:
-        reported = ''
         opened = False
         while not self._closing:
             try:
                 self._loss = NOT_READ_YET
-                self._port = port = self._open()
-                if self._ended():   # it took longer than anybody waits
+                port = self._open_in_time()
+                if port is None or self._ended():
                     return
                 self.taken = False
                 port.error_witness = self.error_witness
@@ -242,7 +293,7 @@ class Link:
                 if opened:
                     self.reconnections += 1
                 opened = True
-                reported = ''
+                self._reported = ''
                 self._listener.bus_opened()
                 self._tell_tried()
                 # it came before anything was asked: it must not pass for the answer
@@ -255,11 +306,31 @@ class Link:
                 reason = gone(adapter_of(self.bus)) if opened and self._gone() else in_words(error)
                 self.last_error = reason
                 self._close_port()
-                if reason != reported:
-                    self._listener.bus_lost(reason)
-                reported = reason
-                self._tell_tried()
+                self._report(reason)
             self._end.wait(self._now() + self.bus.reconnect_period)
+
+    def _report(self, reason: str) -> None:
+        """Tell why the bus is not there; once."""
+        if reason != self._reported:
+            self._listener.bus_lost(reason)
+        self._reported = reason
+        self._tell_tried()
+
+    def _open_in_time(self) -> EndPoint | None:
+        """
+        Open the port; None: it was stopped before that came to an end.
+
+        :raises BusUnavailable: it cannot be opened now.
+        :raises BusMisconfigured: it never can.
+        """
+        self._attempt = attempt = _Attempt(self._open, self._clock, f'open {self.bus.name}')
+        if not self._closing:   # asked behind the assignment: stop() rings what is there then
+            attempt.ended.wait(self._now() + OPEN_TIMEOUT)
+        while not attempt.over and not self._closing:
+            self._report(f'{self.bus.place}: {NOT_GIVEN_BACK}')
+            attempt.ended.wait()
+        self._port = port = attempt.take(give_up=self._closing)
+        return port
 
     def _ended(self) -> bool:
         """Tell whether it was stopped meanwhile, by another thread."""

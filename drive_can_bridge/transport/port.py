@@ -36,12 +36,19 @@ from drive_can_bridge.transport.failures import (
     in_words, is_absence, is_full_queue, is_malformed, is_misconfiguration, is_undefined,
     with_cause,
 )
+from drive_can_bridge.transport.foreign_clock import ForeignClock
+from drive_can_bridge.transport.gateway import Gateway
 from drive_can_bridge.transport.serial_writer import Below, watched
 
-# A frame's own time stamp is believed if it is that much older than now at most, or if the frame
-# may have waited for so long: adapters that count from power-up, and clocks that were set, fall
-# out.
+# The kernel's time stamp of a frame is believed if it is that much older than now at most, or if
+# the frame may have waited for so long: clocks that were set fall out.
 _STAMP_AGE_MAX = 0.1
+# So many returns without a frame in so many s, although it was to wait: the other end has gone.
+_EARLY_MAX, _EARLY_TIME = 1000, 0.1
+# So many frames may be confirmed at once: what a terminal keeps.
+_UNCONFIRMED_MAX = 4096
+# Looks at what a serial adapter has to say of the commands that opened it, and s for each.
+_ANSWER_LOOKS, _ANSWER_TIME = 8, 0.02
 # Data bytes of a classical CAN frame.
 _LENGTH_MAX = 8
 # s that the last command to a serial adapter may take.
@@ -65,14 +72,17 @@ class Port(EndPoint):
     It rejects what has other identifiers (where the adapter does not keep them away), remote and
     CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
 
+    :param host_stamps: the kernel of this machine makes the stamps.
     :param lock: of its device, released when it is closed.
     :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
     """
 
     def __init__(self, bus: can.BusABC, clock: Clock, *, kernel_errors: bool = False,
-                 lock: DeviceLock | None = None) -> None:
+                 host_stamps: bool = False, lock: DeviceLock | None = None) -> None:
         super().__init__()
         self._now, self._stamp = clock.now, clock.stamp
+        self.host_stamps = host_stamps
+        self._foreign = None if host_stamps else ForeignClock()
         self._bus = bus
         self._lock = lock
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
@@ -88,26 +98,36 @@ class Port(EndPoint):
         self.punctual = isinstance(getattr(bus, 'socket', None), socket.socket)
         self._lost = False
         self._malformed_in_row = 0
+        self._early = self._early_heard = self._unconfirmed = 0
+        self._early_since = self._taken_at = 0.0
         self._earliest = self._now()   # the next frame cannot have come before
         self.witness: Callable[[can.Message], None] | None = None
 
     def receive(self, timeout: float) -> Frame | None:
         """Wait for a frame. See the base class."""
+        began = self._now()
         try:
             message, filtered = self._receive(timeout)
         except Exception as error:  # whatever an adapter throws: the bus is lost
-            if self._below is not None and is_malformed(error):
+            if is_malformed(error):
                 self._malformed()
                 return None
             self._lost = True
             raise BusUnavailable(f'receive: {with_cause(error)}') from error
         if message is None:
             self._earliest = self._now()
+            if self._earliest - began < timeout:
+                self._returned_early(self._earliest)
             self._limit_line()
             if self._answers is not None and self._answers.takes_nothing(self._earliest):
                 self._lost = True
                 raise BusUnavailable(f'{REFUSED_FRAMES}; {ADVICE_ALONE}')
             return None
+        self._early = 0
+        now = self._now()
+        self.age = self._age_of(message.timestamp, now)
+        self._earliest = now - self.age     # they come in order
+        self._taken_at = now
         if self.witness is not None:
             self.witness(message)
         if message.is_error_frame:
@@ -126,11 +146,51 @@ class Port(EndPoint):
             self._malformed()
             return None
         self._malformed_in_row = 0
-        now = self._now()
-        age = 1e-9 * self._stamp() - message.timestamp
-        self.age = age if 0.0 < age < max(_STAMP_AGE_MAX, now - self._earliest) else 0.0
-        self._earliest = now - self.age     # they come in order
         return Frame(message.arbitration_id, data, message.is_extended_id)
+
+    def _age_of(self, stamp: float, now: float) -> float:
+        if self._foreign is not None:
+            return self._foreign.age(stamp, now, waited=self._earliest > self._taken_at)
+        age = 1e-9 * self._stamp() - stamp
+        return age if 0.0 < age < max(_STAMP_AGE_MAX, now - self._earliest) else 0.0
+
+    def _returned_early(self, now: float) -> None:
+        """
+        Look whether an adapter says again and again that nothing is there, without waiting.
+
+        python-can's socketcand does so for ever when its gateway has closed the connection.
+        """
+        heard = 0 if self._below is None else self._below.heard
+        if self._unconfirmed:       # a frame may have been confirmed
+            self._unconfirmed -= 1
+            return
+        if not self._early or heard != self._early_heard:
+            self._early, self._early_since, self._early_heard = 0, now, heard
+        self._early += 1
+        if self._early < _EARLY_MAX:
+            return
+        if now - self._early_since <= _EARLY_TIME:
+            self._lost = True
+            raise BusUnavailable('receive: the adapter has nothing, and does not wait: its other '
+                                 'end has closed')
+        self._early = 0
+
+    def await_answers(self, bitrate: int) -> None:
+        """
+        Hear what a serial adapter has to say of the commands that opened it.
+
+        :raises BusUnavailable: it refuses what nothing works without.
+        """
+        if self._answers is None:
+            return
+        for _ in range(_ANSWER_LOOKS):
+            answered = self._answers.answered
+            self.receive(_ANSWER_TIME)
+            if answered and answered == self._answers.answered:
+                break
+        refusal = self._answers.refusal(bitrate)
+        if refusal:
+            raise BusUnavailable(refusal)
 
     def send(self, frame: Frame, timeout: float) -> None:
         """Hand a frame to the adapter. See the base class."""
@@ -144,6 +204,7 @@ class Port(EndPoint):
             else:
                 self._writer.timeout = timeout
                 self._bus.send(message)
+            self._unconfirmed = min(self._unconfirmed + 1, _UNCONFIRMED_MAX)
             if self._answers is not None:
                 self._answers.sent()
         except TransportError:
@@ -283,11 +344,16 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         adapter = can.interface._get_class_for_interface(bus.interface)
         if _takes(adapter, 'bitrate'):
             options['bitrate'] = bus.bitrate
-        opened = (_open_serial(adapter, bus, clock, lock, options)
-                  if bus.interface in SERIAL_INTERFACES else
-                  can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
-                          **options))
-        port = Port(opened, clock, kernel_errors=bus.interface in _KERNEL_ERRORS, lock=lock)
+        opened: can.BusABC
+        if bus.interface in SERIAL_INTERFACES:
+            opened = _open_serial(adapter, bus, clock, lock, options)
+        elif bus.interface == 'socketcand':
+            opened = Gateway(str(bus.channel), now=clock.now, **options)
+        else:
+            opened = can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
+                             **options)
+        port = Port(opened, clock, kernel_errors=bus.interface in _KERNEL_ERRORS,
+                    host_stamps=bus.interface == 'socketcan', lock=lock)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
         reason = in_words(error)
@@ -302,6 +368,7 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
     try:
         # SocketCAN opens an interface that is down; the first look tells
         port.receive(0.0)
+        port.await_answers(bus.bitrate)
         if bus.interface == 'socketcan':
             _check_carrier(str(bus.channel))
     except BusUnavailable as error:

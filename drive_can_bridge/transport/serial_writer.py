@@ -13,11 +13,12 @@ first behind a loss, is a filler (:data:`FILLERS`), and an empty line is never s
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import errno
 import math
 import os
 import select
-from typing import Any, NamedTuple
+from typing import Any
 
 #: what ends a line or packet that was begun and never finished, whatever is lacking, so that
 #: nothing comes of it. On an adapter in which nothing was begun it is a question, or noise.
@@ -37,7 +38,7 @@ FILLERS = {
 }
 #: s of silence behind the filler until commands are sent, and s that it is waited for at most
 _QUIET, _NOISE = 0.05, 0.3
-REFUSED = '\a'
+REFUSED, DONE = '\a', '\r'
 #: of lines that are data frames: where their length stands, one digit in front of the data
 _LENGTH_AT = {'t': 4, 'T': 9, 'x': 9}
 #: characters of the time stamp that may follow: none, ms, µs
@@ -60,13 +61,43 @@ class AdapterAnswers:
     :ivar refused: frames that it did not take.
     """
 
-    __slots__ = ('_in_row', '_since', '_unanswered', 'refused')
+    __slots__ = ('_commands', '_in_row', '_said', '_since', '_unanswered', 'refused')
 
     def __init__(self) -> None:
         self.refused = 0
+        # of the opening: what was commanded, and whether it was refused, in order
+        self._commands: list[str] | None = []
+        self._said: list[bool] = []
         self._unanswered = 0    # frames that a BEL may be about: it also refuses other commands
         self._in_row = 0
         self._since = math.inf
+
+    def commanded(self, command: str) -> None:
+        """Record a command of the opening."""
+        if self._commands is not None:
+            self._commands.append(command)
+
+    @property
+    def answered(self) -> int:
+        """How many commands of the opening were answered; some adapters answer none."""
+        return len(self._said)
+
+    def refusal(self, bitrate: int) -> str:
+        """
+        End the opening: say what was refused; '': nothing that is known.
+
+        Healthy adapters refuse to close what is closed, and to open what is open.
+        """
+        commands, self._commands = self._commands or [], None
+        if len(self._said) < len(commands):
+            return ''
+        # what came first may be about something before
+        said = list(zip(commands, self._said[-len(commands):]))
+        if any(refused and command[0] in 'Ss' and before == 'C'
+               for (command, refused), (before, _) in zip(said[1:], said)):
+            return f'the adapter refuses bit rate {bitrate}'
+        openings = [refused for command, refused in said if command in 'OL']
+        return 'the adapter does not open' if openings and all(openings) else ''
 
     def sent(self) -> None:
         """Record a frame that was written."""
@@ -74,6 +105,10 @@ class AdapterAnswers:
 
     def take(self, line: str, now: float) -> None:
         """Take a line of the adapter, with its end."""
+        if self._commands is not None:
+            if line in (REFUSED, DONE):
+                self._said.append(line == REFUSED)
+            return
         if not line.endswith(REFUSED):
             self._in_row = 0    # it took one, or hears somebody
         elif self._unanswered:
@@ -169,33 +204,41 @@ class _SlcanLines:
 
     #: the steady time
     drive_can_now: Callable[[], float]
-    drive_can_answers: AdapterAnswers
+    drive_can_below: 'Below'
 
     def _write(self, string: str) -> None:
         if string:
+            if self.drive_can_below.answers is not None and string[0] not in _LENGTH_AT:
+                self.drive_can_below.answers.commanded(string)
             super()._write(string)  # type: ignore[misc]
 
     def _read(self, timeout: float | None) -> str | None:
         line: str | None = super()._read(timeout)  # type: ignore[misc]
         if line:
-            self.drive_can_answers.take(line, self.drive_can_now())
+            self.drive_can_below.heard += 1
+            if self.drive_can_below.answers is not None:
+                self.drive_can_below.answers.take(line, self.drive_can_now())
             check_line(line)
         return line
 
 
-class Below(NamedTuple):
+@dataclass(slots=True)
+class Below:
     """
-    What is below an opened serial adapter.
+    What is below an opened adapter.
 
     :param port: of pyserial.
     :param writer: None: the port is not one of a POSIX system.
+    :param filler: of :data:`FILLERS`.
     :param answers: None: its answers are not listened to.
+    :param heard: counts what has arrived, whatever it is.
     """
 
     port: Any
     writer: SerialWriter | None
     filler: bytes
     answers: AdapterAnswers | None
+    heard: int = 0
 
     def clear(self) -> None:
         """Throw away what the adapter has not taken, and end what it has taken a part of."""
@@ -218,9 +261,8 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
     def set_attribute(self: Any, name: str, value: Any) -> None:
         if name == attribute and value is not None:
             opened()
-            answers = AdapterAnswers() if slcan else None
-            object.__setattr__(self, 'drive_can_answers', answers)
-            below = Below(value, SerialWriter.take_over(value, now), FILLERS[interface], answers)
+            below = Below(value, SerialWriter.take_over(value, now), FILLERS[interface],
+                          AdapterAnswers() if slcan else None)
             object.__setattr__(self, 'drive_can_below', below)
             if below.writer is None:
                 value.write_timeout = OPEN_TIMEOUT
@@ -228,6 +270,8 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
             below.clear()
             if slcan:
                 _await_quiet(value, now)
+            else:
+                _count_bytes(below)
         object.__setattr__(self, name, value)
 
     slcan = interface == 'slcan'
@@ -243,3 +287,14 @@ def _await_quiet(port: Any, now: Callable[[], float]) -> None:
     while now() < until and port.read(1):
         port.reset_input_buffer()
     port.timeout = patience
+
+
+def _count_bytes(below: Below) -> None:
+    """Count what is read."""
+    read = below.port.read
+
+    def counting(size: int = 1) -> bytes:
+        data: bytes = read(size)
+        below.heard += len(data)
+        return data
+    below.port.read = counting

@@ -7,6 +7,7 @@ Nothing is ever sent.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import can
 
@@ -90,15 +91,16 @@ class Tap:
 
     def _open(self) -> Port:
         port = open_port(self.bus, self._clock)
-        port.witness = self._take
+        port.witness = partial(self._take, port)
         return port
 
-    def _take(self, message: can.Message) -> None:
+    def _take(self, port: Port, message: can.Message) -> None:
         self._heard = True
         now = self._today()
         record = record_of(message, self.label)
-        if not abs(now - record.time) <= _STAMP_AGE_MAX:   # counted from power-up, or no stamp
-            record = record._replace(time=now)
+        # stamps are the host's; those of its kernel as they are, unless its clock was set
+        if not (port.host_stamps and abs(now - record.time) <= _STAMP_AGE_MAX):
+            record = record._replace(time=now - port.age)
         if not self._records.put(record):
             self.lost += 1
 

@@ -71,7 +71,7 @@ class End(EndPoint):
 
     def __init__(self, wire: Wire, routes: Sequence[Route] = ()) -> None:
         super().__init__()
-        self.punctual = True
+        self.punctual = self.host_stamps = True
         self.witness: Callable[[can.Message], None] | None = None
         if wire.down:
             raise BusUnavailable(wire.down)

@@ -322,6 +322,54 @@ def test_who_has_stopped_is_not_told_what_becomes_of_an_attempt(
     assert bench.port.closed
 
 
+def test_attempt_that_a_library_does_not_give_back(
+        make: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make()
+    tried: list[float] = []
+
+    def slowly() -> FakePort:
+        tried.append(bench.clock.now())
+        pause(60.0)
+        bench.ports.append(FakePort())
+        return bench.port
+    monkeypatch.setattr(bench.link, '_open', slowly)
+    bench.port.coming.append(BusUnavailable('gone'))
+    wait_for(lambda: len(bench.listener.told) == 3)
+    assert bench.listener.told[2] == f'lost: {BUS.place}: {link_module.NOT_GIVEN_BACK}'
+    assert bench.clock.now() - tried[0] == pytest.approx(2.0, abs=0.01)
+    assert bench.link.wait_first_attempt(0.0)
+    pause(50.0)
+    assert len(tried) == 1, 'no other before it has come back'
+    bench.opened(2)
+    assert bench.clock.now() - tried[0] == pytest.approx(60.0, abs=0.1)
+    assert bench.link.send(FRAME)
+    assert len(bench.listener.told) == 4
+
+
+def test_what_a_library_opens_after_the_end_is_closed_without_a_frame(
+        make: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make()
+    tried = []
+    late = FakePort()
+
+    def slowly() -> FakePort:
+        tried.append(bench.clock.now())
+        pause(60.0)
+        return late
+    monkeypatch.setattr(bench.link, '_open', slowly)
+    bench.port.coming.append(BusUnavailable('gone'))
+    wait_for(lambda: tried)
+    began = bench.clock.now()
+    bench.link.stop()
+    assert bench.clock.now() - began < 0.1, 'the end waits for none'
+    told = list(bench.listener.told)
+    wait_for(lambda: not bench.clock.tasks)
+    assert late.closed
+    assert not late.waits, 'it was not read'
+    assert not late.sent
+    assert bench.listener.told == told
+
+
 def test_defect_is_told(make: Callable[..., Bench]) -> None:
     bench = make()
     bench.port.coming.append(ZeroDivisionError('a defect'))

@@ -9,6 +9,7 @@ import itertools
 import os
 from pathlib import Path
 import socket
+import struct
 import sys
 import termios
 import time
@@ -17,6 +18,7 @@ from typing import Any
 
 import can
 from clocks import HandClock, REAL
+from literal_adapters import Attached, Canable, Esp32, Firmware, Lawicel, Usbtin
 import pytest
 
 from drive_can_bridge.core import complaints
@@ -25,7 +27,7 @@ from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, Trans
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.transport import port as port_module
 from drive_can_bridge.transport.port import open_port, Port
-from drive_can_bridge.transport.serial_writer import AdapterAnswers
+from drive_can_bridge.transport.serial_writer import AdapterAnswers, Below
 
 FRAME = Frame(0x003FFFF0, bytes(8), True)
 
@@ -115,7 +117,7 @@ def test_clock_that_is_set_while_waiting(bus: FakeBus, monkeypatch: pytest.Monke
 def test_age(bus: FakeBus, monkeypatch: pytest.MonkeyPatch, stamp: float, age: float) -> None:
     clock = HandClock(lambda: 50.0)
     monkeypatch.setattr(clock, 'stamp', lambda: 1_000_000_000_000)
-    port = Port(bus, clock)
+    port = Port(bus, clock, host_stamps=True)
     bus.coming.append(can.Message(arbitration_id=1, timestamp=stamp))
     port.receive(0.0)
     assert port.age == pytest.approx(age)
@@ -125,7 +127,7 @@ def test_age_of_frames_that_waited(bus: FakeBus, monkeypatch: pytest.MonkeyPatch
     now = [50.0]
     clock = HandClock(lambda: now[0])
     monkeypatch.setattr(clock, 'stamp', lambda: round(1e9 * (950.0 + now[0])))
-    port = Port(bus, clock)
+    port = Port(bus, clock, host_stamps=True)
 
     def comes(stamped: float) -> float:
         bus.coming.append(can.Message(arbitration_id=1, timestamp=stamped))
@@ -189,6 +191,89 @@ def test_full_queue_is_no_lost_bus(bus: FakeBus, failure: Exception) -> None:
     with pytest.raises(TransportError) as caught:
         port.send(FRAME, 0.01)
     assert not isinstance(caught.value, BusUnavailable)
+
+
+def caused(error: Exception, cause: Exception) -> Exception:
+    """Return an error with its cause."""
+    error.__cause__ = cause
+    return error
+
+
+#: what python-can 4.3.1 to 4.6.1 raises about packets, and where
+MALFORMED = {
+    'slcan': ValueError("invalid literal for int() with base 16: 'G12'"),
+    'slcan, cut off': IndexError('string index out of range'),
+    'slcan, no UTF-8': caused(can.CanOperationError('Could not read from serial device'),
+                              UnicodeDecodeError('utf-8', b'\xff', 0, 1, 'invalid start byte')),
+    'seeedstudio, the tail comes later': TypeError('ord() expected a character'),
+    'seeedstudio, serial': struct.error('unpack requires a buffer of 4 bytes'),
+    'serial': can.CanOperationError('invalid delimiter byte while reading message: 0'),
+    'udp_multicast': caused(can.CanOperationError('could not unpack received message'),
+                            TypeError("Message.__init__() got an unexpected keyword 'x'")),
+}
+
+
+@pytest.mark.parametrize('where', MALFORMED)
+def test_what_is_malformed_is_one_rejected_frame(bus: FakeBus, where: str) -> None:
+    port = Port(bus, REAL)
+    bus.coming += [MALFORMED[where], can.Message(arbitration_id=1, data=b'\x01')]
+    assert port.receive(0.0) is None
+    assert port.rejected_frames == 1
+    assert port.receive(0.0) == Frame(1, b'\x01', True)
+    assert port.rejected_frames == 1
+
+
+class Early(FakeBus):
+    """Says at once that nothing is there; each look takes so many s."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__()
+        self.seconds, self.now = seconds, 50.0
+        self.port = Port(self, HandClock(lambda: self.now))
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        self.now += self.seconds
+        return super()._recv_internal(timeout)
+
+    def looks(self, count: int) -> None:
+        for _ in range(count):
+            assert self.port.receive(0.02) is None
+
+
+def test_adapter_that_does_not_wait_has_lost_its_other_end() -> None:
+    """As python-can's socketcand, when its gateway has closed the connection."""
+    early = Early(0.00005)
+    early.looks(999)
+    with pytest.raises(BusUnavailable, match='its other end has closed'):
+        early.looks(1)
+
+
+def test_status_events_are_no_lost_bus() -> None:
+    """pcan, kvaser, ixxat return early for what is no frame: some dozens in a row."""
+    early = Early(0.0002)
+    early.looks(5000)
+
+
+def test_acknowledgements_are_no_lost_bus() -> None:
+    """An adapter that says that it took what was sent, all at once, behind a stall."""
+    early = Early(0.00001)
+    for _ in range(1000):
+        early.port.send(FRAME, 0.01)
+    early.looks(1000)
+
+
+def test_bytes_that_come_are_no_lost_bus() -> None:
+    early = Early(0.00001)
+    early.port._below = below = Below(None, None, b'', None)
+    for _ in range(5000):
+        below.heard += 1    # garbage, of which nothing becomes
+        early.looks(1)
+
+
+def test_who_is_not_to_wait_does_not_return_early() -> None:
+    early = Early(0.0)
+    for _ in range(5000):
+        assert early.port.receive(0.0) is None
 
 
 @pytest.mark.parametrize('failure', [
@@ -421,6 +506,7 @@ def test_frame_that_an_adapter_refuses_is_counted(adapter: Adapter) -> None:
 def answered(*lines: str, seconds: float) -> tuple[int, bool]:
     """Return how many frames were refused, and whether all are, with so many s between them."""
     answers = AdapterAnswers()
+    assert answers.refusal(125_000) == ''     # the opening is over
     for place, line in enumerate(lines):
         answers.sent()
         answers.take(line, seconds * place)
@@ -514,3 +600,69 @@ def test_only_malformed_frames_in_a_row_lose_the_bus(bus: FakeBus) -> None:
     assert port.rejected_frames == 2 * len(few)
     with pytest.raises(BusUnavailable, match='malformed frames in a row'):
         port.receive(0.0)
+
+
+# -- what an adapter says of the commands that opened it ------------------------------------------
+
+
+def told(commands: str, answers: str) -> str:
+    """Return what is refused: ``+`` is CR, ``-`` BEL."""
+    opening = AdapterAnswers()
+    for command in commands.split():
+        opening.commanded(command)
+    for letter in answers:
+        opening.take('\r' if letter == '+' else '\a', 50.0)
+    return opening.refusal(125_000)
+
+
+@pytest.mark.parametrize(('answers', 'what'), [
+    ('', ''),           # CANable
+    ('++++', ''),       # ESP32-SLCAN, simulated ones
+    ('+++-', ''),       # USBtin, which was open
+    ('-++-', ''),       # and closed
+    ('---++-+++-', ''),     # behind what it had to say of something before
+    ('+-+-', 'the adapter refuses bit rate 125000'),
+    ('--+-', 'the adapter refuses bit rate 125000'),
+    ('++--', 'the adapter does not open'),
+    ('--', ''),         # of what, nobody knows
+])
+def test_what_an_adapter_refuses_when_it_is_opened(answers: str, what: str) -> None:
+    assert told('C S4 O O', answers) == what
+
+
+def test_listen_only_is_an_opening() -> None:
+    assert told('C S4 L L', '++--') == 'the adapter does not open'
+    assert told('C S4 L L', '+++-') == ''
+
+
+class DoesNotOpen(Usbtin):
+    """One whose controller does not come up."""
+
+    def take(self, data: bytes) -> bytes:
+        return super().take(data.replace(b'O', b'X'))
+
+
+@pytest.mark.usefixtures('threads')
+@pytest.mark.parametrize(('firmware', 'bitrate', 'why'), [
+    (Usbtin, 125_000, ''), (Lawicel, 125_000, ''), (Canable, 125_000, ''), (Esp32, 125_000, ''),
+    (Usbtin, 83_300, 'the adapter refuses bit rate 83300'),
+    (Esp32, 50_000, 'the adapter refuses bit rate 50000'),
+    (DoesNotOpen, 125_000, 'the adapter does not open')])
+def test_adapters_are_believed(firmware: type[Firmware], bitrate: int, why: str) -> None:
+    adapter = firmware()
+    attached = Attached(adapter.take)
+    try:
+        for _ in range(2):      # closed, and as it was left by a process that died
+            bus = BusConfiguration('main', 'slcan', attached.path, bitrate=bitrate)
+            if not why:
+                port = open_port(bus, REAL)
+                assert adapter.channel_open
+                port._bus._is_shutdown = True   # by SIGKILL
+                port._below.port.close()        # type: ignore[union-attr]
+                port._lock.release()            # type: ignore[union-attr]
+                continue
+            with pytest.raises(BusUnavailable) as caught:
+                open_port(bus, REAL)
+            assert str(caught.value) == f'slcan {attached.path}: {why}'
+    finally:
+        attached.close()

@@ -22,6 +22,7 @@ class HeldPort:
 
     def __init__(self, clock: Clock) -> None:
         self.witness: Callable[[can.Message], None] | None = None
+        self.host_stamps, self.age = True, 0.0
         self.steps: deque[list[can.Message] | Exception | None] = deque()
         self._wake = clock.wake_event()
 
@@ -72,6 +73,16 @@ def test_a_stamp_is_believed_although_it_was_read_late(
     port.put([can.Message(arbitration_id=0x123, is_extended_id=False, data=b'\x01',
                           timestamp=sent_at)])
     assert records.get().time == pytest.approx(sent_at if believed else now, abs=0.01)
+
+
+def test_a_stamp_of_another_clock_is_not_believed(bench: World, port: HeldPort) -> None:
+    records: Mailbox[Record] = Mailbox(bench.clock)
+    tap(bench, records)
+    port.host_stamps, port.age = False, 0.02
+    now = today(bench)
+    port.put([can.Message(arbitration_id=0x123, is_extended_id=False, data=b'\x01',
+                          timestamp=now - 0.094)])
+    assert records.get().time == pytest.approx(now - 0.02, abs=0.001)
 
 
 def test_until_when_everything_was_heard(bench: World, port: HeldPort) -> None:
