@@ -112,7 +112,7 @@ class HomingServo(LateServo):
     :ivar fails: it ends with an error.
     :ivar before: the bits that stand before the first homing.
     :ivar homed_at: 6064h behind a homing.
-    :ivar stopped: homings that were broken off.
+    :ivar broken_off: homings that were broken off.
     :ivar found: those that came to their end.
     """
 
@@ -120,7 +120,7 @@ class HomingServo(LateServo):
         super().__init__(node, objects)
         self.takes_syncs, self.fails, self.homed_at = 30, False, 7
         self.before = self.bits = 0
-        self.stopped = self.found = 0
+        self.broken_off = self.found = 0
         self.left = 0                   # SYNCs until it is done
         self._word = 0
 
@@ -147,7 +147,7 @@ class HomingServo(LateServo):
             if not self.left:
                 self._done()
         elif falls and self.left:
-            self.left, self.stopped = 0, self.stopped + 1
+            self.left, self.broken_off = 0, self.broken_off + 1
         self.becomes(self.state)
 
     def _done(self) -> None:
@@ -189,3 +189,31 @@ class LelyHomingServo(HomingServo):
         if getattr(self, 'before', 0):
             self.bits = self.before     # in every mode
         super().becomes(state)
+
+
+class ProfileServo(LateServo):
+    """
+    Takes a target of mode pp with the rising edge of bit 4.
+
+    :ivar targets: those that it took.
+    :ivar looks_each: SYNCs between two looks of its state machine at the control word.
+    """
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        super().__init__(node, objects)
+        self.targets: list[int] = []
+        self.looks_each = 1
+        self._words = 0
+        self._high = False
+
+    def _control(self, word: int) -> None:
+        self._words += 1
+        if self._words % self.looks_each:
+            return
+        super()._control(word)
+        if self.state == self.ENABLED:
+            if word & 0x10 and not self._high:
+                self.targets.append(self.number(0x607A))
+            self._high = bool(word & 0x10)
+            status = self.number(0x6041) & ~0x1000 | 0x1000 * self._high
+            self.objects[0x6041, 0] = status.to_bytes(2, 'little')

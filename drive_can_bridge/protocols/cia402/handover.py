@@ -8,7 +8,9 @@ How a target reaches a drive in mode pp: by an edge of bit 4, which the drive ac
     bit 12 ________/‾‾‾‾‾‾‾‾‾\__    acknowledged; the next target waits until it has fallen
 
 One after the other, the newest wins. When its commands cease, an axis that is on its way is halted
-(bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises.
+(bit 8), until it is armed again: bit 8 falls in the word in which bit 4 rises. If that cut an edge
+off before it was acknowledged, its bit 12 may be on its way: it is waited for, or a status that
+knows the halt (:data:`.STATUS_LAG`), before the next edge.
 """
 
 import math
@@ -43,28 +45,30 @@ class Handover:
         self._doubted = False               # or another one, if that frame was lost
         self._rising = False                # bit 4 has yet to travel
         self._before = 0                    # the bits that travel until then
+        self._settling = 0                  # status words until bit 12 is none of a cut edge
 
     def look(self, status: int, now: float) -> None:
         """Take a status word, before the next control word is chosen."""
         rules, setpoint = self._rules, self._setpoint
         if state_of(status) is not State.OPERATION_ENABLED:
-            self._handed, self._rising = None, False
+            self._handed, self._rising, self._settling = None, False, 0
             rules.mode_bits, rules.halted = 0, False
             self._waits_since, self._told = math.inf, False
             return
         acknowledged = bool(status & states.BIT_12)
+        self._settling = 0 if acknowledged else max(0, self._settling - 1)
         self._see_to_acknowledge(acknowledged, now)
         if not setpoint.armed:
-            self.disarmed()
+            self.disarmed(acknowledged=acknowledged)
         elif rules.mode_bits & states.NEW_SETPOINT:
             if acknowledged and not self._rising:
                 rules.mode_bits = 0
-        elif self._new and not acknowledged:
+        elif self._new and not acknowledged and not self._settling:
             self._before = rules.mode_bits
             rules.mode_bits, self._rising = states.NEW_SETPOINT | states.AT_ONCE, True
         rules.halted = rules.mode_bits == states.HALT
 
-    def disarmed(self) -> None:
+    def disarmed(self, *, acknowledged: bool = False) -> None:
         """Halt what is on its way, if nobody means its target any more."""
         rules = self._rules
         if self._setpoint.armed:
@@ -73,6 +77,7 @@ class Handover:
             rules.mode_bits, self._rising = self._before, False
         elif rules.mode_bits & states.NEW_SETPOINT:
             rules.mode_bits = 0
+            self._settling = 0 if acknowledged else states.STATUS_LAG + 1
         if self._handed is not None:
             rules.mode_bits, self._handed = states.HALT, None
         rules.halted = rules.mode_bits == states.HALT

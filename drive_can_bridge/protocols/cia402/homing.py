@@ -6,8 +6,20 @@ Each step is seen before the next one: a control word in an answered cycle, a mo
 end in the status word. Nothing arms meanwhile. Whatever stops the drive stops this too; the mode
 is written back then as soon as the drive is disabled, and until that is acknowledged the drive is
 not enabled: bit 4 of its own mode would start homing.
+
+Bits of the homing before do not count, and a status may be :data:`.STATUS_LAG` answered cycles
+behind its control word; a position, as many samples. So an end is seen as follows:
+
+======== ==========================================================================================
+error    bit 13 that was low, later than the status may be behind; or that still stands
+         :data:`STILL` s behind the start
+attained bit 12 that was low, later than the status may be behind; or, of a drive that is done at
+         once, bits 12 and 10 that stand without 13 for a while, in which the position stays where
+         it is, but for one change
+======== ==========================================================================================
 """
 
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from enum import Enum
 import math
@@ -22,17 +34,17 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DriveRules
-from drive_can_bridge.protocols.cia402.states import State
+from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, STILL
 
-#: a mode that changes now would change how the drive brakes
-_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
 _DONE = states.BIT_12 | states.TARGET_REACHED
-#: s within arming_tolerance that are *it stands*, where 606Ch is 0, or the drive has none
-_STILL = 0.1
-#: likewise where it says otherwise, which may be noise: so much of control_timeout
-_STILL_ANYWAY = 0.5
-#: periods that it takes at least to be seen standing: bit 4 falls, then four samples
-_LATCHING_PERIODS = 5
+#: 6098h: the present position becomes the reference, and nothing moves
+_ON_THE_SPOT = (b'\x23', b'\x25')     # 35, 37
+#: of control_timeout: for so long, at least STILL, a drive stands that is done at once
+_AT_ONCE = 0.25
+#: samples behind the one that is latched
+_LATCHING_SAMPLES = 3
+#: periods that it takes at least to be seen standing: bit 4 falls, then five samples
+_LATCHING_PERIODS = 6
 #: s until a mode that the drive did not take is written again
 _WRITE_AGAIN = 1.0
 
@@ -65,11 +77,17 @@ class Homing:
         self._request: ControlRequest | None = None
         self._step = Step.NONE
         self._deadline = math.inf
-        self._stay: list[int] = []      # where held axes are, and since when
-        self._since = -math.inf
-        self._looking = self._no_velocity = False       # 606Ch says so, or nothing
+        self._standing = rules.standing
+        self._latches = [Band(max(1.0, each.parameter.arming_tolerance / abs(each.measured.scale)))
+                         for each in session.setpoints.held]
+        # samples in which axes stay in their bands; the oldest one is latched
+        self._stay: deque[Sequence[int]] = deque(maxlen=_LATCHING_SAMPLES + 1)
         self._now = -math.inf           # of the last sample
-        self._fresh = self._lowered = False
+        self._fresh = False
+        self._on_the_spot = False
+        self._answers, self._started_at = 0, -math.inf  # cycles answered behind the start
+        self._no_error = self._lowered = False          # bits 13 and 12, seen low since
+        self._done_since, self._done_in_a_row = math.inf, 0     # bits 12 and 10 without 13
         self._failure = self.not_back = NOTHING
         self._write_at = -math.inf      # the mode of a drive that was stopped
 
@@ -134,8 +152,8 @@ class Homing:
         if step is Step.LOWERING and behind:
             self._go(Step.ENTERING)
             self._change(states.HOMING_MODE, self._entered)
-        elif step is Step.RUNNING:
-            self._look(status, behind)
+        elif step is Step.RUNNING and not self._machine.word_due:
+            self._look(status)
         elif step is Step.LATCHING:
             self._latch(raws, behind)
         elif step is Step.HOLDING and behind:
@@ -147,15 +165,34 @@ class Homing:
     def _go(self, step: Step) -> None:
         self._step, self._fresh = step, False
 
-    def _look(self, status: int, behind: bool) -> None:
-        if not status & states.BIT_12:
-            self._lowered = True
-        if not behind:
-            return
-        if status & states.BIT_13:
+    def _look(self, status: int) -> None:
+        """Look for the end in a status behind the start."""
+        self._answers += 1
+        if self._answers == 1:
+            self._started_at = self._now
+        attained, failed = status & states.BIT_12, status & states.BIT_13
+        if self._answers > states.STATUS_LAG:       # before, it may be that of the other mode
+            self._no_error = self._no_error or not failed
+            self._lowered = self._lowered or not attained
+        done = status & _DONE == _DONE and not failed
+        self._done_in_a_row = self._done_in_a_row + 1 if done else 0
+        if failed and (self._no_error or self._now - self._started_at >= STILL):
             self._end(sentences.homing_failed())
-        elif self._lowered and status & _DONE == _DONE:
+        elif not done:
+            self._standing.end()
+        elif self._lowered or self._done_at_once():
             self._end(NOTHING)
+
+    def _done_at_once(self) -> bool:
+        """Tell whether it was done before that could be seen: its bits stand, and so does it."""
+        if self._on_the_spot:
+            return self._done_in_a_row >= IN_A_ROW
+        band = self._standing.band
+        if self._done_in_a_row == 1 or band.left > 1 or band.creeps:
+            self._standing.begin(self._now)
+            self._done_since = self._now
+        duration = max(STILL, _AT_ONCE * self._session.configuration.control_timeout)
+        return band.seen_at - self._done_since >= duration
 
     def _entered(self, failure: Sentence) -> None:
         if self._step is not Step.ENTERING or failure and not self._machine.operating:
@@ -163,17 +200,18 @@ class Homing:
         if failure:
             self._end(failure)
             return
-        self._lowered = False       # what bit 12 was before, it was in another mode
         self._rules.homing_bits = states.START
+        self._answers, self._no_error, self._lowered, self._done_in_a_row = 0, False, False, 0
         self._go(Step.RUNNING)
 
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
         drive, self._failure = self._session.configuration, failure
-        self._deadline = self._now + max(
-            drive.control_timeout, _LATCHING_PERIODS * drive.period)
+        self._deadline = self._now + max(   # it may have to brake first
+            drive.control_timeout + LONG, _LATCHING_PERIODS * drive.period)
         self._rules.homing_bits = 0
-        self._stay, self._looking, self._no_velocity = [], False, False
+        self._stay.clear()
+        self._standing.begin(self._now)
         self._go(Step.LATCHING)
 
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
@@ -182,32 +220,23 @@ class Homing:
         setpoints.measure(raws, driven=False)
         if not setpoints.known:     # a sample that was cut short says nothing
             return
-        where = [each.neutral for each in setpoints.held]
-        if not behind or not self._stay or any(
-                abs(position - stay) * abs(each.parameter.scale) > each.parameter.arming_tolerance
-                for position, stay, each in zip(where, self._stay, setpoints.held)):
-            self._stay, self._since, self._no_velocity = where, self._now, False
-        still = self._now - self._since
+        if not behind:
+            return
+        left = [band.left for band in self._latches]
+        for band, each in zip(self._latches, setpoints.held):
+            if not self._stay:
+                band.begin()
+            band.take(raws[each.place], self._now)
+        if [band.left for band in self._latches] != left:
+            self._stay.clear()
+        self._stay.append(raws)
         # not by bit 10: with bit 4 low it says no more than that homing was ended
-        stands = self._no_velocity and still >= _STILL or (
-            still >= _STILL_ANYWAY * self._session.configuration.control_timeout)
-        if not self._failure or (stands if where else behind):
+        if not setpoints.held or len(self._stay) == self._stay.maxlen and (
+                not self._failure or self._standing.stands):
+            setpoints.measure(self._stay[0], driven=False)
+            self._standing.end()
             self._deadline = math.inf
             self._go(Step.HOLDING)
-        elif where and still >= _STILL and not self._looking:
-            self._looking = True
-            self._channel.run(self._look_at_velocity(), self._looked, self._now)
-
-    def _look_at_velocity(self) -> Generator[Ask, Reply, bool]:
-        """Return whether 606Ch is 0, or the drive has none."""
-        reply = yield Ask(states.VELOCITY, attempts=1)
-        if reply.abort is not None or reply.data is not None and not any(reply.data):
-            return True
-        yield Ask(pause=LOOK_PERIOD)
-        return False
-
-    def _looked(self, no_velocity: bool) -> None:
-        self._looking, self._no_velocity = False, no_velocity
 
     def _left(self, failure: Sentence) -> None:
         if self._step is not Step.LEAVING:
@@ -229,7 +258,8 @@ class Homing:
             self._answer(False, self._stopped())
         self._rules.homing_bits = 0
         self._deadline = math.inf
-        if states.state_of(status) not in _MOVING and self._step is not Step.LEAVING and (
+        # a mode that changes now would change how the drive brakes
+        if states.state_of(status) not in states.MOVING and self._step is not Step.LEAVING and (
                 self._now >= self._write_at):
             self._go(Step.LEAVING)
             # it may show it when it is enabled
@@ -262,9 +292,14 @@ class Homing:
             while self._step is step and self._machine.operating and self._channel.now < until:
                 shown = yield Ask(states.MODE_SHOWN)
                 if shown.abort is not None or shown.data and shown.data[0] == mode:
-                    return NOTHING
+                    break
                 yield Ask(pause=LOOK_PERIOD)
-            return sentences.mode_refused(mode)
+            else:
+                return sentences.mode_refused(mode)
+            if mode == states.HOMING_MODE:
+                method = (yield Ask(states.HOMING_METHOD)).data
+                self._on_the_spot = method is not None and method[:1] in _ON_THE_SPOT
+            return NOTHING
         # PDOs do not pass through the channel: its own time may be that of long ago
         self._channel.run(look(), then, self._now)
 

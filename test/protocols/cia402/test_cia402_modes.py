@@ -6,6 +6,7 @@ from typing import Any
 
 from extent import some
 from literal_drives import ServoDrive
+from literal_servos import ProfileServo
 import pytest
 from saying import says
 from servo_builders import Axis, ERROR, OBJECTS, POSITION, TABLE, TARGET
@@ -138,6 +139,32 @@ class TestHandover:
         assert axis.words() == ['3F00', '0F00', '3F00', '0F00']
         assert drive.targets == [2000, 3000]
 
+    @pytest.mark.parametrize('looks_each', [1, 2, 3])
+    @pytest.mark.parametrize('late', [0, 1, 2, 3])
+    def test_bits_that_are_late_acknowledge_no_later_target(
+            self, late: int, looks_each: int) -> None:
+        """Of an edge that a halt has cut off: the next target is not lost."""
+        axis = Axis('pp', command_timeout=0.0)
+        drive = axis.drive = ProfileServo(5, OBJECTS)
+        drive.late_status = late
+        axis.enabled()
+        drive.looks_each = looks_each
+        for place in range(5):
+            axis.commands(1000.0, 2000.0)
+            axis.live(0.011)
+            axis.session.setpoints.disarm()
+            axis.live(0.011)
+            axis.commands(float(axis.session.setpoints.items[0].neutral), 3000.0 + place)
+            axis.live(0.2)
+            assert drive.targets[-1] == 3000 + place
+            assert drive.number(0x607A) == 3000 + place
+            falls = [word for word in axis.words() if word in ('3F00', '0F00')]
+            assert falls[-2:] == ['3F00', '0F00']
+            axis.session.setpoints.disarm()
+            axis.live(0.1)
+            drive.objects[0x6064, 0] = (1000).to_bytes(4, 'little')
+            axis.live(0.1)
+
     def test_one_that_never_acknowledges_is_told_once(self) -> None:
         axis, drive = meet(control_timeout=0.5, command_timeout=0.0)
         drive.becomes = lambda state: None      # type: ignore[method-assign]
@@ -263,10 +290,10 @@ class TestHoming:
     def test_what_ends_it(self, mode: str, number: int) -> None:
         axis, drive = meet(mode, homing=True, homing_timeout=1.0)
         drive.homing = -2
-        assert home(axis) == [('home', False, says('homing_failed'))]
+        assert home(axis, 1.3) == [('home', False, says('homing_failed'))]
         assert drive.number(0x6060) == number
         drive.homing = -1
-        assert home(axis, 1.5) == [('home', False, says(
+        assert home(axis, 1.7) == [('home', False, says(
             'homing_timed_out', timeout=1.0, step=AWAY))]
         assert drive.number(0x6060) == number
         assert drive.state == drive.ENABLED
@@ -356,7 +383,7 @@ class TestHoming:
             drive.bits = 0x1400 if drive.number(0x6060) == 6 else drive.bits
             drive.becomes(drive.state)
         drive.runs_down = keeps     # type: ignore[method-assign]
-        assert home(axis, 1.0) == [('home', False, says('homing_timed_out', step=AWAY))]
+        assert home(axis, 1.3) == [('home', False, says('homing_timed_out', step=AWAY))]
         assert (drive.state, drive.number(0x6060)) == (drive.ENABLED, number)
 
     def test_one_that_is_there_at_once_is_so_again(self, mode: str, number: int) -> None:
@@ -370,7 +397,7 @@ class TestHoming:
                 drive.bits = 0x1400
                 drive.becomes(drive.state)
         drive._control = at_once    # type: ignore[method-assign]
-        assert [*home(axis), *home(axis)] == [('home', True, 'homed')] * 2
+        assert [*home(axis, 0.8), *home(axis, 0.8)] == [('home', True, 'homed')] * 2
 
     def test_nor_do_they_where_bit_12_falls_late(self, mode: str, number: int) -> None:
         axis, drive = meet(mode, homing=True)
@@ -498,7 +525,7 @@ class TestHomingThatEndsOnTheWay:
     def test_it_is_latched_where_it_has_come_to_stand(
             self, homing: int, mode: str, number: int) -> None:
         axis, drive = self.meet(mode, homing)
-        (_, success, _), = home(axis, 1.0)
+        (_, success, _), = home(axis, 1.5)
         assert not success
         sent, stands = axis.take(), drive.objects[0x6064, 0].hex().upper()
         there = sent.index('605#2F60600006000000')
@@ -521,7 +548,7 @@ class TestHomingThatEndsOnTheWay:
                     cut) % 3 else each for each in answers]
             return answers
         drive.takes = cuts      # type: ignore[method-assign]
-        (_, success, text), = home(axis, 1.0)
+        (_, success, text), = home(axis, 1.5)
         assert not success
         assert says('homing_moves_on') not in text.fields.get('parts', ())  # type: ignore
         assert len(cut) > 5
@@ -532,7 +559,7 @@ class TestHomingThatEndsOnTheWay:
             self, homing: int, mode: str, number: int) -> None:
         axis, drive = self.meet(mode, homing)
         drive.brakes = 1000
-        (_, success, text), = home(axis, 1.5)
+        (_, success, text), = home(axis, 3.5)
         assert not success
         assert text.fields['parts'][1] == says('homing_moves_on')  # type: ignore[attr-defined]
         assert drive.state == drive.READY
@@ -551,7 +578,7 @@ def test_an_axis_is_given_samples_enough_to_be_seen_standing(period: float) -> N
     axis.live(6 * period)
     assert axis.asks(ControlAction.ENABLE, 7 * period) == [('enable', True, 'operation enabled')]
     drive.homing = -2
-    assert home(axis, 12 * period) == [('home', False, says('homing_failed'))]
+    assert home(axis, 16 * period) == [('home', False, says('homing_failed'))]
     assert drive.state == drive.ENABLED
     assert drive.number(0x6060) == 1
 
@@ -604,13 +631,13 @@ class TestWhetherItStands:
     def test_noise_is_no_motion(self) -> None:
         axis, drive = self.meet(10.0)
         drive.steps, drive.noise = 0, 3
-        assert home(axis, 1.0) == [('home', False, says('homing_failed'))]
+        assert home(axis, 3.0) == [('home', False, says('homing_failed'))]
         assert (drive.state, drive.number(0x6060)) == (drive.ENABLED, 8)
 
     def test_one_that_never_stands_is_disabled(self) -> None:
         axis, drive = self.meet(0.0)
         drive.steps = 1000
-        assert home(axis, 1.2) != []
+        assert home(axis, 4.0) != []
         assert drive.state == drive.READY
 
     @pytest.mark.parametrize('found', [5, -2])
@@ -623,7 +650,7 @@ class TestWhetherItStands:
                 drive.bits or drive.number(0x6060) != 6) else each for each in takes(sent)]
         drive.takes = cuts      # type: ignore[method-assign]
         axis.take()
-        (_, success, text), = home(axis, 2.0)
+        (_, success, text), = home(axis, 4.0)
         assert not success
         assert 'would_jump' in (text.code, *(    # type: ignore[attr-defined]
             part.code for part in text.fields.get('parts', ())))    # type: ignore[attr-defined]
