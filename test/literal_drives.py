@@ -129,6 +129,8 @@ class ServoDrive:
     """
 
     OFF, READY, ON, ENABLED, QUICK_STOP, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x08
+    #: something happens by itself, so that ``passes`` is to be called
+    ticks = False
 
     def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
         self.node = node

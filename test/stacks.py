@@ -5,6 +5,9 @@ CiA 402 drives as real CANopen stacks and devices behave, on the literal drive o
 Each says what showed it. What they have in common stands in :class:`ServoDrive`.
 """
 
+import math
+
+from drive_can_bridge.core.frame import Frame
 from literal_drives import ServoDrive
 
 NO_OBJECT, ACCESS = 0x06020000, 0x06010000
@@ -110,3 +113,94 @@ class EightEntries(ServoDrive):
         entries = [self.objects.get((at, place), bytes(4)) for place in range(1, 9)]
         return [(int.from_bytes(entry[2:], 'little'), entry[1], entry[0] // 8)
                 for entry in entries if any(entry)]
+
+
+class WatchesSync(ChecksMapping):
+    """
+    Misses SYNC (1006h) after 1.5 periods: emergency 8100h, and pre-operational, or as 1029h says.
+
+    CANopenNode 4 (9b8beed) with its example dictionary. The error goes with the next SYNC, also
+    right behind NMT start; a node with the error that is started is operational for a millisecond.
+    Stopped, it hears no SYNC.
+
+    :ivar failed: it has the error.
+    """
+
+    ticks = True
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None, *,
+                 failed: bool = True) -> None:
+        super().__init__(node, {
+            (0x1006, 0): (10_000).to_bytes(4, 'little'), (0x1029, 1): b'\0', **(objects or {})})
+        self.failed = failed
+        self._synced_at = self._drops_at = math.inf
+
+    def _sync(self) -> list[Frame]:
+        self._synced_at, over = self.now, self.failed
+        self.failed = False
+        return [Frame(0x80 + self.node, bytes(8), False)] * over + super()._sync()
+
+    def obeys(self, command: int) -> list[Frame]:
+        self._drops_at = self.now + 0.001 if command == 0x01 else math.inf
+        return super().obeys(command)
+
+    def passes(self, now: float) -> list[Frame]:
+        self.now, period = now, 1e-6 * self.number(0x1006)
+        frames = []
+        if period and not (self.failed or self.stopped) and now > self._synced_at + 1.5 * period:
+            self.failed, self._drops_at = True, now
+            frames.append(Frame(0x80 + self.node, bytes.fromhex('0081110000000000'), False))
+        if self.failed and self.operational and now >= self._drops_at:
+            behaviour = self.number(0x1029, 1)
+            self.operational, self.stopped = behaviour == 1, behaviour == 2
+        return frames
+
+
+class StartsSlowly(ServoDrive):
+    """
+    Needs 0.3 s from NMT start to operational; a test device that is none of the stacks.
+
+    :ivar takes_to_start: s.
+    """
+
+    ticks = True
+    takes_to_start = 0.3
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        super().__init__(node, objects)
+        self._starts_at = math.inf
+
+    def obeys(self, command: int) -> list[Frame]:
+        if command == 0x01 and self.operational:
+            return []
+        self._starts_at = self.now + self.takes_to_start if command == 0x01 else math.inf
+        return super().obeys(0x80 if command == 0x01 else command)
+
+    def passes(self, now: float) -> list[Frame]:
+        self.operational = self.operational or now >= self._starts_at
+        return super().passes(now)
+
+
+class FewObjects(ServoDrive):
+    """No 1006h, 1016h, 1019h, 60C2h, no event timer: durand 0.5.0 (PyPI) as a drive."""
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        super().__init__(node, objects)
+        for place in (0x1006, 0), (0x1016, 0), (0x1016, 1):
+            self.objects.pop(place, None)
+
+
+class StartsItself(AcceptsAnything):
+    """Operational by itself, at once and without a word: Lely core 2.4.0 (620d185), no 1F80h."""
+
+    def restarts(self) -> list[Frame]:
+        frames = super().restarts()
+        self.operational = True
+        return frames
+
+
+class BootsTwice(AcceptsAnything):
+    """Two boot-up frames within 0.1 ms behind each reset: CanFestival 3 (12a05e4)."""
+
+    def restarts(self) -> list[Frame]:
+        return 2 * super().restarts()

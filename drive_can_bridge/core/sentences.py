@@ -387,6 +387,14 @@ device_restarted = Text('the device restarted', do='see why it lost its power')
 no_heartbeat = Text(
     'no heartbeat for {timeout:g} s',
     do='power, cable; the producer of the device (1017h)')
+sync_not_begun = Text(
+    'SYNC begins when every drive of the bus that hears it is known not to be enabled, was told '
+    'to stop, or is silent',
+    do='wait a moment; see what the other drives of the bus say')
+sync_watched = Text(
+    'the drive watches SYNC (1006h = {period} us): one cycle that is late by {late:.4g} s is a '
+    'fault for it',
+    do='keep the computer from being late (real-time priority), or set 1006h to 0 in the drive')
 node_state = Text('node is {state}', do='start the node (nmt_start)')
 silent = Text('{what}: {look_at}', do='look at what it names')
 lost_because = Text('{why}: {gap}', do='correct cyclic_response')

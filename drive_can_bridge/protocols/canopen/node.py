@@ -63,6 +63,7 @@ class Node:
     :ivar free_at: when PDOs may be sent.
     :ivar heartbeat_lost: a heartbeat is overdue.
     :ivar pdo_at: when it sent a PDO last, for who looks at them.
+    :ivar heard_at: when it said anything else last, likewise.
     """
 
     def __init__(self, number: int, *, heartbeat_timeout: float) -> None:
@@ -76,7 +77,7 @@ class Node:
         self.emergency: Emergency | None = None
         self.free_at = math.inf
         self.heartbeat_lost = False
-        self.pdo_at = -math.inf
+        self.pdo_at = self.heard_at = -math.inf
         self._heartbeat_at = self._said_at = -math.inf      # or the boot-up frame
         self._interval: float | None = None     # None: there was no heartbeat yet
         self._blocked_until = -math.inf         # a heartbeat is believed until then
@@ -97,7 +98,7 @@ class Node:
         """Take a boot-up frame or heartbeat."""
         was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
-        self._heartbeat_at = self._said_at = now
+        self._heartbeat_at = self._said_at = self.heard_at = now
         if state is NmtState.BOOT_UP:
             self.state = NmtState.PRE_OPERATIONAL
             self.emergency = None
@@ -166,6 +167,15 @@ class Node:
         """Return the state that its last heartbeat says; None: there is none that is recent."""
         recent = now - self._said_at <= (self.heartbeat_timeout or BELIEF_TIME)
         return self.state if recent else None
+
+    def said_since(self, at: float) -> NmtState | None:
+        """Return the state that a heartbeat has said since then; None: there was none."""
+        return self.state if self._said_at > at else None
+
+    @property
+    def interval(self) -> float | None:
+        """How many s there are between its heartbeats, as far as known; None: it sends none."""
+        return None if self.heartbeat_lost else self._interval
 
     @property
     def ailing(self) -> Sentence:

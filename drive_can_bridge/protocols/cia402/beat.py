@@ -6,6 +6,12 @@ What the drives of one bus have in common: SYNC, and the heartbeat of the bridge
 own when it is due, which is the same moment for all; the last of them in the order of the bus
 sends SYNC. Where a stop does not wait for the next SYNC, a whole round is brought forward: all who
 does so sends the RPDOs of all others as well.
+
+A drive that watches SYNC (1006h) leaves *operational* without it, and does not come back before it
+gets one. So SYNC goes on between rounds, and before the first of them (:class:`FreeSync`), as long
+as a drive is set up, differs, is lost or is told to stop, and one of these is heard. A SYNC puts
+into effect what an operational drive has in its buffers: so the first one waits until that can
+start no drive of the bus (:attr:`InStep.sync_at`).
 """
 
 from collections.abc import Sequence
@@ -13,40 +19,59 @@ import math
 from typing import Protocol
 
 from drive_can_bridge.core.outbox import Left, Outbox
+from drive_can_bridge.core.session import Stage
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.exchange_book import CYCLE_SPACING_MIN, CycleTimer
 
 #: s that a stop waits for the next SYNC; else a round is brought forward
 SYNC_WAIT_MAX = 0.02
+#: s since a drive was heard for which SYNC goes on between rounds
+HEARD_TIME = 1.0
+#: s before NMT start, and behind it, in which there is SYNC although nobody is heard
+BEFORE_START, BEHIND_START = 0.1, 0.2
 
 
 class InStep(Protocol):
     """A session that hears SYNC."""
 
     outbox: Outbox
+    stage: Stage
 
     @property
     def exchange(self) -> 'CyclicExchange[list[bytes]]':
         """Its cycles."""
+
+    @property
+    def needs_sync(self) -> bool:
+        """The drive is looked for, set up, in exchange, or told to stop."""
+
+    @property
+    def heard_at(self) -> float:
+        """When it sent a PDO, an SDO answer or a heartbeat last."""
+
+    @property
+    def sync_at(self) -> float:
+        """From when on SYNC starts nothing that is in its buffers; infinity: not known."""
 
 
 class Turn(CycleTimer):
     """
     When one drive is due: with all others of its bus.
 
+    :ivar period: s between two rounds.
     :ivar session: of the drive.
     :ivar begun_round: its RPDOs of the round under way were handed out.
     :ivar moved: who serves this drive may not know when it is due.
     :ivar tell: takes what becomes of the SYNC behind them.
     """
 
-    __slots__ = ('_beat', '_spacing', 'begun_round', 'moved', 'session', 'tell')
+    __slots__ = ('_beat', 'begun_round', 'moved', 'period', 'session', 'tell')
 
     def __init__(self, period: float, beat: 'Beat', session: InStep) -> None:
         super().__init__(period)
         self._beat = beat
-        self._spacing = period
+        self.period = period
         self.session = session
         self.begun_round = self.moved = False
         self.tell: Left | None = None
@@ -59,11 +84,11 @@ class Turn(CycleTimer):
 
     def takes_part(self, now: float) -> bool:
         """Tell whether this round is one of the drive: it has begun it, or is about to."""
-        return self.begun_round or self.due < now + 0.5 * self._spacing
+        return self.begun_round or self.due < now + 0.5 * self.period
 
     def start(self, at: float) -> None:
         self.moved = self._beat.pulling
-        due = self._beat.next_due(at, self, self._spacing)
+        due = self._beat.next_due(at, self, self.period)
         if self.running and due > at + self.stop_spacing:   # a stop
             if at > self.due:
                 self._beat.bring_forward(at)    # the others come along
@@ -89,7 +114,7 @@ class Turn(CycleTimer):
 
     def begun(self, now: float, pause: float | None = None) -> float:
         error = super().begun(now)
-        if pause is not None and pause < self._spacing:     # those of a stop are closer
+        if pause is not None and pause < self.period:     # those of a stop are closer
             self._beat.bring_forward(now + pause)
         self.begun_round, self.moved = True, self._beat.pulling
         self._beat.agree()
@@ -102,11 +127,14 @@ class Beat:
 
     :ivar turns: of all its drives, in their order.
     :ivar pulling: drives are served of whom another one was.
+    :ivar opened: SYNC may be sent.
+    :ivar by_rounds: rounds send it.
     """
 
     def __init__(self) -> None:
         self.turns: list[Turn] = []
-        self.pulling = False
+        self.pulling = self.opened = self.by_rounds = False
+        self._next = self._around_until = -math.inf     # the next SYNC; and NMT start
 
     @property
     def running(self) -> bool:
@@ -116,6 +144,8 @@ class Beat:
     def next_due(self, at: float, turn: Turn, period: float) -> float:
         """Return when a drive that wants to begin then is due: with the others."""
         due = min((other.due for other in self.turns if other is not turn), default=math.inf)
+        if due == math.inf and not self.by_rounds:
+            due = self.due
         if math.inf in (due, at):
             return at
         while due < at:
@@ -165,6 +195,7 @@ class Beat:
         """Record that a drive is not in exchange any more: others may have waited for it."""
         turn.begun_round, turn.tell = False, None
         running = [each for each in self.turns if each.running]
+        self.by_rounds = self.by_rounds and bool(running)
         if running and not self.pulling and all(each.begun_round for each in running):
             self._send_sync(turn.session.outbox)
 
@@ -172,11 +203,80 @@ class Beat:
         told = [each.tell for each in self.turns if each.begun_round and each.tell is not None]
         for each in self.turns:
             each.begun_round, each.tell = False, None
+        self.by_rounds, self._next = True, min(each.due for each in self.turns)
 
         def left(sent: bool, now: float) -> None:
             for tell in told:
                 tell(sent, now)
         outbox.put(network.encode_sync(), left)
+
+
+    # -- between rounds ---------------------------------------------------------------------------
+
+    @property
+    def due(self) -> float:
+        """When SYNC is to be sent, or to begin, that no round sends; infinity: never."""
+        sessions = [turn.session for turn in self.turns if turn.session.needs_sync]
+        if not sessions:
+            return math.inf
+        if not self.opened:
+            return max(session.sync_at for session in sessions)
+        until = max(HEARD_TIME + max(session.heard_at for session in sessions), self._around_until)
+        soon = self._next + 0.5 * self.turns[0].period
+        if self._next > until or min(turn.due for turn in self.turns) < soon:
+            return math.inf
+        return self._next
+
+    def send(self, outbox: Outbox, now: float) -> None:
+        """Send SYNC, if it is due and no round sends it."""
+        if self.by_rounds or now < self.due:
+            return
+        if not self.opened:
+            self.opened, self._next = True, now
+            if now < self.due:
+                return
+        period = self.turns[0].period
+        self._next += period * max(1, math.ceil((now - self._next) / period - 0.5))
+        outbox.put(network.encode_sync())
+
+    def before_start(self, now: float) -> float:
+        """Have SYNC around an NMT start; return in how many s that may be sent."""
+        flows = self.by_rounds or self.due < math.inf
+        self._around_until = now + BEFORE_START + BEHIND_START
+        if flows:
+            return 0.0
+        self._next = now
+        return BEFORE_START
+
+    def shut(self) -> None:
+        """Begin again: nothing is known of the drives any more."""
+        self.opened = False
+
+    def ended(self) -> None:
+        """Record that a session sends nothing more."""
+        if all(turn.session.stage is Stage.IDLE for turn in self.turns):
+            self.shut()
+
+
+class FreeSync:
+    """The part of a session that sends SYNC while no round does: any of the bus."""
+
+    def __init__(self, session: InStep, beat: Beat) -> None:
+        self._session, self._beat = session, beat
+
+    def next_timer(self) -> float:
+        """Return when SYNC is due."""
+        if self._beat.by_rounds or self._session.stage is Stage.IDLE:
+            return math.inf
+        return self._beat.due
+
+    def handle_timer(self, now: float) -> None:
+        """Send it, if it is due."""
+        self._beat.send(self._session.outbox, now)
+
+    def stop(self) -> None:
+        """Send none any more on account of this drive."""
+        self._beat.ended()
 
 
 class BridgeHeartbeat:

@@ -5,8 +5,8 @@ What is done with a drive before its first PDO, as one sequence.
 .. code-block:: text
 
     6041h ─enabled─► 6040h until it is not ─► heartbeats ─► NMT pre-operational ─► PDOs, SYNC
-        ─► 60C2h, 6502h, 6060h ─► NMT start ─► where axes are that stay there ─► 6041h as above
-        ─► PDOs flow
+        ─► 60C2h, 6502h, 6060h ─► NMT start, as soon as there is SYNC ─► operational
+        ─► where axes are that stay there ─► 6041h as above ─► PDOs flow
 
 All that may take minutes, and others may have enabled the drive meanwhile: so it is asked for its
 state once more before the first PDO, and disabled. Whatever nobody answers ends it; it begins anew
@@ -26,6 +26,7 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
 from drive_can_bridge.protocols.cia402 import pdo, states
+from drive_can_bridge.protocols.cia402.beat import Beat
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
@@ -43,6 +44,10 @@ PRODUCER = 0x1017
 _PRODUCES_SYNC = 1 << 30
 #: s between two looks at what is awaited
 LOOK_PERIOD = 0.02
+#: s that a drive has to acknowledge its stop until SYNC begins, and that a silent one is silent
+STOP_TIME, SILENCE_TIME = 0.5, 1.0
+#: s that the first heartbeat behind NMT start is waited for
+_HEARTBEAT_WAIT = 0.5
 #: looks at a state that a heartbeat has yet to tell
 _LOOKS = 5
 _POWERS = (-3, -4, -5, -6, -2, -1, 0)
@@ -57,31 +62,52 @@ class BringUp:
     :param limits: learn what they are before anything is sent.
     :ivar watch: who watches the bridge.
     :ivar options: what 605Ah, 605Bh, 605Ch say, by index; without those that the drive lacks.
+    :param beat: has SYNC; None: the drive does not hear it.
     :ivar nmt_at: when it was sent NMT last.
+    :ivar started_at: when it was sent NMT start last.
     """
 
     def __init__(self, session: Session, node: Node, rules: DriveRules, channel: SdoChannel,
-                 limits: LimitCheck) -> None:
+                 limits: LimitCheck, beat: Beat | None) -> None:
         drive = session.configuration
         self._session, self._node, self._rules = session, node, rules
-        self._channel, self._limits = channel, limits
+        self._channel, self._limits, self._beat = channel, limits, beat
         self._drive, self._options = drive, drive.options
         self._mode = MODES[drive.options.mode]
         objects = self._objects = Objects(drive.parameter_retries + 1)
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
-        self._synchronous: bool = drive.options.transmission == 'sync'
         self._told: set[str] = set()
         self._found = NOTHING           # what was told of a drive that runs
         self.options: dict[int, int] = {}
-        self.nmt_at = -math.inf
+        self.nmt_at = self.started_at = -math.inf
+        self.forget(-math.inf)
         self.watch = Watch(objects, drive, self.tell)
         self._pdos = PdoSetUp(objects, drive, self._may_write, self.tell)
 
+    def forget(self, now: float) -> None:
+        """Know nothing of the state of the drive."""
+        self._since = now
+        self._disabled = False
+        self._asked_at = self._stopped_at = math.inf
+
+    @property
+    def sync_at(self) -> float:
+        """From when on SYNC starts nothing that is in the buffers of the drive."""
+        if self._disabled:
+            return -math.inf
+        node, answer_time = self._node, self._drive.parameter_timeout
+        heard_at = max(self._since, node.heard_at, node.pdo_at)
+        silent_at = max(self._asked_at + answer_time, heard_at + SILENCE_TIME)
+        return min(max(self._asked_at, self._stopped_at + STOP_TIME), silent_at)
+
     def run(self) -> Procedure:
         """Do it; returns an :class:`Outcome`."""
+        self._asked_at = min(self._asked_at, self._channel.now)
         reply = yield Ask(states.STATUS_WORD)
         if silent(reply):
+            if self._node.heard_at > self._asked_at:
+                yield from self._tell_blindly(attempts=1)
             return Outcome(Found.ABSENT)
         try:
             yield from self._stand_still(reply)
@@ -131,6 +157,7 @@ class BringUp:
         until = self._channel.now + self._drive.control_timeout
         while True:
             if reply.data is None:
+                yield from self._tell_blindly()
                 raise differs(sentences.object_refused(
                     at_object(states.STATUS_WORD), sdo.describe(reply.abort or 0)))
             raw = int.from_bytes(reply.data[:2], 'little')
@@ -140,6 +167,7 @@ class BringUp:
             braking = reacting = state is State.FAULT_REACTION
             if not reacting and state not in _RUNNING:
                 break
+            self._stopped_at = min(self._stopped_at, self._channel.now)
             found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
             if self._channel.now >= until:
                 runs = found if reacting else sentences.found_running(state.value)
@@ -158,9 +186,17 @@ class BringUp:
             yield Ask(pause=LOOK_PERIOD)
             reply = yield from self._transfer(Ask(states.STATUS_WORD))
         self._found = NOTHING
+        self._disabled = True
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
         return raw
+
+    def _tell_blindly(self, attempts: int | None = None) -> Procedure:
+        """Have a drive stand still whose state nobody knows, before SYNC begins."""
+        if self._beat is not None and not self._beat.opened and self._stopped_at == math.inf:
+            self._stopped_at = self._channel.now
+            word = DISABLE_WORDS[self._options.disable_word].to_bytes(2, 'little')
+            yield Ask(states.CONTROL_WORD, 0, word, attempts=attempts)
 
     def _brakes(self) -> Generator[Ask, Reply, bool]:
         """Tell whether a quick stop takes its course."""
@@ -220,13 +256,48 @@ class BringUp:
 
     def _start(self) -> Procedure:
         """Have the node take PDOs, or wait until somebody else does."""
+        if self._beat is not None:
+            yield from self._sync_begins(self._beat)
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
+            self.started_at = self._channel.now
             yield Ask(pause=START_PAUSE)
+            yield from self._becomes_operational()
         elif self._waits_for_start and self._node.state is not None:
             self._session.report.advice = sentences.node_state(self._node.state.text)
             while self._waits_for_start:
                 yield Ask(pause=LOOK_PERIOD)
+
+    def _sync_begins(self, beat: Beat) -> Procedure:
+        """Wait until there is SYNC: a drive that watches it needs it when it is started."""
+        while not beat.opened:
+            self._session.report.advice = sentences.sync_not_begun()
+            yield Ask(pause=LOOK_PERIOD)
+        pause = beat.before_start(self._channel.now) if self._options.nmt_start else 0.0
+        if pause:
+            yield Ask(pause=pause)
+
+    def _becomes_operational(self) -> Procedure:
+        """Wait for what shows that the node is operational; for a heartbeat, if it sends them."""
+        node, started_at = self._node, self.started_at
+        until = started_at + self._drive.control_timeout
+        heard_by = started_at
+        if node.interval is not None:
+            heard_by += min(_HEARTBEAT_WAIT, 1.5 * max(
+                node.interval, self._options.heartbeat_producer))
+        while node.pdo_at < started_at:
+            said, now = node.said_since(started_at), self._channel.now
+            if said is NmtState.OPERATIONAL or said is None and now >= heard_by:
+                return
+            if now >= until:
+                raise End(Outcome(Found.SILENT, sentences.node_state(
+                    (said or NmtState.PRE_OPERATIONAL).text)))
+            yield Ask(pause=LOOK_PERIOD)
+
+    def starting(self, now: float) -> bool:
+        """Tell whether the node may still be on its way to operational."""
+        return now < self.started_at + self._drive.control_timeout and (
+            self._node.said_since(self.started_at) is not NmtState.OPERATIONAL)
 
     @property
     def _waits_for_start(self) -> bool:
@@ -294,7 +365,7 @@ class BringUp:
             for _ in range(_LOOKS):     # whether it may be written, a heartbeat says
                 if self._node.state is None:
                     yield Ask(pause=self._options.heartbeat_producer / 2)
-        if self._synchronous:
+        if self._beat is not None:
             yield from self._sync()
         yield from self._pdos.set_up()
 
@@ -319,6 +390,8 @@ class BringUp:
             self._may_write(sentences.object_differs(
                 at_object(SYNC_PERIOD), f'{period} us', f'{wanted} us'))
             yield from self._must(SYNC_PERIOD, 0, wanted, 4)
+        if period:
+            self.tell(sentences.sync_watched(wanted, 0.5 * self._drive.period))
         counter = yield from self._read(SYNC_COUNTER, 0, 1)
         if (counter or 0) > 1:
             raise differs(sentences.object_differs(at_object(SYNC_COUNTER), str(counter), '0'))

@@ -40,7 +40,8 @@ from drive_can_bridge.protocols.canopen.node import (
     Change, Node, START_PAUSE, START_PERIOD, START_SPACING)
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.beat import Beat, BridgeHeartbeat, smallest, Turn
+from drive_can_bridge.protocols.cia402.beat import (
+    Beat, BridgeHeartbeat, FreeSync, smallest, Turn)
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoTransactor
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
@@ -150,15 +151,18 @@ class Cia402Session(Session):
             [] if options.mapping == 'assume' else [
                 each for each in drive.cyclic_request if each.limit],
             self.sent, self._channel, self._limits_judged)
-        self._bring_up = BringUp(self, self._node, self._rules, self._channel, self._limits)
+        self._bring_up = BringUp(
+            self, self._node, self._rules, self._channel, self._limits,
+            self._beat if self._synchronous else None)
         self.homes = options.homing
         self._handover = Handover(
             self.setpoints, self._rules, drive.control_timeout, self.report,
             ) if options.mode == 'pp' else None
         self._homing = Homing(self, control, self._rules, self._channel, self._mode)
         self._course = Life(self._channel)
-        self.look_after(self._course, self._heartbeats, self._homing, self.exchange,
-                        channel=self._channel)
+        self.look_after(
+            self._course, self._heartbeats, self._homing, self.exchange,
+            *([FreeSync(self, self._beat)] if self._synchronous else ()), channel=self._channel)
         self._stop_until = -math.inf
         self._runs_on = False       # what its stop by SDO has come to
         self._forget_state()
@@ -182,6 +186,7 @@ class Cia402Session(Session):
         self._limits.stop()
         self._standing.forget()
         self._node.begin(now)
+        self._bring_up.forget(now)
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._stop_by_sdo(now)
         self._course.start(self._life(now, spacing), now)
@@ -223,6 +228,10 @@ class Cia402Session(Session):
     def bus_down(self, now: float, reason: str) -> None:
         self._node.forget()
         super().bus_down(now, reason)
+
+    def stood_still(self, now: float) -> None:
+        self._beat.shut()
+        super().stood_still(now)
 
     # -- setting up -------------------------------------------------------------------------------
 
@@ -272,7 +281,7 @@ class Cia402Session(Session):
         exchange = self.exchange
         self._machine.status_received(status, now)
         self._answers.book.forget_asked()
-        self._answers.book.stale = self._beat.running    # it answers to the SYNC of others
+        self._answers.book.stale = self._synchronous     # it answers to the SYNC before
         self.setpoints.changed = True   # what was written by SDO meanwhile was something else
         self._limits.begin()
         exchange.start(now)
@@ -285,6 +294,10 @@ class Cia402Session(Session):
             if self.exchange.cycles_left == 0:
                 self.duty.happened(Happened.SILENT)
                 self.start_over(now)
+        elif reason and not self.online and self._bring_up.starting(now):
+            self._answers.forget()
+            if not self._synchronous:
+                self._expect_set(now)
         elif reason:
             self._silent(reason, now)
         elif not self._synchronous:
@@ -341,6 +354,8 @@ class Cia402Session(Session):
         for each, payload in zip(self._requests, payloads):
             exchange.put(Frame(each.identifier, payload, False))
         if self._turn is not None:
+            if self.online:     # what answers to SYNC of before has come by now
+                self._answers.book.stale = 0
             exchange.expect_answer(now)
             self._beat.begun(self._turn, now, exchange.await_frame())
         elif not self._answers.book.awaiting:
@@ -360,6 +375,7 @@ class Cia402Session(Session):
             if place is not None:
                 self._receive_pdo(place, data, now, now - age)
             elif identifier == sdo.RESPONSE_BASE + self.configuration.station:
+                self._node.heard_at = now
                 self._again.heard(now)
                 self._channel.receive(data, now)
             elif identifier in self._masters:
@@ -444,7 +460,8 @@ class Cia402Session(Session):
             self._no_answer_comes(now)
         elif state is not NmtState.OPERATIONAL and self.exchange.cycling and (
                 state is NmtState.STOPPED or not self.exchange.leaving
-                and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING):
+                and now > self._bring_up.nmt_at + START_PAUSE + START_SPACING
+                and (self.online or not self._bring_up.starting(now))):
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.heard(now, hurry=True)
@@ -697,6 +714,24 @@ class Cia402Session(Session):
             return
         self._channel.run(self._bring_up.watch.release(self._stop.answer_time),
                           lambda _: self.stop_left(why), now, Priority.STOP)
+
+    # -- SYNC -------------------------------------------------------------------------------------
+
+    @property
+    def needs_sync(self) -> bool:
+        """The drive is looked for, set up, in exchange, or told to stop."""
+        return self.stage is Stage.RUNNING or self.stage is Stage.STOPPING and (
+            self.exchange.cycling or self._stop.running)
+
+    @property
+    def heard_at(self) -> float:
+        """When the drive sent anything last."""
+        return max(self._node.heard_at, self._node.pdo_at)
+
+    @property
+    def sync_at(self) -> float:
+        """From when on SYNC starts nothing that is in the buffers of the drive."""
+        return self._bring_up.sync_at
 
     # -- state ------------------------------------------------------------------------------------
 

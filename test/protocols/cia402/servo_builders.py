@@ -2,6 +2,7 @@
 """A servo drive, node 5, in csv or csp, with its bus; frames as candump writes them."""
 
 from collections.abc import Callable
+import math
 from typing import Any
 
 from builders import Conversation, drive, frame, INT16, INT32, parameter, RAM, RO
@@ -76,12 +77,14 @@ class Axis:
         self.drive = make(5, {**OBJECTS, **(objects or {})})
         self.now = 10.0
         self.beat_at = 10.05
+        self.tick_at = 10.0 if self.drive.ticks else math.inf
         self.log: list[tuple[float, str]] = []
         self.mute = self.deaf = False
 
     def deliver(self, sent: list[str]) -> None:
         for text in sent:
             self.log.append((round(self.now, 6), text))
+            self.drive.now = self.now
             answers = [] if self.deaf else self.drive.takes(frame(text))
             for answer in answers if not self.mute else ():
                 self.now += self.DELAY
@@ -96,9 +99,15 @@ class Axis:
         end = self.now + duration
         for _ in range(100_000):
             due = self.session.next_timer()
-            if min(due, self.beat_at) > end:
+            if min(due, self.beat_at, self.tick_at) > end:
                 self.now = max(self.now, end)
                 return
+            if self.tick_at <= min(due, self.beat_at):
+                self.now = max(self.now, self.tick_at)
+                self.tick_at += 0.001
+                for said in self.drive.passes(self.now):
+                    self.says(str(said))
+                continue
             if self.beat_at <= due:
                 self.now = max(self.now, self.beat_at)
                 self.beat_at += 0.1

@@ -47,7 +47,7 @@ class TestObjects:
         assert found_differing(axis) == says(
             'of_object', what='torque_limit (6072h.00h)', why=says('no_such_object'))
         assert 'torque_limit (6072h.00h): no such object' in axis.session.offline_advice
-        assert not any(text.startswith(('000#', '205#', '080#')) for text in axis.take())
+        assert not any(text.startswith(('000#', '205#')) for text in axis.take())
         axis.drive.objects[LIMIT] = SAME    # it was another drive
         if mapping == 'configure':
             axis.live(1.5)
@@ -152,7 +152,7 @@ class TestLimits:
             'limit_without_effect', what='torque_limit (6072h.00h)', shown='30 %', sent='100 %')
         axis.take()
         axis.live(5.0)      # looked at again, and still the same: it is left alone
-        assert not any(text.startswith(('000#', '205#', '080#')) for text in axis.take())
+        assert not any(text.startswith(('000#', '205#')) for text in axis.take())
         axis.drive.objects[LIMIT] = (400).to_bytes(2, 'little')
         axis.drive.__class__ = AcceptsAnything
         axis.live(1.5)
