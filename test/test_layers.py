@@ -48,18 +48,22 @@ INTERNAL: dict[str, set[str]] = {
         '', 'core', 'configuration', 'process', 'simulation', 'monitor', 'ros', 'ros.monitor'},
     'demo': {'', 'process'},
     'client.drive': {'', 'core', 'process'},
-    'client.bridge': {'', 'clock', 'core', 'client.drive', 'ros.client', 'ros.messages'},
+    'client.way': {'', 'core'},
+    'client.local': {'', 'clock', 'core', 'process', 'client.way'},
+    'client.ros_way': {'', 'clock', 'core', 'client.way', 'ros.client', 'ros.messages'},
+    'client.bridge': {'', 'core', 'client.drive', 'client.way'},
     'client.jog': {
-        '', 'core', 'client.bridge', 'ros.client', 'ros.messages', 'ros.recognition'},
+        '', 'core', 'client.bridge', 'client.ros_way', 'ros.client', 'ros.messages',
+        'ros.recognition'},
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
-        'client.bridge', 'client.drive'},
+        'client.bridge', 'client.drive', 'client.local', 'client.ros_way'},
     'backup': {'', 'core', 'configuration', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
         'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
-        'demo', 'client', 'client.drive', 'client.jog', 'backup', 'ros', 'ros.client',
-        'ros.monitor', 'ros.demo'},
+        'demo', 'client', 'client.drive', 'client.jog', 'client.local', 'backup', 'ros',
+        'ros.client', 'ros.monitor', 'ros.demo'},
 }
 
 ROS_PACKAGES = {
@@ -81,7 +85,7 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
-    'client.bridge': {'rcl_interfaces'},
+    'client.ros_way': {'rcl_interfaces'},
     'client.jog': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,
     'view': {'rich'},
@@ -95,7 +99,7 @@ EXTERNAL: dict[str, set[str]] = {
 #: works where the other side is missing.
 LAZY = {('cli', 'ros'), ('cli', 'ros.client'), ('cli', 'ros.monitor'), ('cli', 'ros.demo'),
         ('cli', 'view'), ('cli', 'panel'), ('cli', 'client.jog'),
-        ('client', 'client.bridge')}
+        ('client', 'client.ros_way')}
 
 #: No clock, no thread, no log, no input or output in here: time and frames are arguments.
 SANS_IO = {'core', 'protocols', 'monitor'}

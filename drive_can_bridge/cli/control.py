@@ -7,11 +7,13 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from drive_can_bridge.cli.command import (
     complain, FAILED, namespace, print_json, say, WrongUsage,
 )
+from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern
 from drive_can_bridge.process.environment import nobody
@@ -70,15 +72,36 @@ def run(args: Namespace) -> int:
     _check(args)
     if args.subcommand == STOP:
         return _stop(args)
+    from drive_can_bridge.cli.output import waiting     # a stop has no time for that
+    try:
+        with waiting('waiting for the bridge'):
+            answers = _given_locally(args)
+            if answers is None:
+                answers = _given(args)
+    except (UnknownDrive, WhichBridge) as error:
+        raise WrongUsage(str(error)) from None
+    return _show(args, answers)
+
+
+def _given_locally(args: Namespace) -> list[Answer] | None:
+    """Tell drives by the local way; None: it does not lead to all of them."""
+    from drive_can_bridge.client.local import local_ways, NoWay
+    with local_ways(args.clock) as ways:
+        try:
+            nodes = chosen_drives(args.words, args.namespace, ways.known, matches)
+        except NoWay:
+            return None
+        return ways.give(args.subcommand, nodes)
+
+
+def _given(args: Namespace) -> list[Answer]:
+    """Tell drives through ROS."""
     graph, control = _ros(args)
     try:
-        from drive_can_bridge.cli.output import waiting     # a stop has no time for that
-        try:
-            with waiting('waiting for the bridge'):
-                answers = control.give(graph, args.subcommand, args.namespace, args.words)
-            return _show(args, answers)
-        except (control.UnknownDrive, WhichBridge) as error:
-            raise WrongUsage(str(error)) from None
+        nodes = chosen_drives(args.words, args.namespace, partial(control.known_drives, graph),
+                              matches)
+        found: list[Answer] = control.give(graph, args.subcommand, nodes)
+        return found
     finally:
         graph.close()
 

@@ -13,7 +13,8 @@ The parameters of drives for people and scripts: directly, or through a running 
         print(error)
 
 See :mod:`drive_can_bridge.client.drive` for what a drive can be asked; both ways to it are made of
-that: :mod:`.direct`, and :mod:`.bridge`.
+that: :mod:`.direct`, and :mod:`.bridge`. To a bridge of this host it is the local one
+(:mod:`.local`), where that leads to it, else that through ROS (:mod:`.ros_way`).
 """
 
 from collections.abc import Sequence
@@ -57,7 +58,13 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
             raise DriveCanError(f'{error.filename or params_file}: '
                                 f'{error.strerror or error}') from error
     from drive_can_bridge.client.bridge import BridgeSource
-    return BridgeSource(namespace, clock)
+    from drive_can_bridge.client.local import local_way
+    place = namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/')
+    way = local_way(place, clock)
+    if way is not None:
+        return BridgeSource(way)
+    from drive_can_bridge.client.ros_way import RosWay
+    return BridgeSource(RosWay(place, clock))
 
 
 def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),

@@ -6,33 +6,27 @@ from dataclasses import replace
 import json
 from typing import Any
 
-from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescriptor
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
-
 from drive_can_bridge.client.drive import (
     Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
-from drive_can_bridge.clock import Clock
+from drive_can_bridge.client.way import Described, Way
 from drive_can_bridge.core.directory import ParameterDirectory
-from drive_can_bridge.core.errors import NoBridge
+from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.text import printable, taken_apart
-from drive_can_bridge.ros.client.search import find_drives, Graph, NoAnswer
-from drive_can_bridge.ros.messages import (
-    drive_value, facts_of, limits_of, parameter_message, plain)
+from drive_can_bridge.core.text import facts_in, printable, taken_apart
 
 _TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
 
 
-def parameter_of(message: ParameterDescriptor, *, listed: bool = True) -> Parameter | None:
+def parameter_of(message: Described, *, listed: bool = True) -> Parameter | None:
     """Return what a descriptor describes; None: no parameter of a drive."""
-    facts = facts_of(message)
+    facts = facts_in(message.facts)
     if 'access' not in facts:
         return None
     try:
-        minimum, maximum = limits_of(message) if listed else (None, None)
+        minimum, maximum = (message.minimum, message.maximum) if listed else (None, None)
         made = Parameter(
             name=message.name,
             type=WireType(facts['type']) if 'type' in facts else WireType.UINT32,
@@ -46,14 +40,14 @@ def parameter_of(message: ParameterDescriptor, *, listed: bool = True) -> Parame
             width_known='type' in facts, values=taken_apart(facts.get('values', '')))
     except ValueError:
         return None
-    text = printable(message.description)
+    text = printable(message.text)
     end = text.rfind(f' ({made.address}')
     return replace(made, description=text[:end] if end > 0 and listed else '')
 
 
-def role_of(message: ParameterDescriptor) -> Role | None:
+def role_of(message: Described) -> Role | None:
     """Return what the bridge uses a parameter for."""
-    role = facts_of(message).get('role')
+    role = facts_in(message.facts).get('role')
     return next((each for each in Role if each.value == role), None)
 
 
@@ -62,11 +56,6 @@ def raw_of(parameter: Parameter, value: Value) -> int:
     if parameter.scaled:
         return round((value - parameter.offset) / parameter.scale)
     return int(value)
-
-
-def message_of(name: str, parameter: Parameter, value: Value) -> ParameterMessage:
-    """Return what sets a parameter to a value that fits it."""
-    return parameter_message(name, _TYPES[parameter.kind](value))
 
 
 def _number(facts: dict[str, str], key: str) -> int | None:
@@ -88,6 +77,7 @@ class BridgedDrive(Drive):
     """
     One drive.
 
+    :param way: to its bridge.
     :param node: full name of its node.
     :param table: the parameters that it lists.
     :param roles: what the bridge uses them for.
@@ -95,10 +85,10 @@ class BridgedDrive(Drive):
     :param identity: asks the bridge who a drive is.
     """
 
-    def __init__(self, graph: Graph, node: str, facts: DriveFacts, table: dict[str, Parameter],
+    def __init__(self, way: Way, node: str, facts: DriveFacts, table: dict[str, Parameter],
                  roles: dict[str, Role], period: float, identity: Callable[[str], str]) -> None:
         super().__init__(facts, ParameterDirectory(table, self._raw_parameter))
-        self._graph = graph
+        self._way = way
         self._node = node
         self._roles = roles
         self._period = period
@@ -106,10 +96,11 @@ class BridgedDrive(Drive):
         self._raw: dict[str, Parameter | None] = {}
 
     def _raw_parameter(self, name: str) -> Parameter | None:
-        if not name.isascii():      # no parameter is called so, and not all of it can be sent
+        # no parameter is called so, and not all of it can be sent
+        if not name.isascii() or '\0' in name:
             return None
         if name not in self._raw:
-            message, = self._describe([name])
+            message, = self._way.describe(self._node, [name])
             self._raw[name] = parameter_of(message, listed=False)
             role = role_of(message)
             if role is not None:
@@ -136,9 +127,8 @@ class BridgedDrive(Drive):
 
     def _get(self, asked: Sequence[tuple[str, Parameter]]) -> list[ReadOutcome]:
         names = [name for name, _ in asked]
-        answer = self._graph.call(self._node, 'get_parameters',
-                                  GetParameters.Request(names=names))
-        values = dict(zip(names, map(drive_value, answer.values)))
+        values = {name: value for name, value in zip(names, self._way.get(self._node, names))
+                  if isinstance(value, (bool, int, float))}
         missing = [name for name in names if values.get(name) is None]
         reasons = dict(zip(missing, self._reasons(missing)))
         made = []
@@ -154,28 +144,21 @@ class BridgedDrive(Drive):
         """Ask why there is no value."""
         if not names:
             return []
-        return [facts_of(message).get('error') or _NO_VALUE for message in self._describe(names)]
-
-    def _describe(self, names: Sequence[str]) -> list[object]:
-        answer = self._graph.call(self._node, 'describe_parameters',
-                                  DescribeParameters.Request(names=list(names)))
-        return list(answer.descriptors)
+        return [facts_in(message.facts).get('error') or _NO_VALUE
+                for message in self._way.describe(self._node, names)]
 
     def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
         # the bridge tries what is offline, too
         try:
-            answer = self._graph.call(self._node, 'set_parameters', SetParameters.Request(
-                parameters=[message_of(name, parameter, value)]))
+            done, reason = self._way.set(self._node, name, _TYPES[parameter.kind](value))
         except NoAnswer as trouble:
             if not trouble.asked:
                 raise
             return WriteOutcome.under_way(name, parameter, trouble)
-        result, = answer.results
-        return WriteOutcome(name, result.successful, parameter, result.reason)
+        return WriteOutcome(name, done, parameter, reason)
 
     def enabled(self) -> Enabled:
-        facts = self._graph.newest_status(f'{self.facts.through.lstrip("/")}: drive {self.name}',
-                                          age=self._period, patience=_DIAGNOSTICS_MARGIN)
+        facts = self._way.condition(self.name, age=self._period, patience=_DIAGNOSTICS_MARGIN)
         if 'control_state' not in facts:
             return Enabled.UNKNOWN
         if any(part in facts['control_state'] for part in _MOVING):
@@ -197,25 +180,12 @@ class BridgeSource:
     """
     The drives of a running bridge, or of all bridges of one namespace.
 
-    :param namespace: where they run; None: anywhere, if there is only one.
-    :raises WhichBridge: there are several, and not together.
-    :raises NoBridge: there is none.
-    :raises SilentBridge: it does not answer.
+    :param way: to them.
     """
 
-    def __init__(self, namespace: str | None, clock: Clock) -> None:
-        self._graph = Graph(clock)
-        try:
-            self._bridges = find_drives(
-                self._graph,
-                namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/'))
-        except NoBridge as error:
-            self._graph.close()
-            raise NoBridge(f'{error}: start one, or name its file with --params-file to talk to '
-                           'the drives directly') from None
-        except BaseException:
-            self._graph.close()
-            raise
+    def __init__(self, way: Way) -> None:
+        self._way = way
+        self._bridges = way.bridge_of
 
     @property
     def names(self) -> Sequence[str]:
@@ -224,8 +194,7 @@ class BridgeSource:
 
     def parameter_names(self, drive: str) -> Sequence[str]:
         """Return the names of the listed parameters of a drive."""
-        return list(self._graph.call(self._node_of(drive), 'list_parameters',
-                                     ListParameters.Request()).result.names)
+        return self._way.listed(self._node_of(drive))
 
     def open(self, names: Sequence[str]) -> Drives:
         """Ask for what is known of these drives."""
@@ -235,23 +204,22 @@ class BridgeSource:
         opened = {}
         for name, bridge in wanted.items():
             table, roles = self._table(name)
-            opened[name] = BridgedDrive(self._graph, self._node_of(name), self._facts(name),
+            opened[name] = BridgedDrive(self._way, self._node_of(name), self._facts(name),
                                         table, roles, float(period_of[bridge] or 1.0),
                                         self._identity)
         return Drives(opened, self.close)
 
     def close(self) -> None:
-        """Leave the graph. Idempotent."""
-        self._graph.close()
+        """End the way. Idempotent."""
+        self._way.close()
 
     def _node_of(self, drive: str) -> str:
         return f'{self._bridges[drive].rpartition("/")[0]}/{drive}'
 
     def _values(self, bridge: str, names: Sequence[str]) -> dict[str, Any]:
         """Return parameters of a bridge; None for those that it does not have."""
-        answer = self._graph.call(bridge, 'get_parameters',
-                                  GetParameters.Request(names=list(names)))
-        values = [plain(value) for value in answer.values]
+        values = [None if isinstance(value, tuple) else value
+                  for value in self._way.get(bridge, names)]
         if len(values) != len(names):   # rclpy answers nothing where one name is unknown
             values = [self._values(bridge, [name])[name] if len(names) > 1 else None
                       for name in names]
@@ -283,10 +251,7 @@ class BridgeSource:
         table: dict[str, Parameter] = {}
         roles: dict[str, Role] = {}
         for start in range(0, len(names), _BATCH):
-            answer = self._graph.call(
-                self._node_of(drive), 'describe_parameters',
-                DescribeParameters.Request(names=names[start:start + _BATCH]))
-            for message in answer.descriptors:
+            for message in self._way.describe(self._node_of(drive), names[start:start + _BATCH]):
                 parameter, role = parameter_of(message), role_of(message)
                 if parameter is not None:
                     table[message.name] = parameter

@@ -20,6 +20,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.client.bridge import parameter_of
+from drive_can_bridge.client.ros_way import described
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused, WhichBridge
 from drive_can_bridge.core.messages import Sentence
@@ -182,7 +183,7 @@ def _described(graph: Graph, node: str, names: Sequence[str]) -> list[Parameter]
     """Return parameters of a drive; the first of them is there."""
     answer = graph.call(node, 'describe_parameters', DescribeParameters.Request(
         names=list(names)), ANSWER_TIMEOUT)
-    found = [parameter_of(each) for each in answer.descriptors]
+    found = [parameter_of(described(each)) for each in answer.descriptors]
     if not found or found[0] is None:
         raise Refused(sentences.jog_not_told())
     return [each for each in found if each is not None]

@@ -15,6 +15,7 @@ The errors of the package.
      +-- NoBridge               none is running
      +-- SilentBridge           one is in the graph, or holds drives on this host; none answers
      +-- WhichBridge            several are running, and nobody has said which one is meant
+     +-- NoAnswer               a node does not answer, or has gone
 
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
@@ -93,3 +94,15 @@ class SilentBridge(DriveCanError):
 
 class WhichBridge(DriveCanError):
     """Several bridges are running, and nobody has said which one is meant."""
+
+
+class NoAnswer(DriveCanError):
+    """
+    A node does not answer, or has gone.
+
+    :ivar asked: it was sent the question, and may have done what it was asked.
+    """
+
+    def __init__(self, text: str, *, asked: bool) -> None:
+        super().__init__(text)
+        self.asked = asked

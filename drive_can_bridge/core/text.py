@@ -12,6 +12,7 @@ import difflib
 from functools import lru_cache
 import math
 import re
+import shlex
 from typing import Any
 
 #: characters of what users or the bus bring
@@ -101,6 +102,21 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
     """Return the known word that looks most like ``word``, or None."""
     matches = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
     return matches[0] if matches else None
+
+
+#: characters of ``additional_constraints`` that are looked at
+_CONSTRAINTS_MAX = 65536
+
+
+def facts_in(constraints: str) -> dict[str, str]:
+    """Return the ``key=value`` pairs of a descriptor; none of one that is not understood."""
+    try:
+        words = shlex.split(constraints[:_CONSTRAINTS_MAX])
+    except ValueError:
+        return {}
+    pairs = (word.partition('=') for word in words)
+    return {printable(key): printable(value, None if key == 'values' else TEXT_MAX)
+            for key, separator, value in pairs if separator}
 
 
 #: what makes a shell pattern of a name

@@ -47,6 +47,7 @@ class LocalWay:
 
     :param name: full name of the bridge.
     :param drives: by name, as they are.
+    :param order: their names in the order of the configuration.
     :param seen: returns the full names of all bridges in the graph, ours among them, and those of
         the drives that are seen around them.
     :param get: does what ``get_parameters`` of the bridge does, in the thread of the spinner.
@@ -54,7 +55,7 @@ class LocalWay:
     """
 
     def __init__(self, presence: Presence, domain: int, name: str,
-                 drives: Mapping[str, DriveNode], *,
+                 drives: Mapping[str, DriveNode], order: Sequence[str], *,
                  seen: Callable[[], tuple[list[str], list[str]]],
                  get: Callable[[Any, Any], Any], spinner: ExecutorThread,
                  pass_on: Callable[[Sequence[str], Asked], None],
@@ -62,6 +63,7 @@ class LocalWay:
         self._domain = domain
         self._name = name
         self._drives = drives
+        self._order = order
         self._seen = seen
         self._seen_at, self._found = -_SEEN_FOR, (list[str](), list[str]())
         self._get = get
@@ -151,7 +153,8 @@ class LocalWay:
         if now - self._seen_at >= _SEEN_FOR:
             self._seen_at, self._found = now, self._seen()
         bridges, drives = self._found
-        asked.answer('drives', *(drive.full_name for drive in list(self._drives.values())))
+        asked.answer('drives', *(self._drives[name].full_name for name in self._order
+                                 if name in self._drives))
         asked.answer('around', *drives)
         asked.answer('bridge', self._name, str(self._domain), *bridges)
 

@@ -1,16 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is in the messages of parameters: for the bridge, and for its clients."""
 
-import shlex
-
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescriptor, ParameterValue
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.text import printable, TEXT_MAX
-
-#: characters of ``additional_constraints`` that are looked at
-_CONSTRAINTS_MAX = 65536
+from drive_can_bridge.core.text import facts_in
 
 
 def value_of(message: ParameterValue) -> object:
@@ -40,13 +35,7 @@ def parameter_message(name: str, value: Value) -> ParameterMessage:
 
 def facts_of(message: ParameterDescriptor) -> dict[str, str]:
     """Return the ``key=value`` pairs of a descriptor; none of one that is not understood."""
-    try:
-        words = shlex.split(message.additional_constraints[:_CONSTRAINTS_MAX])
-    except ValueError:
-        return {}
-    pairs = (word.partition('=') for word in words)
-    return {printable(key): printable(value, None if key == 'values' else TEXT_MAX)
-            for key, separator, value in pairs if separator}
+    return facts_in(message.additional_constraints)
 
 
 def limits_of(message: ParameterDescriptor) -> tuple[float | None, float | None]:

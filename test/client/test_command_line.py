@@ -149,7 +149,7 @@ def test_the_file_of_the_environment_stands_for_the_option_where_no_bridge_is_as
     ('compare', 'a'), ('restore', 'a', 'b', 'c')])
 def test_wrong_usage_is_told_before_a_bridge_is_looked_for(
         words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'drive_can_bridge.client.bridge', None)
+    monkeypatch.setitem(sys.modules, 'drive_can_bridge.client.local', None)
     try:
         code = main(words)
     except SystemExit as ended:

@@ -10,6 +10,7 @@ from bridges import Bridge
 import pytest
 
 from drive_can_bridge.cli.main import main
+from drive_can_bridge.client import local
 from drive_can_bridge.process import local_stop
 from drive_can_bridge.process.local_server import Asked
 from drive_can_bridge.process.local_way import Inbound, packets_of, VERSION
@@ -22,7 +23,7 @@ Run = Callable[..., tuple[int, list[str], str]]
 def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Return what runs a command, and returns exit code, lines, and standard error."""
     # others may use this host meanwhile
-    for module in (local_stop, search):
+    for module in (local_stop, local, search):
         monkeypatch.setattr(module, 'bridges', lambda: [
             each for each in bridges() if each.process == os.getpid()])
 
@@ -103,4 +104,5 @@ class Lines:
                 return Line(None, self.asked)
             raise ConnectionRefusedError
         self._patch.setenv(SWITCH, 'on')
-        self._patch.setattr(local_stop, 'Line', line)
+        for module in (local_stop, local):
+            self._patch.setattr(module, 'Line', line)

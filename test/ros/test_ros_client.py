@@ -278,9 +278,9 @@ def test_a_write_that_nobody_answers_is_in_doubt_once_it_was_sent(asked: bool) -
 
     def call(*_: Any) -> None:
         raise trouble
-    graph: Any = SimpleNamespace(call=call)
+    way: Any = SimpleNamespace(set=call)
     facts: Any = SimpleNamespace(name='lift')
-    drive = BridgedDrive(graph, '/lift', facts, {RAMP.name: RAMP}, {}, 1.0, str)
+    drive = BridgedDrive(way, '/lift', facts, {RAMP.name: RAMP}, {}, 1.0, str)
     told: list[Any] = []
     with pytest.raises(search.NoAnswer):
         drive.write({RAMP.name: 1.5}, told=told.append)
@@ -322,7 +322,7 @@ def test_a_second_bridge_with_the_same_drive_does_not_configure(bridge: StartBri
     ('offline', 'unknown', Enabled.UNKNOWN)])
 def test_a_drive_counts_as_enabled_while_its_motor_may_move(
         state: str, control_state: str, enabled: Enabled) -> None:
-    graph: Any = SimpleNamespace(newest_status=lambda *_, **__: {
+    way: Any = SimpleNamespace(condition=lambda *_, **__: {
         'state': state, 'control_state': control_state})
     facts: Any = SimpleNamespace(name='lift', through='/drive_can_bridge')
-    assert BridgedDrive(graph, '/lift', facts, {}, {}, 1.0, str).enabled() is enabled
+    assert BridgedDrive(way, '/lift', facts, {}, {}, 1.0, str).enabled() is enabled

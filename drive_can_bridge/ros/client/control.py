@@ -15,10 +15,11 @@ from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core.text import is_pattern
+from drive_can_bridge.core.bridges import is_some
 from drive_can_bridge.process.local_stop import (
     Answer, does_not_answer, may_match, RUNNING, stop_answer, STOP_TIMEOUT, twins)
-from drive_can_bridge.process.local_way import matches, meant
+from drive_can_bridge.process.local_way import meant
+from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unoffered
 from drive_can_bridge.process.presence import Present, short
 from drive_can_bridge.ros.client.calls import (
     HasHandle, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
@@ -30,12 +31,6 @@ from drive_can_bridge.ros.recognition import drives_among, namespace_of
 STOP_AGAIN = 1.0
 #: s that it may take to hear whether a drive is online
 _ONLINE_TIMEOUT = 5.0
-#: s that anything else may take: it is the bridge that says when it is over
-CONTROL_TIMEOUT = 120.0
-
-
-class UnknownDrive(Exception):
-    """A word names no drive."""
 
 
 class _Stopping:
@@ -191,38 +186,34 @@ class Order:
 
 
 ORDERS: Mapping[str, Order] = {
-    'enable': Order('enable', lambda: SetBool.Request(data=True)),
-    'disable': Order('enable', lambda: SetBool.Request(data=False)),
-    'reset': Order('reset_fault', Trigger.Request),
+    'enable': Order(SERVICES['enable'], lambda: SetBool.Request(data=True)),
+    'disable': Order(SERVICES['disable'], lambda: SetBool.Request(data=False)),
+    'reset': Order(SERVICES['reset'], Trigger.Request),
 }
 
 
-def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) -> list[Answer]:
+def known_drives(graph: Graph, place: str | None) -> list[str]:
     """
-    Tell drives something, all of them at once.
+    Return the full names of the drives in a namespace, or in those of a pattern.
 
-    :param order: of :data:`ORDERS`.
-    :param words: names, patterns or full names; a full name says which bridge is meant.
-    :raises UnknownDrive: a word names none.
+    :param place: None: the only one.
     :raises WhichBridge: there are several, and not together.
     :raises NoBridge: there is none.
     :raises SilentBridge: it does not answer.
     """
-    nodes: dict[str, None] = {}
-    known: dict[str | None, list[str]] = {}
-    for word in words:
-        place = namespace_of(word) if word.startswith('/') else namespace
-        if place not in known:
-            known[place] = [
-                node for each in find_bridges(graph, place) for node in each.nodes
-            ] if place and is_pattern(place) else [
-                f'{namespace_of(bridge)}/{drive}'
-                for drive, bridge in find_drives(graph, place).items()]
-        found = [node for node in known[place] if matches(word, node)]
-        if not found:
-            there = ', '.join(node.lstrip('/') for node in known[place])
-            raise UnknownDrive(f'no drive {word!r}; there are: {there}')
-        nodes.update(dict.fromkeys(found))
+    if is_some(place):
+        return [node for each in find_bridges(graph, place or '') for node in each.nodes]
+    return [f'{namespace_of(bridge)}/{drive}'
+            for drive, bridge in find_drives(graph, place).items()]
+
+
+def give(graph: Graph, order: str, nodes: Sequence[str]) -> list[Answer]:
+    """
+    Tell drives something, all of them at once.
+
+    :param order: of :data:`ORDERS`.
+    :param nodes: their full names.
+    """
     calls = NodeCalls(graph.client_node, CONTROL_TIMEOUT)
     answers: dict[str, Answer] = {}
     service = ORDERS[order].service
@@ -234,8 +225,7 @@ def give(graph: Graph, order: str, namespace: str | None, words: Sequence[str]) 
             elif calls.offered(node, service):
                 answers[node] = Answer(node, False, 'no answer')
             else:
-                answers[node] = Answer(node, False, f'nobody offers its ~/{service}: no control '
-                                                    'word, or its bridge has gone')
+                answers[node] = unoffered(node, order)
         calls.ask(node, service, ORDERS[order].request(), take, graph.now(), OFFER_TIMEOUT)
     for node in nodes:
         ask(node)

@@ -22,7 +22,9 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.errors import DriveCanError, NoBridge, SilentBridge, WhichBridge
+from drive_can_bridge.core.bridges import bridges_of, must_stand_together, stand_apart
+from drive_can_bridge.core.errors import (
+    DriveCanError, NoAnswer, NoBridge, SilentBridge, WhichBridge)
 from drive_can_bridge.core.text import is_ros_name
 from drive_can_bridge.process.environment import nobody
 from drive_can_bridge.process.presence import bridges, short
@@ -33,18 +35,6 @@ from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, na
 LOOK_PERIOD = 0.002
 #: s that an answer may take: many reads that nobody answers are slow
 _CALL_TIMEOUT = 120.0
-
-
-class NoAnswer(DriveCanError):
-    """
-    A node does not answer, or has gone.
-
-    :ivar asked: it was sent the question, and may have done what it was asked.
-    """
-
-    def __init__(self, text: str, *, asked: bool) -> None:
-        super().__init__(text)
-        self.asked = asked
 
 
 class Graph:
@@ -311,22 +301,14 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     :raises NoBridge: there is none.
     :raises SilentBridge: it does not answer.
     """
-    search = _search(graph, namespace, lambda names: bool(_which(names)))
+    search = _search(graph, namespace, lambda names: bool(stand_apart(names)))
     names = search.names
-    which = _which(names)
-    if which:
-        raise WhichBridge(which)
+    must_stand_together(names)
     silent = [name for name in names if not search.found[name].answered]
     if silent and len(names) > 1:
         raise WhichBridge(f'several bridges are running: {", ".join(names)}, and not every one '
                           f'answers: {", ".join(silent)}')
-    bridge_of: dict[str, str] = {}
-    for name in names:
-        for drive in search.found[name].drives or ():
-            if drive in bridge_of:
-                raise WhichBridge(f'{bridge_of[drive]} and {name} have a drive {drive} each: '
-                                  'start each in a namespace of its own')
-            bridge_of[drive] = name
+    bridge_of = bridges_of({name: search.found[name].drives or () for name in names})
     if silent or not bridge_of:
         raise _none(graph, namespace, search.found.values(), silent)
     return bridge_of
@@ -356,12 +338,3 @@ def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],
     hung = [f'{each.name}: {each.silence(domain)}, and holds its drives' for each in bridges()
             if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
     return SilentBridge('; '.join(hung)) if hung else NoBridge(nobody(pattern))
-
-
-def _which(names: Sequence[str]) -> str:
-    """Say why bridges do not stand together; '': they do."""
-    if len({namespace_of(name) for name in names}) > 1:
-        return f'several bridges are running: {", ".join(names)}; choose one with --namespace'
-    twice = next((name for name in names if names.count(name) > 1), '')
-    return twice and (f'{names.count(twice)} bridges are called {twice}: start each in a '
-                      'namespace of its own')
