@@ -15,7 +15,7 @@ from drive_can_bridge.process import local_stop
 from drive_can_bridge.process.local_server import Asked
 from drive_can_bridge.process.local_way import Inbound, packets_of, VERSION
 from drive_can_bridge.process.presence import bridges, Present, SWITCH
-from drive_can_bridge.ros.client import search
+from drive_can_bridge.ros.client import calls, search
 
 Run = Callable[..., tuple[int, list[str], str]]
 
@@ -33,6 +33,16 @@ def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch)
         told = capsys.readouterr()
         return code, told.out.splitlines(), told.err
     return started
+
+
+def no_way(*_: Any) -> Any:
+    """Fail, in the place of what is not to be done."""
+    raise AssertionError('looked for a bridge')
+
+
+def no_ros(patch: pytest.MonkeyPatch) -> None:
+    """Let no command become part of the graph."""
+    patch.setattr(calls.ClientNode, '__init__', no_way)
 
 
 class Line:

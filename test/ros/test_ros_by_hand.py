@@ -8,17 +8,18 @@ import re
 from typing import Any
 
 from bridges import LIFT, parameters, StartBridge
-from by_hand import Run
+from by_hand import Lines, no_ros, no_way, Run
 from clients import Client, LATCHED, wait_until
 from graph_builders import answer, hang, offer
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from transcripts import replayed, shown, stories
+import waiting
 
 from drive_can_bridge.cli.main import main
+from drive_can_bridge.process import local_stop
 from drive_can_bridge.process.presence import Presence
-from drive_can_bridge.ros.client import calls
 
 HOIST = {**LIFT, 'station': 3}
 STORIES = stories(__file__, 'by_hand.yaml')
@@ -36,9 +37,14 @@ def replay(story: str, run: Run) -> None:
 @pytest.fixture
 def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nobody look for a bridge."""
-    def look(*_: Any) -> None:
-        raise AssertionError('looked for a bridge')
-    monkeypatch.setattr(calls.ClientNode, '__init__', look)
+    no_ros(monkeypatch)
+    monkeypatch.setattr(local_stop, 'bridges', no_way)
+
+
+def pause() -> None:
+    """Let a quarter of a second pass."""
+    clock = waiting.clock()
+    clock.wait(clock.now() + 0.25)
 
 
 def states(bridge: Any, *names: str) -> list[str]:
@@ -60,7 +66,8 @@ def test_stop_stops_every_drive_of_every_bridge(bridge: StartBridge, run: Run) -
     assert {*states(one, 'lift', 'hoist'), *states(two, 'lift')} == {'disabled'}
 
 
-def test_names_patterns_and_namespaces(bridge: StartBridge, run: Run) -> None:
+def test_names_patterns_and_namespaces(
+        bridge: StartBridge, run: Run, locally: Lines) -> None:
     one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
     two = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
     for each in (one, two):
@@ -80,6 +87,8 @@ def test_names_patterns_and_namespaces(bridge: StartBridge, run: Run) -> None:
     assert run('stop', 'l*')[0] == 0
     assert (states(one, 'lift', 'hoist'), states(two, 'lift')) == (
         ['disabled', 'online'], ['disabled'])
+    replay('which lift, and no crane', run)
+    locally(one, two)
     replay('which lift, and no crane', run)
     run_all()
     assert run('disable', '--namespace', 'a', '*')[0] == 0
@@ -236,30 +245,43 @@ def test_wrong_usage_is_told_before_anybody_is_looked_for(words: tuple[str, ...]
     assert code == 2
 
 
-def test_a_fault_is_reset(bridge: StartBridge, run: Run) -> None:
+@pytest.mark.parametrize('listens', [False, True])
+def test_a_fault_is_reset(
+        bridge: StartBridge, run: Run, locally: Lines, listens: bool) -> None:
     one = bridge(parameters(lift=LIFT))
     one.online()
+    if listens:
+        locally(one)
     one.played['lift'].fault('trip')
     wait_until(lambda: states(one, 'lift') == ['fault'])
     code, lines, _ = run('reset', 'lift')
     assert (code, states(one, 'lift')) == (0, ['disabled']), lines
 
 
+@pytest.mark.parametrize('locals_listen', [False, True])
 def test_bridges_of_one_namespace_stand_together(
-        bridge: StartBridge, client: Client, run: Run, tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch) -> None:
+        bridge: StartBridge, client: Client, run: Run, tmp_path: Path, locally: Lines,
+        locals_listen: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     one, two = (bridge(parameters(**drives), key='/**', arguments=(
         '-r', '__ns:=/cell', '-r', f'__node:={name}'))
         for name, drives in (('left', {'hoist': HOIST}), ('right', {'lift': LIFT})))
     for each in (one, two):
         each.online()
-    replay('a bridge a bus', run)
+    if locals_listen:   # what is shown is the same, word for word
+        locally(one, two)
+        with monkeypatch.context() as patch:
+            no_ros(patch)
+            replay('a bridge a bus', run)
+    else:
+        replay('a bridge a bus', run)
     assert [played.value('ramp_time') for each in (one, two) for played in each.played.values()
             ] == [1.0, 3.25]
     hang(client, '/cell/mute')
+    pause()     # bridges look at the graph a few times a second
     replay('a bridge a bus, and one that does not answer', run)
     answer(client, '/b/bridge')()
+    pause()
     replay('a bridge a bus, and one elsewhere', run)
 
 

@@ -6,23 +6,20 @@ import os
 from typing import Any
 
 from bridges import LIFT, parameters, StartBridge
-from by_hand import Lines, Run
+from by_hand import Lines, no_ros, Run
 from clients import wait_until
 import pytest
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.process.presence import Presence
-from drive_can_bridge.ros.client import calls
 
 HOIST = {**LIFT, 'station': 3}
 
 
 @pytest.fixture
-def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no command become part of the graph."""
-    def begin(*_: Any) -> None:
-        raise AssertionError('went through ROS')
-    monkeypatch.setattr(calls.ClientNode, '__init__', begin)
+    no_ros(monkeypatch)
 
 
 def states(bridge: Any) -> list[str]:
@@ -31,7 +28,7 @@ def states(bridge: Any) -> list[str]:
             for each in bridge.node.drives.values()]
 
 
-@pytest.mark.usefixtures('no_ros')
+@pytest.mark.usefixtures('alone')
 def test_ros_is_not_needed_where_all_are_here(
         bridge: StartBridge, run: Run, locally: Lines) -> None:
     one = bridge(parameters(lift=LIFT, hoist=HOIST), arguments=('-r', '__ns:=/a'))
@@ -51,7 +48,7 @@ def test_ros_is_not_needed_where_all_are_here(
         'a/hoist: ready'], '')
 
 
-@pytest.mark.usefixtures('no_ros')
+@pytest.mark.usefixtures('alone')
 def test_other_domains_are_stopped_too_unless_something_is_named(
         bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
     here = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/a'))
