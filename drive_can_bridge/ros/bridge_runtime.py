@@ -270,7 +270,8 @@ class BridgeRuntime:
             closing.callback(self._passing.end)
             self.local_way = LocalWay(
                 presence, domain, name, self.drives, list(configuration.drives), seen=seen,
-                get=get, spinner=spinner, pass_on=self._passing.begin, warn=log.warning, clock=clock)
+                get=get, spinner=spinner, pass_on=self._passing.begin, warn=log.warning,
+                clock=clock)
             closing.callback(self.local_way.close)
             self._closing = closing.pop_all()
 
