@@ -128,6 +128,7 @@ class Host:
 def host(monkeypatch: pytest.MonkeyPatch, threads: None) -> Iterator[Host]:
     """Listen by a name that nobody else on this machine looks for."""
     monkeypatch.setattr(presence, 'PREFIX', f'test_{os.getpid()}')
+    monkeypatch.setattr(local_server, 'PATIENCE', 60.0)     # whoever else has the processors
     made = Host()
     yield made
     made.close()
@@ -183,6 +184,7 @@ def test_whoever_asks_nothing_or_rubbish_is_hung_up_on(
                     break
         assert all(b'no\0' in each or each in (b'.end', b'.\0\0\0') for each in received)
         caller.close()
+    monkeypatch.setattr(local_server, 'PATIENCE', 60.0)
     assert ask(host, 'who')[-1] == ['end']
 
 
@@ -213,6 +215,7 @@ def test_a_caller_that_does_not_read_costs_nobody_anything(
             if deaf.take() is None:
                 time.sleep(0.001)
     deaf.close()
+    monkeypatch.setattr(local_server, 'UNREAD_PATIENCE', 60.0)
     reader = host.call()    # the same, read
     reader.ask('much')
     assert len(answers(reader)) == 3001
