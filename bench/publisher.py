@@ -58,8 +58,9 @@ class JointCommands:
         names = [f'joint{number}' for number in range(drives)]
         self._publisher = node.create_publisher(
             JointState, '/drive_can_bridge/joint_commands', 1)
-        self._messages = [serialize_message(JointState(name=names, velocity=[speed] * drives))
-                          for speed in (0.0, 0.1)]
+        # as messages: a publisher makes other bytes than a serialisation
+        self._messages = [JointState(name=names, position=[0.0] * drives,
+                                     velocity=[speed] * drives) for speed in (0.0, 0.1)]
         self._rate = 0.0
 
     def set_rate(self, rate: float) -> bool:

@@ -94,6 +94,7 @@ class CommandTopic:
         code = _CODES.get(self._type)
         self._read = read or partial(deserialize_message, message_type=self._type)
         self._structs = [struct.Struct(order + code) for order in '><'] if code else []
+        self._shortest = HEADER + (self._structs[0].size if self._structs else 0)
         self._ages = CommandAges()
         self.forget = self._ages.forget
 
@@ -149,6 +150,8 @@ class CommandTopic:
             code = self._structs[data[1] & 1]       # the lowest bit says: low byte first
             if HEADER + code.size <= len(data) < HEADER + code.size + 4:
                 return code.unpack_from(data, HEADER)[0]
+        if len(data) < self._shortest:  # no middleware need have words for that
+            raise ValueError(f'{len(data)} bytes, which end too soon')
         if len(data) > LENGTH_MAX:
             raise ValueError(f'{len(data)} bytes, at most {LENGTH_MAX} are looked at')
         message = self._read(data)

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.core.command_age import Age
+from drive_can_bridge.ros import polled_topics
 from drive_can_bridge.ros.polled_topics import CommandTopic
 
 MS = 1_000_000
@@ -99,6 +100,19 @@ def test_rubbish_is_no_exception(kind: Any, data: bytes) -> None:
     taken.take()
     assert len(taken.used) + len(taken.unreadable) == 2
     assert taken.used
+
+
+@pytest.mark.parametrize('kind, size', [(Float64, 12), (Int64, 12), (Bool, 5), (JointState, 4)])
+def test_what_is_too_short_reaches_no_deserialiser(kind: Any, size: int,
+                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    def deserialise(*_: Any, **__: Any) -> None:
+        raise AssertionError('some middlewares end the process')
+    monkeypatch.setattr(polled_topics, 'deserialize_message', deserialise)
+    taken = Taken(kind)
+    for length in range(size):
+        taken.subscription.put(bytes(length))
+        taken.take()
+    assert taken.unreadable == [f'{length} bytes, which end too soon' for length in range(size)]
 
 
 def test_a_joint_state_is_an_object() -> None:
