@@ -15,6 +15,7 @@ import configparser
 from dataclasses import dataclass, field
 import io
 import logging
+import math
 import re
 from types import ModuleType
 from typing import Any
@@ -53,6 +54,9 @@ _MEANING = ('bits', 'values', 'neutral', 'neutral_from', 'limit', 'protected')
 _SI_UNITS = {0xB400: ('rev', 1.0), 0xB500: ('inc', 1.0), 0x4100: ('deg', 1.0),
              0x1000: ('rad', 1.0), 0xB447: ('rpm', 1.0), 0xB403: ('rpm', 60.0),
              0xB503: ('inc/s', 1.0), 0x4103: ('deg/s', 1.0), 0x1003: ('rad/s', 1.0)}
+#: revolutions by which a command may miss where the axis stays, and still arms; in other units
+_ARMING = 0.01
+_OF_A_REVOLUTION = {'rev': 1.0, 'deg': 360.0, 'rad': 2.0 * math.pi}
 #: everything that the library raises about a section that makes no sense
 _ERRORS = (ValueError, OverflowError, KeyError, AttributeError, TypeError,
            configparser.Error)
@@ -161,7 +165,7 @@ def read_eds(text: str, protocols: Sequence[str] = ()) -> Found:
                            'entries')
     if standard:
         _standardise(found, {index: _si_unit(sections.get(index, info))
-                             for index in ('60a8', '60a9')})
+                             for index in ('60a8', '60a9')}, _turning(sections))
     return found
 
 
@@ -309,20 +313,41 @@ def _limits(section: Section, variable: Any, scale: float) -> dict[str, float]:
 # -- CiA 402 --------------------------------------------------------------------------------------
 
 
+def _value(section: Section) -> int | None:
+    """Return what the file says that an object holds; None: it does not."""
+    try:
+        return int(section.get('ParameterValue') or section.get('DefaultValue'), 0)
+    except ValueError:
+        return None
+
+
+def _turning(sections: dict[str, Section]) -> str:
+    """Say what makes the revolutions that positions are counted in: CiA 402 has a gear, 6091h."""
+    motor, shaft = (_value(sections.get(name, Section('', 0))) for name in (
+        '6091sub1', '6091sub2'))
+    if motor and shaft and motor != shaft:
+        return (f'of the joint: 60A8h counts behind the gear, 6091h = {motor}:{shaft} '
+                '(joint: gear_ratio: 1.0)')
+    return ('of the motor: 60A8h counts before any gear that 6091h does not name '
+            '(joint: gear_ratio)')
+
+
 def _si_unit(section: Section) -> tuple[str, float] | None:
     """Return the unit that 60A8h or 60A9h names in the file, and how many of it a step is."""
-    text = section.get('ParameterValue') or section.get('DefaultValue')
-    try:
-        value = int(text, 0)
-    except ValueError:
+    value = _value(section)
+    if value is None:
         return None
     name, count = _SI_UNITS.get(value >> 8 & 0xFFFF, ('', 0.0))
     exponent = value >> 24 & 0xFF
     return (name, count * 10.0 ** (exponent - (exponent & 0x80) * 2)) if name else None
 
 
-def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> None:
-    """Call standard objects by their names, and say what is known of them."""
+def _standardise(found: Found, units: dict[str, tuple[str, float] | None], turning: str) -> None:
+    """
+    Call standard objects by their names, and say what is known of them.
+
+    :param turning: what makes the revolutions of positions.
+    """
     shipped = check(profiles_directory() / f'{_STANDARD}.yaml')
     known = {(entry['index'], entry['subindex']): name for name, entry in shipped.entries.items()}
     found.drafts = [draft for draft in found.drafts if draft.entry['index'] not in _BUILT_IN]
@@ -332,7 +357,7 @@ def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> No
     raw = []
     for draft in list(found.drafts):
         try:
-            if not _complete(draft, shipped, units, names):
+            if not _complete(draft, shipped, units, names, turning):
                 raw.append(draft)
         except Unusable as error:
             found.drafts.remove(draft)
@@ -353,7 +378,7 @@ def _standardise(found: Found, units: dict[str, tuple[str, float] | None]) -> No
 
 
 def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float] | None],
-              names: set[str]) -> bool:
+              names: set[str], turning: str) -> bool:
     """Add to an entry what the standard says of it; return whether its unit is known."""
     entry, known = draft.entry, shipped.entries.get(draft.name, {})
     if entry['access'] != 'ro':
@@ -382,8 +407,12 @@ def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float]
         if factor != 1.0:
             entry['scale'] = rounded(entry.get('scale', 1.0) * factor)
     if known.get('neutral_from') in names:
-        entry['arming_tolerance'] = rounded(known['arming_tolerance'] / scale
-                                            * entry.get('scale', 1.0))
+        revolution = _OF_A_REVOLUTION.get(name, 0.0)    # unknown: a step may be any angle
+        entry['arming_tolerance'] = rounded(_ARMING * revolution)
+        draft.remarks.append(
+            f'arming_tolerance: {_ARMING} rev {turning}' if revolution else
+            'arming_tolerance 0: only the latched value exactly, as ~/request shows it, arms; set '
+            f'as many steps as make {_ARMING} rev')
     elif entry.pop('neutral_from', None) is not None:
         draft.remarks.append(f'neutral_from left out: the file has no {known["neutral_from"]}')
     return has_unit

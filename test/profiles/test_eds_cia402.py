@@ -92,7 +92,8 @@ def test_what_is_the_makers_own_is_raw_and_said_to_be(tmp_path: Path) -> None:
     made = bring(tmp_path, eds())
     target = made.parameters['target_position']
     assert (target.scale, target.unit, target.scaled) == (1.0, '', False)
-    assert (target.neutral_from, target.arming_tolerance) == ('actual_position', 100)
+    assert (target.neutral_from, target.arming_tolerance) == ('actual_position', 0)
+    assert '# arming_tolerance 0: only the latched value exactly' in made.built.text
     velocity = made.parameters['target_velocity']
     assert (velocity.unit, velocity.minimum, velocity.maximum) == ('', -5000, 5000)
     assert told(made) == stories(__file__, 'imports.yaml')['axis.eds']
@@ -109,8 +110,35 @@ def test_units_that_the_file_names(tmp_path: Path, value: str, scale: float, uni
     velocity = made.parameters['target_velocity']
     assert (velocity.scale, velocity.unit) == (scale, unit)
     assert velocity.maximum == 5000 * scale
-    assert made.parameters['target_position'].unit == 'inc'
+    target = made.parameters['target_position']
+    assert (target.unit, target.arming_tolerance) == ('inc', 0)     # of whatever size
     assert made.parameters['profile_acceleration'].unit == ''
+
+
+@pytest.mark.parametrize(('value', 'scale', 'unit', 'tolerance'), [
+    ('0x00B40000', 1.0, 'rev', 0.01), ('0xFF410000', 0.1, 'deg', 3.6),
+    ('0xFDB40000', 0.001, 'rev', 0.01), ('0xFA100000', 0.000001, 'rad', 0.0628318531)])
+def test_a_hundredth_of_a_revolution_arms_whatever_a_step_is(
+        tmp_path: Path, value: str, scale: float, unit: str, tolerance: float) -> None:
+    """Not 100 steps: 9 degrees with a file of Nanotec (FF410000h), 100 revolutions with others."""
+    made = bring(tmp_path, eds(
+        ('60A8', 'SI unit position', 7, 'rw', f'DefaultValue={value}')))
+    target = made.parameters['target_position']
+    assert (target.scale, target.unit) == (scale, unit)
+    assert target.arming_tolerance == pytest.approx(tolerance)
+    assert '# arming_tolerance: 0.01 rev of the motor' in made.built.text
+
+
+@pytest.mark.parametrize(('motor', 'shaft', 'says'), [
+    (50, 1, 'of the joint: 60A8h counts behind the gear, 6091h = 50:1'),
+    (1, 1, 'of the motor')])
+def test_whose_revolution_it_is(tmp_path: Path, motor: int, shaft: int, says: str) -> None:
+    made = bring(tmp_path, eds(
+        ('60A8', 'SI unit position', 7, 'rw', 'DefaultValue=0x00B40000'),
+        ('6091sub1', 'Motor revolutions', 7, 'rw', f'DefaultValue={motor}'),
+        ('6091sub2', 'Shaft revolutions', 7, 'rw', f'DefaultValue={shaft}'),
+        ('6091', 'Gear ratio', 7, 'rw', '')))
+    assert f'arming_tolerance: 0.01 rev {says}' in made.built.text
 
 
 def test_a_unit_that_makes_no_sense_costs_its_entries_only(tmp_path: Path) -> None:
