@@ -297,8 +297,15 @@ pp_halts = Text(
     'way; publish it continuously, or set 0')
 one_missing = Text('missing, allowed is one of {allowed}')
 interpolated = Text(
-    "'{name}' is interpolated by the drive from SYNC to SYNC, allowed is transmission: sync "
-    'with a period of at most {most:g} s')
+    "'{name}' is interpolated by the drive from setpoint to setpoint, allowed is a period of at "
+    'most {most:g} s')
+ip_by_event = Text(
+    "'event' is nothing for mode ip, which goes from SYNC to SYNC, allowed is transmission: sync")
+interpolated_by_event = Text(
+    "'event' with mode {mode}: the drive interpolates from SYNC to SYNC, and without it every "
+    'jitter of the bridge moves the axis')
+period_jitters = Text(
+    '{period:g} s: a process without a real-time kernel jitters by tenths of a millisecond')
 no_event_timer = Text(
     '{period:g} s is no event timer, allowed with transmission: event are whole milliseconds '
     'up to {most:g} s')

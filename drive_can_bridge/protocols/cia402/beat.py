@@ -55,6 +55,15 @@ class InStep(Protocol):
         """From when on SYNC starts nothing that is in its buffers; infinity: not known."""
 
 
+class EventTimer(CycleTimer):
+    """When a drive is due that hears no SYNC: a stop jolts nobody else, and goes out at once."""
+
+    __slots__ = ()
+
+    def hurry(self, now: float) -> None:
+        self.no_later(max(now, self.began_at + CYCLE_SPACING_MIN))
+
+
 class Turn(CycleTimer):
     """
     When one drive is due: with all others of its bus.

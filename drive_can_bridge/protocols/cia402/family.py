@@ -24,6 +24,8 @@ from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s: longest period in which a drive that interpolates gets its setpoints
 INTERPOLATION_MAX = 0.02
+#: s: periods of which the jitter of a process without a real-time kernel is a good part
+JITTERS_BELOW = 0.005
 #: s: longest event timer, and longest time of a heartbeat consumer (16 bits of ms)
 TIMER_MAX = 65.535
 _SETPOINTS = {(mode.index, mode.subindex) for mode in MODES.values()}
@@ -107,6 +109,10 @@ class Cia402(Family):
                     name=parameter.name, mode=options.mode))
         if not options.ramp_bits and options.mode != 'vl':
             yield Complaint('ramp_bits', complaints.vl_only(mode=options.mode))
+        if mode.interpolated and options.transmission == 'event' and options.mode != 'ip':
+            yield Complaint('transmission', complaints.interpolated_by_event(mode=options.mode))
+        if drive.period < JITTERS_BELOW:
+            yield Complaint('period', complaints.period_jitters(period=drive.period))
         if options.mode == 'pp' and drive.command_timeout > 0:
             yield Complaint('command_timeout', (
                 complaints.pp_halts(timeout=drive.command_timeout)))
@@ -265,9 +271,10 @@ class Cia402(Family):
         elif mode.position and not setpoint.neutral_from:
             yield Complaint(f'profile.parameters.{setpoint.name}.neutral_from', (
                 complaints.no_neutral_position(name=name)))
-        if mode.interpolated and not (
-                drive.options.transmission == 'sync' and drive.period <= INTERPOLATION_MAX):
+        if mode.interpolated and drive.period > INTERPOLATION_MAX:
             yield Complaint('mode', complaints.interpolated(name=name, most=INTERPOLATION_MAX))
+        if name == 'ip' and drive.options.transmission == 'event':
+            yield Complaint('transmission', complaints.ip_by_event())
 
     def _check_times(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         options, milliseconds = drive.options, 1000 * drive.period

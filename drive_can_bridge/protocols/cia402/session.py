@@ -41,7 +41,7 @@ from drive_can_bridge.protocols.canopen.node import (
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import (
-    Beat, BridgeHeartbeat, FreeSync, smallest, Turn)
+    Beat, BridgeHeartbeat, EventTimer, FreeSync, smallest, Turn)
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoTransactor
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
@@ -142,7 +142,8 @@ class Cia402Session(Session):
         self._beat = beat or Beat()
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
         self._answers = Answers(self, silence='no complete set of PDOs',
-                               in_turn=not self._synchronous, timer=self._turn)
+                               in_turn=not self._synchronous,
+                               timer=self._turn or EventTimer(drive.period))
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)

@@ -51,12 +51,34 @@ def test_a_position_stays_where_it_is(mode: str, neutral: float | None) -> None:
         'profile.parameters.target_position.neutral_from': says('no_neutral_position', name=mode)}
 
 
-@pytest.mark.parametrize('options', [
-    {'period': 0.03}, {'transmission': 'event'}])
-def test_what_is_interpolated_needs_sync(options: dict[str, Any]) -> None:
+def test_what_is_interpolated_needs_a_setpoint_every_20_ms() -> None:
     for mode in ('csp', 'csv', 'cst', 'ip'):
-        assert wrong(mode, **options) == {'mode': says('interpolated', name=mode, most=0.02)}
-    assert wrong('pv', **options) == {}
+        assert wrong(mode, period=0.03) == {'mode': says('interpolated', name=mode, most=0.02)}
+    assert wrong('csp', period=0.03, transmission='event') == {
+        'mode': says('interpolated', name='csp', most=0.02)}
+    assert wrong('pv', period=0.03) == {}
+
+
+def warned(mode: str, **options: Any) -> dict[str, Sentence]:
+    return dict(FAMILY.warnings(servo(mode, **options)))
+
+
+@pytest.mark.parametrize('mode', ['csp', 'csv', 'cst'])
+def test_it_is_warned_about_by_event(mode: str) -> None:
+    assert wrong(mode, transmission='event', period=0.02) == {}
+    assert warned(mode, transmission='event', period=0.02) == {
+        'transmission': says('interpolated_by_event', mode=mode)}
+    assert warned(mode, period=0.02) == {}
+    assert warned('pv', transmission='event') == {}
+
+
+def test_ip_needs_sync() -> None:
+    assert wrong('ip', transmission='event') == {'transmission': says('ip_by_event')}
+
+
+def test_a_period_that_jitters() -> None:
+    assert warned('csp', period=0.004) == {'period': says('period_jitters', period=0.004)}
+    assert warned('csp', period=0.005) == {}
 
 
 def test_lists_that_are_too_short_say_what_is_needed() -> None:

@@ -436,8 +436,8 @@ class TestTheFirst:
 class TestEvent:
 
     @staticmethod
-    def meet(**options: Any) -> Axis:
-        axis = Axis('pv', transmission='event', objects={
+    def meet(mode: str = 'pv', **options: Any) -> Axis:
+        axis = Axis(mode, transmission='event', objects={
             (0x1800, 3): bytes(2), (0x1800, 5): bytes(2)}, **options)
         takes = axis.drive.takes
         axis.drive.takes = lambda sent: [   # type: ignore[method-assign]
@@ -489,6 +489,20 @@ class TestEvent:
         assert len(axis.talk.events(ProcessDataReceived)) > 50
         assert axis.session.statistics.rejected == axis.session.statistics.late == 0
         assert axis.session.statistics.missed == 0
+
+    @pytest.mark.parametrize('mode', ['csp', 'pv'])
+    def test_a_stop_goes_out_at_once(self, mode: str) -> None:
+        axis = self.meet(mode, period=0.02)
+        axis.asks(ControlAction.ENABLE)
+        for _ in range(40):
+            axis.live(0.001)
+            if axis.words():
+                break
+        axis.live(0.006)
+        axis.take()
+        axis.deliver(axis.talk.asks(ControlAction.QUICK_STOP, axis.now))
+        axis.live(0.0)
+        assert axis.words() == ['0200']
 
     def test_missed_is_a_period_and_a_half_without_a_set(self) -> None:
         axis = self.meet()
