@@ -6,9 +6,11 @@ Each says what showed it. What they have in common stands in :class:`ServoDrive`
 """
 
 import math
+from typing import Any
+
+from literal_drives import ServoDrive
 
 from drive_can_bridge.core.frame import Frame
-from literal_drives import ServoDrive
 
 NO_OBJECT, ACCESS = 0x06020000, 0x06010000
 
@@ -204,3 +206,14 @@ class BootsTwice(AcceptsAnything):
 
     def restarts(self) -> list[Frame]:
         return 2 * super().restarts()
+
+
+def odd_heartbeats(axis: Any, length: int) -> None:
+    """Have the heartbeats of an axis be 0 or 8 bytes long (reports of users of ros2_canopen)."""
+    says = axis.says
+
+    def otherwise(text: str) -> None:
+        state = text[4:]
+        says(text[:4] + state.ljust(2 * length, '0')[:2 * length]
+             if text.startswith('705#') and state != '00' else text)     # not the boot-up
+    axis.says = otherwise

@@ -385,7 +385,9 @@ no_round = Text(
     do='power, cable, station, bit rate; a longer period for a slow drive')
 device_restarted = Text('the device restarted', do='see why it lost its power')
 no_heartbeat = Text(
+    '{answers:?}answers, but there is no heartbeat for {timeout:g} s',
     'no heartbeat for {timeout:g} s',
+    fields='timeout answers',
     do='power, cable; the producer of the device (1017h)')
 sync_not_begun = Text(
     'SYNC begins when every drive of the bus that hears it is known not to be enabled, was told '
@@ -395,7 +397,23 @@ sync_watched = Text(
     'the drive watches SYNC (1006h = {period} us): one cycle that is late by {late:.4g} s is a '
     'fault for it',
     do='keep the computer from being late (real-time priority), or set 1006h to 0 in the drive')
-node_state = Text('node is {state}', do='start the node (nmt_start)')
+node_state = Text(
+    '{answers:?}answers, but is {state}: {emergency}',
+    '{answers:?}answers, but is {state}',
+    'node is {state}',
+    fields='state answers emergency',
+    do='start the node (nmt_start); remove the cause of an emergency')
+answers_without = Text(
+    'answers, but there is {lacks}: {emergency}',
+    'answers, but there is {lacks}',
+    fields='lacks emergency',
+    do='see what its PDOs are (mapping); remove the cause of an emergency')
+answers_otherwise = Text(
+    'answers, but not as CANopen has it: {what}',
+    do='look for another device with its identifiers; see what its manual says of CANopen')
+pdo_length = Text(
+    'TPDO {number} has {found:#byte} instead of {wanted}',
+    do='let the bridge write its mapping (mapping configure), or correct the lists')
 silent = Text('{what}: {look_at}', do='look at what it names')
 lost_because = Text('{why}: {gap}', do='correct cyclic_response')
 maps_unread = Text(
@@ -533,6 +551,9 @@ watch_stays = Text(
     '{what} watches the bridge and is left as it is (mapping: verify): an ordered stop ends in '
     'a fault of the drive',
     do='set 1016h to 0, or let the bridge write it (mapping configure)')
+heartbeat_without_content = Text(
+    'heartbeat without content: this drive cannot be watched by it',
+    do='set heartbeat_timeout to 0; its PDOs show whether it is there')
 heartbeat_missing = Text(
     "no heartbeat although heartbeat_timeout is set: configure the device's heartbeat producer "
     '(1017h)',
@@ -661,6 +682,10 @@ bus_of_drive_opening = Text('bus {bus} is not open yet', do='wait')
 never_seen = Text(
     'not seen since start: {why}; check its power, cable, station number and bit rate',
     do='check its power, cable, station number and bit rate')
+not_online = Text('not online since start: {why}', do='see what it says')
+offline_since = Text(
+    'offline since {since}, was online before: {why}',
+    do='see what it says')
 not_seen = Text('not seen since start: {why}', do='see what diagnostics say of the bus')
 drives_missing = Text(
     '{online} of {drives:#drive} online; not seen: {missing:, }',

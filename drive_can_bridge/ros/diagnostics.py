@@ -39,6 +39,8 @@ GRACE = 5.0
 _FIRST_START = frozenset((
     'looked_for', 'maps_unread', 'cycles_unanswered', 'reads_unanswered', 'rounds_unanswered',
     'silent', 'reconnected'))
+#: what a session says of a drive that sends something, so that power and cable are in order
+_ANSWERS = frozenset(('answers_without', 'answers_otherwise', 'pdo_length'))
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
 #: s for which a command that changed nothing is worth a warning
@@ -52,9 +54,12 @@ def absence(drive: DriveNode) -> Sentence:
     if exchange.bus_state != 'up':      # which is told once, there
         return (sentences.bus_of_drive_opening if exchange.bus_state == 'opening' else
                 sentences.bus_of_drive_down)(exchange.bus.name)
+    answers = what.code in _ANSWERS or 'answers' in what.fields
     if not session.ever_online:
-        return sentences.never_seen(what)
+        return (sentences.not_online if answers else sentences.never_seen)(what)
     since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))
+    if answers:
+        return sentences.offline_since(since, what)
     if what.code in _FIRST_START:
         what = drive.lost_for
     return sentences.silent_since(since, what)
@@ -101,7 +106,7 @@ class Attendance:
             with drive.exchange.entered() as entered:
                 told = absence(drive) if entered else sentences.bus_hangs(drive.exchange.bus.name)
             self._log.speaker(drive.name).warning(
-                told if told.code == 'never_seen' else sentences.not_seen(told))
+                told if told.code in ('never_seen', 'not_online') else sentences.not_seen(told))
         online = sum(drive.session.online for drive in self._drives)
         self._log.warning(sentences.drives_missing(
             online, len(self._drives), [drive.name for drive in missing]))

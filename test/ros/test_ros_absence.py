@@ -67,6 +67,18 @@ def test_what_is_known_of_it_now_is_said() -> None:
     assert told == says('silent_since', why=why)
 
 
+@pytest.mark.parametrize('advice', [
+    sentences.node_state('pre-operational', answers=True, emergency='emergency 1000h'),
+    sentences.no_heartbeat(0.1, answers=True), sentences.pdo_length(1, 2, 6),
+    sentences.answers_without('no complete set of PDOs', ''),
+    sentences.answers_otherwise('SDO with 3 data bytes instead of 8')])
+@pytest.mark.parametrize('ever', [True, False])
+def test_one_that_sends_something_has_power_and_a_cable(advice: Sentence, ever: bool) -> None:
+    told = absence(drive(ever_online=ever, advice=advice))
+    assert told == says('offline_since' if ever else 'not_online', why=advice)
+    assert 'cable' not in told and 'silent' not in told
+
+
 @pytest.mark.parametrize(('state', 'ever', 'expected'), [
     ('down', True, 'bus_of_drive_down'), ('down', False, 'bus_of_drive_down'),
     ('opening', False, 'bus_of_drive_opening')])

@@ -209,11 +209,14 @@ def decode_heartbeat(data: bytes) -> NmtState:
     """
     Return the state of a boot-up frame or heartbeat.
 
-    Bit 7 is left out: answers to node guarding, which have the same identifier, toggle it.
+    Bit 7 is left out: answers to node guarding, which have the same identifier, toggle it. Some
+    devices send eight bytes; the first one is the state.
 
-    :raises RemoteProtocolError: not one byte, or a state that does not exist.
+    :raises RemoteProtocolError: not one byte, nor eight, or a state that does not exist.
     """
-    if len(data) != 1:
+    if not data:
+        raise RemoteProtocolError('heartbeat without content')
+    if len(data) not in (1, 8):
         raise RemoteProtocolError(f'heartbeat with {len(data)} data bytes instead of 1')
     try:
         return NmtState(data[0] & 0x7F)

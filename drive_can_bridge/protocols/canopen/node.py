@@ -76,7 +76,7 @@ class Node:
         self.state: NmtState | None = None
         self.emergency: Emergency | None = None
         self.free_at = math.inf
-        self.heartbeat_lost = False
+        self.heartbeat_lost = self.without_content = False
         self.pdo_at = self.heard_at = -math.inf
         self._heartbeat_at = self._said_at = -math.inf      # or the boot-up frame
         self._interval: float | None = None     # None: there was no heartbeat yet
@@ -106,6 +106,7 @@ class Node:
             if self._interval is not None:
                 self.free_at = self._blocked_until = now + self._belief
             return Change.RESTARTED
+        self.without_content = False
         if self._interval is None:
             self._interval = 0.0
         elif interval <= INTERVAL_MAX:
@@ -117,6 +118,13 @@ class Node:
             return Change.OPERATIONAL if waited or recovered else Change.NONE
         self.free_at = self._blocked_until = now + self._belief
         return Change.STILL_NOT if was_blocked else Change.NOT_OPERATIONAL
+
+    def take_empty_heartbeat(self, report: Reporter, now: float) -> None:
+        """Take a heartbeat without content, and tell the first."""
+        self.heard_at = now
+        if not self.without_content:
+            self.without_content = True
+            report.reject(sentences.heartbeat_without_content())
 
     def receive_emergency(self, emergency: Emergency) -> Sentence:
         """
@@ -151,7 +159,8 @@ class Node:
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` wants to be called."""
-        if self.state is None or self.heartbeat_lost or self.heartbeat_timeout <= 0.0:
+        if (self.state is None or self.heartbeat_lost or self.without_content
+                or self.heartbeat_timeout <= 0.0):
             return math.inf
         return self._heartbeat_at + self.heartbeat_timeout
 
@@ -191,6 +200,8 @@ class Node:
     @property
     def missing(self) -> Sentence:
         """What the node should say, but does not; '' if nothing."""
+        if self.without_content and self.heartbeat_timeout > 0:
+            return sentences.heartbeat_without_content()
         never = self.state is None or self.heartbeat_lost and self._interval is None
         return sentences.heartbeat_missing() if never and self.heartbeat_timeout > 0 else NOTHING
 

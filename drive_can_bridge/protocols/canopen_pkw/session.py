@@ -46,6 +46,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
@@ -58,6 +59,9 @@ from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
+
+#: what a node sends beside the answers of its mailbox; plus its number
+_NODE_SAYS = network.HEARTBEAT_BASE, network.EMERGENCY_BASE
 
 
 class Rounds:
@@ -174,6 +178,7 @@ class PkwSession(Session):
         options, placement = drive.options, addresses.Placement.of(drive)
         self._layout = Layout(options.layout)
         self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
+        self._heard = Heard('no complete round of reads')
         self._started_at = -math.inf    # by NMT, the last time
         self._transactor = MailboxTransactor(
             self._send, order=options.abort_code_order, retry=self.retry,
@@ -250,6 +255,8 @@ class PkwSession(Session):
             self.report.advice = self._rounds.gap or sentences.rounds_unanswered()
 
     def lost(self, now: float, *, was_online: bool) -> None:
+        if was_online:
+            self._heard.clear()
         self._forget_exchange()
 
     def _forget_exchange(self) -> None:
@@ -336,7 +343,9 @@ class PkwSession(Session):
     def _node_says(self, identifier: int, data: bytes, now: float) -> bool:
         """Take a frame; tell whether it was the node's heartbeat or emergency message."""
         base = identifier - self._node.number
-        if base == network.HEARTBEAT_BASE:
+        if base == network.HEARTBEAT_BASE and not data:
+            self._node.take_empty_heartbeat(self.report, now)
+        elif base == network.HEARTBEAT_BASE:
             self._take_heartbeat(network.decode_heartbeat(data), now)
         elif base == network.EMERGENCY_BASE:
             self._node.take_emergency(data, self.report)
@@ -379,6 +388,9 @@ class PkwSession(Session):
         if extended:
             return
         options = self.configuration.options
+        if not self.online and (identifier == options.response_cob_id
+                                or identifier - self._node.number in _NODE_SAYS):
+            self._heard.came(now)
         try:
             if identifier == options.response_cob_id:
                 self._writers.again.heard(now)
@@ -396,6 +408,14 @@ class PkwSession(Session):
                     self.configuration.station, 'PKW requests', str(frame))))
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
+            if not self.online:
+                self._heard.wrong(sentences.answers_otherwise(str(error)), now)
+
+    @property
+    def offline_advice(self) -> Sentence:
+        advice = super().offline_advice
+        return advice if self.defect else self._heard.instead_of(
+            advice, self._node, self._channel.now)
 
     # -- timer ------------------------------------------------------------------------------------
 

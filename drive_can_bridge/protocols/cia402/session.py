@@ -35,6 +35,7 @@ from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.answers import Answers
 from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
     Change, Node, START_PAUSE, START_PERIOD, START_SPACING)
@@ -147,6 +148,7 @@ class Cia402Session(Session):
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
+        self._heard = Heard('no complete set of PDOs')
         self._heartbeats = Heartbeats(self, self._node, heartbeat)
         self._limits = LimitCheck(
             [] if options.mapping == 'assume' else [
@@ -320,6 +322,8 @@ class Cia402Session(Session):
         self.exchange.run_out(self.exchange.timer.due)
 
     def lost(self, now: float, *, was_online: bool) -> None:
+        if was_online:
+            self._heard.clear()
         self._homing.stop()
         self._limits.stop()
         self._forget_state()
@@ -372,6 +376,8 @@ class Cia402Session(Session):
         if extended:
             return
         place = self._places.get(identifier)
+        if not self.online:
+            self._hear(identifier, place, data, now)
         try:
             if place is not None:
                 self._receive_pdo(place, data, now, now - age)
@@ -384,6 +390,8 @@ class Cia402Session(Session):
                 self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
                     self.configuration.station,
                     'SDO requests' if sdo_request else 'process data', str(frame))))
+            elif identifier == network.HEARTBEAT_BASE + self.configuration.station and not data:
+                self._node.take_empty_heartbeat(self.report, now)
             elif identifier == network.HEARTBEAT_BASE + self.configuration.station:
                 self._take_heartbeat(network.decode_heartbeat(data), now)
             elif identifier == network.EMERGENCY_BASE + self.configuration.station:
@@ -393,6 +401,25 @@ class Cia402Session(Session):
                 now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
+            if not self.online:
+                self._heard.wrong(sentences.answers_otherwise(str(error)), now)
+
+    def _hear(self, identifier: int, place: int | None, data: bytes, now: float) -> None:
+        """Note what a drive sends that is not online."""
+        if place is not None:
+            wanted = self._responses[place]
+            if len(data) < wanted.length:
+                self._heard.wrong(sentences.pdo_length(
+                    wanted.number, len(data), wanted.length), now)
+        if place is not None or identifier - self.configuration.station in (
+                sdo.RESPONSE_BASE, network.HEARTBEAT_BASE, network.EMERGENCY_BASE):
+            self._heard.came(now)
+
+    @property
+    def offline_advice(self) -> Sentence:
+        advice = super().offline_advice
+        return advice if self.defect else self._heard.instead_of(
+            advice, self._node, self._channel.now)
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""
