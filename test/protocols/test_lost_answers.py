@@ -8,7 +8,7 @@ from typing import Any
 import builders
 from builders import Conversation, EEPROM, parameter, RO, text_of
 import pytest
-from test_late_answers import KINDS, Partner, REGISTERS, TIMEOUT
+from test_late_answers import KINDS, Partner, REGISTERS, SPEED, TIMEOUT
 
 from drive_can_bridge.core.events import RequestCompleted
 from drive_can_bridge.core.frame import Frame
@@ -18,6 +18,7 @@ from drive_can_bridge.core.requests import ReadRequest, RetryPolicy, WriteReques
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402.channel import Ask, SdoTransactor
 from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Read
+from drive_can_bridge.protocols.families import FAMILIES
 
 STATUS = parameter('system_status_1', 455, access=RO)
 REGISTER = parameter('register_652', 652, storage=EEPROM)
@@ -45,7 +46,32 @@ class PkwPartner(Partner):
             self.late(now, Frame(0x485, data[:4] + bytes.fromhex('41000000'), False))
 
 
-PARTNERS = {**KINDS, 'canopen_pkw': PkwPartner}
+class StandardPartner(Partner):
+    """Station 1 with 11-bit identifiers: answers say nothing of what they answer."""
+
+    drive = builders.drive(
+        'datamodel_standard', request=(), response=(SPEED,), table=(SPEED, *REGISTERS),
+        parameter_timeout=TIMEOUT, parameter_retries=1, missed_limit=1000)
+
+    def hear(self, frame: Frame, now: float) -> None:
+        assert frame.identifier == 0x3F1
+        number = int.from_bytes(frame.data[1:3], 'little')
+        if frame.data[0] == 6:
+            self.write(number, int.from_bytes(frame.data[3:5], 'little'), now)
+            return
+        assert (frame.data[0], frame.data[3]) == (3, 1)
+        if number == 200:
+            self.answer(Frame(0x7F1, bytes(8), False), now + 0.002)
+        else:
+            self.late(now, Frame(
+                0x7F1, self.value(number).to_bytes(2, 'little') + bytes(6), False))
+
+
+PARTNERS = {**KINDS, 'canopen_pkw': PkwPartner, 'datamodel_standard': StandardPartner}
+
+
+def test_every_family_is_here() -> None:
+    assert set(PARTNERS) == set(FAMILIES)
 
 
 class Story:
