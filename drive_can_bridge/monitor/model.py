@@ -230,7 +230,8 @@ class _BridgeRecord:
         self._period = _PERIOD_UNKNOWN
 
     def heard(self, stamp: float, now: float) -> None:
-        if stamp > self._stamp:
+        # else its host's clock was set: nothing else passes so much quicker there than here
+        if 0.0 < stamp - self._stamp <= 2.0 * (now - self._at) + _PERIOD_UNKNOWN:
             self._goes_on_after(stamp - self._stamp)
         self._at, self._stamp = now, stamp
 

@@ -120,6 +120,16 @@ def test_without_descriptors_values_are_shown_all_the_same() -> None:
     assert [shown.text for shown in seen(model).drives[0].values] == ['1.500', '7', 'true']
 
 
+@pytest.mark.parametrize('step', [-3600.0, 3600.0])
+def test_a_clock_that_is_set_hides_no_silent_bridge(step: float) -> None:
+    model = Model()
+    for second in range(5):
+        model.diagnosed([drive_status()], AT + second, NOW + second)
+    model.diagnosed([drive_status()], AT + 5.0 + step, NOW + 5.0)
+    assert not model.look(NOW + 8.0, AT).bridges[0].silent
+    assert model.look(NOW + 8.1, AT).bridges[0].silent
+
+
 def test_a_silent_bridge_takes_its_drives_along_in_words() -> None:
     model = model_of([bus_status(), drive_status()])
     feed(model, '/conveyor')
