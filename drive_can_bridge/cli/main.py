@@ -134,6 +134,8 @@ ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 ENDLESS_OPTIONS = ('--live', '--watch')
 #: what ends these like Ctrl-C; SIGHUP comes when a terminal is closed, or its ssh session breaks
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
+#: subcommands that open no bus, whatever they are given
+WITHOUT_BUS = (*GROUPS['By hand'], 'monitor', 'panel')
 #: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
 WITH_ROS = (*GROUPS['By hand'], *GROUPS['Parameters of drives'], 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
@@ -272,6 +274,9 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
 def _run(arguments: list[str], clock: Clock) -> int:
     module, args = understood(arguments)
     args.clock = clock
+    if args.subcommand not in WITHOUT_BUS:
+        from drive_can_bridge.transport.library_logs import Few, LibraryLogs
+        LibraryLogs(Few(complain).say, clock.now).install()
     try:
         code: int = module.run(args)
     except WrongUsage as error:

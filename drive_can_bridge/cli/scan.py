@@ -22,7 +22,9 @@ from drive_can_bridge.cli.command import (
     above_zero, agree_to_hazard, bitrate, complain, FAILED, output_path, print_json, WrongUsage,
 )
 from drive_can_bridge.cli.output import may_overwrite, waiting, write_atomically
-from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.configuration.load import (
+    configuration_from_file, configuration_from_overrides)
+from drive_can_bridge.configuration.yaml_nodes import read_scalar
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
@@ -33,6 +35,7 @@ from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
 from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
+from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.port import open_port
@@ -194,7 +197,9 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     bridge_node = max(set(range(1, NODE_MAX + 1)) - taken, default=NODE_MAX)
     head = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
             f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
-            f'        bitrate: {bus.bitrate}', '    drives:']
+            f'        bitrate: {bus.bitrate}',
+            *(f'        {key}: {json.dumps(value)}' for key, value in bus.options.items()),
+            '    drives:']
     drives: dict[str, list[str]] = {}
     for sighting, keys in sorted(      # the surest first
             zip(sightings, settings), key=lambda each: each[0].certainty is Certainty.LIKELY):
@@ -276,6 +281,9 @@ def define(parser: ArgumentParser) -> None:
     parser.add_argument('--channel', required=True, help='what it calls its channel: can0, …')
     parser.add_argument('--bitrate', type=bitrate, default=125_000, metavar='B',
                         help='bit/s, also as 500k (default: 125k)')
+    parser.add_argument('--option', action='append', default=[], metavar='KEY=VALUE',
+                        type=_option, help='a key of the adapter, as in a parameter file: '
+                                           'host=10.0.0.5; as often as needed')
     parser.add_argument('--listen', type=above_zero, default=2.0, metavar='S',
                         help='s to listen before anything is asked (default 2)')
     parser.add_argument('--passive', action='store_true', help='only listen')
@@ -309,7 +317,7 @@ def run(args: Namespace) -> int:
     reason = check_channel(args.interface, args.channel)
     if reason is not None:
         raise WrongUsage(f'--channel: {reason}')
-    bus = BusConfiguration('main', args.interface, args.channel, args.bitrate)
+    bus = _bus(args)
     if args.bitrates:
         if args.output is not None:
             raise WrongUsage('--bitrates only counts frames, there is nothing to write: leave -o '
@@ -328,6 +336,33 @@ def run(args: Namespace) -> int:
                         f'Ask {name} all the same?', yes=args.yes or args.passive,
                         who=f'--protocols {name}')
     return _scan(args, bus)
+
+
+def _bus(args: Namespace) -> BusConfiguration:
+    """
+    Return the bus, looked at as one of a parameter file.
+
+    :raises WrongUsage: an option that the bridge sets, or one that is missing.
+    """
+    options = dict(args.option)
+    keys = {'interface': args.interface, 'channel': args.channel, 'bitrate': args.bitrate}
+    wrong = next((key for key in options if key in keys), None)
+    if wrong is not None:
+        raise WrongUsage(f'--option {wrong}: there is --{wrong}')
+    try:
+        found = configuration_from_overrides(
+            {f'buses.main.{key}': value for key, value in {**keys, **options}.items()},
+            adapters=adapters)
+    except ConfigurationError as error:
+        problem = str(error.problems[0])
+        where, told = problem.partition(': ')[::2]
+        key = where.removeprefix('buses.main').removeprefix('.')
+        name = f'--{key}' if key in keys else f'--option {key}'.rstrip()
+        raise WrongUsage(f'{name}: {told}') from None
+    for warning in found.warnings:
+        if warning.startswith('buses.main.'):
+            complain(f'warning: --option {warning.removeprefix("buses.main.")}')
+    return found.buses['main']
 
 
 def _scan(args: Namespace, bus: BusConfiguration) -> int:
@@ -392,6 +427,8 @@ def _command(args: Namespace) -> str:
     """Return the command line that does the same again."""
     words = ['drive_can', 'scan', '--interface', args.interface, '--channel', args.channel,
              '--bitrate', str(args.bitrate)]
+    for key, value in args.option:
+        words += ['--option', f'{key}={value if isinstance(value, str) else json.dumps(value)}']
     if args.protocols:
         words += ['--protocols', ','.join(args.protocols)]
     return shlex.join(words)
@@ -439,8 +476,8 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
     heard = 0
     for rate in args.bitrates:
         with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
-            port = open_port(replace(bus, bitrate=rate, options={'listen_only': True}),
-                             args.clock)
+            port = open_port(replace(bus, bitrate=rate, options={
+                **bus.options, 'listen_only': True}), args.clock)
             try:
                 survey = Survey(bus, port, args.clock.now)
                 survey.listen(args.listen)
@@ -463,6 +500,13 @@ def _protocols(text: str) -> list[str]:
         raise ArgumentTypeError(f'{wrong[0]!r}: allowed are {", ".join(_NAMED)}; the others are '
                                 'asked anyway')
     return names
+
+
+def _option(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition('=')
+    if not equals or re.fullmatch('[a-zA-Z_]+', key) is None:
+        raise ArgumentTypeError(f'{text!r}: allowed is KEY=VALUE')
+    return key, read_scalar(value)
 
 
 def _bitrates(text: str) -> list[int]:

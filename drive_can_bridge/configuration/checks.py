@@ -6,7 +6,7 @@ A drive is built even when parts of it are wrong, with defaults in place of the 
 that everything else about it can be checked in the same run.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Container, Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 import math
 import pathlib
@@ -45,6 +45,9 @@ class Adapters(Protocol):
     def adapter_keywords(self, interface: str) -> set[str] | None:
         """Return the keyword arguments that an adapter's class names; None: unknown."""
 
+    def missing_keywords(self, interface: str, given: Container[str]) -> list[str]:
+        """Return the keys without which an adapter's class cannot be made."""
+
     def check_interface(self, interface: str) -> Sentence | None:
         """Say why an interface cannot be used here; None: it can."""
 
@@ -65,6 +68,10 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
         path, known = ('buses', name), len(tree.problems)
         values = complete('bus', entry)
         keywords = _check_adapter(tree, path, values, adapters)
+        missing = (adapters.missing_keywords(entry['interface'], entry)
+                   if keywords is not None and adapters is not None else [])
+        if missing:
+            tree.wrong(path, complaints.adapter_needs(interface=entry['interface'], keys=missing))
         _check_keys(tree, path, entry, keywords)
         _check_trace_directory(tree, path, values)
         if 'interface' not in entry or 'channel' not in entry:

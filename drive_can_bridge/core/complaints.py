@@ -110,6 +110,7 @@ no_serial_port = Text(
 no_bitrate = Text('{bitrate} is impossible with {interface}, allowed is one of {allowed}')
 adapter_does_not_name = Text(
     'the adapter for {interface} does not name this key{near}; it is handed over all the same')
+adapter_needs = Text('the adapter for {interface} needs {keys:, }')
 channel_of_other_bus = Text(
     '{channel!r} is also the channel of bus {bus}; the load is checked for each bus alone')
 port_of_other_bus = Text(

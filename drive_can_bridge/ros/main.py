@@ -144,8 +144,10 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
     import rclpy
 
     from drive_can_bridge.ros.bridge_node import BridgeNode
+    from drive_can_bridge.ros.log import FEW
     from drive_can_bridge.ros.threads import ExecutorThread
     from drive_can_bridge.transport.failures import in_words
+    from drive_can_bridge.transport.library_logs import LibraryLogs
 
     spinner = ExecutorThread('services', lambda text: bridge.log.error(text),
                              rclpy.get_default_context(), clock)
@@ -153,6 +155,8 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
         bridge = BridgeNode(spinner, watcher.fatal, clock, files=_parameter_files(arguments))
     except Exception as error:  # noqa: BLE001  names and namespaces that rcl refuses
         return _complain(f'drive_can_bridge: {in_words(error)}')
+    libraries = bridge.log.speaker('library')
+    LibraryLogs(partial(libraries.warn, few=FEW), clock.now).install()
     if bridge.is_empty:
         bridge.log.fatal(_nothing_configured(bridge, arguments))
         bridge.destroy_node()

@@ -388,6 +388,7 @@ def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Ite
     logger = logging.getLogger('can')
     heard = _Heard(complain)
     logger.addHandler(heard)
+    logger.propagate = False    # told once
     try:
         while True:
             lines = _Lines(itertools.chain(header, stream))
@@ -410,6 +411,7 @@ def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Ite
                 if not known:
                     header = lines.taken[:-1]
     finally:
+        logger.propagate = True
         logger.removeHandler(heard)
 
 

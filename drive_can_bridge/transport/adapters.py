@@ -7,7 +7,7 @@ work, and a key that the adapter's class does not name is probably misspelt. Mos
 unknown keywords silently.
 """
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 import importlib
 import inspect
@@ -48,6 +48,17 @@ def adapter_keywords(interface: str) -> set[str] | None:
         names.update(name for name, parameter in parameters.items() if parameter.kind in (
             inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY))
     return names - {'self'}
+
+
+def missing_keywords(interface: str, given: Container[str]) -> list[str]:
+    """Return the keys without which an adapter's class cannot be made."""
+    try:
+        parameters = inspect.signature(_adapter_class(interface)).parameters.values()
+    except (_Unusable, TypeError, ValueError):
+        return []
+    return [each.name for each in parameters
+            if each.default is each.empty and each.name not in given and each.name != 'channel'
+            and each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
 
 
 def check_interface(interface: str) -> Sentence | None:

@@ -6,7 +6,7 @@ import pytest
 from saying import says
 
 from drive_can_bridge.transport.adapters import (
-    adapter_keywords, check_bitrate, check_channel, check_interface,
+    adapter_keywords, check_bitrate, check_channel, check_interface, missing_keywords,
 )
 
 
@@ -75,6 +75,13 @@ def test_channels_of_serial_interfaces(interface: str) -> None:
     ('socketcan', 'can0'), ('pcan', 'PCAN_USBBUS1'), ('kvaser', 0), ('virtual', 'a://b')])
 def test_channels_of_others_are_theirs(interface: str, channel: str | int) -> None:
     assert check_channel(interface, channel) is None
+
+
+def test_keys_without_which_there_is_no_adapter() -> None:
+    assert missing_keywords('socketcand', {'port': 29536}) == ['host']
+    assert missing_keywords('socketcand', {'host': '10.0.0.5', 'port': 29536}) == []
+    assert missing_keywords('slcan', ()) == []
+    assert missing_keywords('zzzzzz', ()) == []
 
 
 @pytest.mark.usefixtures('programs')

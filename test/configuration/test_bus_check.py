@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What is wrong with a bus or with the whole: one changed line each."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 import os
 from pathlib import Path
 
@@ -92,6 +92,9 @@ class Adapters:
     def adapter_keywords(self, interface: str) -> set[str] | None:
         return {'channel', 'bitrates', 'rx_queue_size'} if interface == 'virtual' else None
 
+    def missing_keywords(self, interface: str, given: Container[str]) -> list[str]:
+        return ['room'] if 'rooms' in given else []
+
     def check_interface(self, interface: str) -> Sentence | None:
         return None if interface in ('virtual', 'closed') else uncoded(
             'no such thing, allowed is virtual')
@@ -115,6 +118,8 @@ class Adapters:
      ['f.yaml:8: buses.main.bitrate: impossible, allowed is 500000']),
     # close to a key of ours, but the adapter knows it
     ('bitrate: 125000', 'bitrates: 5', []),
+    ('bitrate: 125000', 'rooms: 5',
+     [at('f.yaml:5: buses.main', 'adapter_needs', interface='virtual', keys=['room'])]),
     ('bitrate: 125000', 'bitrats: 5',
      [at('f.yaml:8: buses.main.bitrats', 'unknown_key',
          hint=says('did_you_mean', word='bitrate'))]),

@@ -12,6 +12,7 @@ from extent import SEED
 from foreign_devices import (
     cannord, canopen, CROWD as CROWD_OF_ALL, datamodel_extended, datamodel_standard, Device,
 )
+from literal_adapters import Socketcand
 import pytest
 from test_trace_agrees import running
 from transcripts import replayed, stories
@@ -575,6 +576,47 @@ def test_wrong_usage(arguments: list[str], text: str,
                      capsys: pytest.CaptureFixture[str]) -> None:
     assert drive_can('scan', *arguments) == 2
     assert text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('options', 'text'), [
+    ([], '--option: the adapter for socketcand needs host, port'),
+    (['host=10.0.0.5'], '--option: the adapter for socketcand needs port'),
+    (['channel=can1'], '--option channel: there is --channel'),
+    (['can_filters=1', 'host=10.0.0.5', 'port=29536'],
+     '--option can_filters: set by the bridge itself'),
+])
+def test_options_of_the_adapter_are_looked_at(options: list[str], text: str,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    words = [word for option in options for word in ('--option', option)]
+    assert drive_can('scan', '--interface', 'socketcand', '--channel', 'can0', *words) == 2
+    assert text in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures('threads')
+def test_a_gateway_is_scanned(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    gateway = Socketcand()
+    words = ['scan', '--interface', 'socketcand', '--channel', 'can0', '--listen', '0.05',
+             '--passive', '--option', 'host=127.0.0.1', '--option', f'port={gateway.port}']
+    try:
+        assert drive_can(*words) == 1
+        assert 'no drive found' in capsys.readouterr().out
+        gateway.close()
+        assert drive_can(*words) == 1
+        told = capsys.readouterr().err
+        assert told == (f'drive_can scan: socketcand can0: the gateway 127.0.0.1:{gateway.port} '
+                        f'refuses\n')
+    finally:
+        gateway.close()
+
+
+def test_what_is_written_has_the_options(tmp_path: Path) -> None:
+    bus = BusConfiguration('main', 'socketcand', 'can0', BITRATE, options={
+        'host': '10.0.0.5', 'port': 29536})
+    path = tmp_path / 'found.yaml'
+    write_parameter_file(path, bus, [Sighting(
+        'datamodel_extended', 3, Certainty.CERTAIN, SAID['maps'])],
+        [{'request_numbers': [50], 'response_numbers': [209]}])
+    assert configuration_from_file(path).buses['main'].options == bus.options
 
 
 def test_who_only_listens_is_not_asked(capsys: pytest.CaptureFixture[str]) -> None:
