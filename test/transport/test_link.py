@@ -336,12 +336,12 @@ def test_attempt_that_a_library_does_not_give_back(
     bench.port.coming.append(BusUnavailable('gone'))
     wait_for(lambda: len(bench.listener.told) == 3)
     assert bench.listener.told[2] == f'lost: {BUS.place}: {link_module.NOT_GIVEN_BACK}'
-    assert bench.clock.now() - tried[0] == pytest.approx(2.0, abs=0.01)
+    assert bench.clock.now() - tried[0] == pytest.approx(2.0, abs=0.05)
     assert bench.link.wait_first_attempt(0.0)
     pause(50.0)
     assert len(tried) == 1, 'no other before it has come back'
     bench.opened(2)
-    assert bench.clock.now() - tried[0] == pytest.approx(60.0, abs=0.1)
+    assert bench.clock.now() - tried[0] == pytest.approx(60.0, abs=0.2)
     assert bench.link.send(FRAME)
     assert len(bench.listener.told) == 4
 
