@@ -17,11 +17,13 @@ from pathlib import Path
 import re
 import sys
 import termios
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TYPE_CHECKING, TypeVar
 
-from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import is_ros_name, printable
+
+if TYPE_CHECKING:
+    from drive_can_bridge.core.configuration import BridgeConfiguration
 
 FAILED = 1
 WRONG_USAGE = 2
@@ -186,7 +188,7 @@ def add_seconds(parser: ArgumentParser) -> None:
                         help='end by itself after that time (default: runs until Ctrl-C)')
 
 
-def of_drive(option: str, text: str, configuration: BridgeConfiguration,
+def of_drive(option: str, text: str, configuration: 'BridgeConfiguration',
              parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
     """
     Read an argument that begins with the name of a drive.

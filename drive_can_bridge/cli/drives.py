@@ -7,7 +7,7 @@ Positional arguments of such a command are called ``words``; options may stand b
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -58,9 +58,10 @@ def source_of(args: Namespace) -> Iterator[Source]:
     if args.params_file is None and args.nmt_start:
         raise WrongUsage('--nmt-start goes with --params-file: a bridge starts its nodes itself')
     try:
-        with waiting('looking for a bridge' if args.params_file is None else 'reading the file'):
-            source = find_source(args.params_file, namespace=args.namespace,
-                                 nmt_start=args.nmt_start, clock=args.clock)
+        source = find_source(
+            args.params_file, namespace=args.namespace, nmt_start=args.nmt_start,
+            clock=args.clock, slow=lambda: waiting(
+                'looking for a bridge' if args.params_file is None else 'reading the file'))
     except WhichBridge as error:
         raise WrongUsage(str(error)) from None
     except ImportError as error:
@@ -126,7 +127,8 @@ def chosen_one(names: Sequence[str], word: str) -> str:
 @contextmanager
 def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
     """Open drives, and say what the user should know."""
-    with waiting('listening for another master, and greeting the drives'):
+    with (waiting('listening for another master, and greeting the drives')
+          if source.listens else nullcontext()):
         drives = source.open(names)
     with drives:
         for warning in drives.warnings:

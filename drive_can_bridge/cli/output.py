@@ -4,6 +4,9 @@ Tables and progress bars for people, and files.
 
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
 a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a terminal only.
+
+What draws there takes as long to be imported as a bridge of this host to be asked: so that is done
+only where something is drawn.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,14 +15,14 @@ import os
 from pathlib import Path
 import sys
 import tempfile
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING
 
 from drive_can_bridge.cli.command import agreed
 from drive_can_bridge.core.text import column_lines, printable
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.table import Table
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
@@ -30,14 +33,17 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     :param numbers: headings of columns that are aligned to the right.
     """
     if sys.stdout.isatty():
+        from rich.console import Console
         Console().print(fitting_table(headings, rows, numbers))
     else:
         print('\n'.join(column_lines(*_used(headings, rows), numbers=numbers)))
 
 
 def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
-                  numbers: Sequence[str] = ()) -> Table:
+                  numbers: Sequence[str] = ()) -> 'Table':
     """Make a table that fits a terminal, for those that show it again and again."""
+    from rich.table import Table
+    from rich.text import Text
     headings, written = _used(headings, rows)
     table = Table(box=None, pad_edge=False, header_style='bold')
     for place, heading in enumerate(headings):
@@ -68,6 +74,7 @@ def waiting(what: str) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return
+    from rich.console import Console
     with Console(stderr=True).status(f'{what} …'):
         yield
 
@@ -81,21 +88,33 @@ def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callab
     :param total: how many there are.
     :param now: the steady time.
     """
-    progress = Progress(TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-                        TimeRemainingColumn(), console=Console(stderr=True), transient=True)
-    task = progress.add_task(what, total=total)
-    began = now()
+    began, done = now(), 0
+    progress: 'Progress | None' = None
 
     def step(_: object = None) -> None:
-        progress.advance(task)
-        if now() - began >= PATIENCE and sys.stderr.isatty():
+        nonlocal done, progress
+        done += 1
+        if progress is None and now() - began >= PATIENCE and sys.stderr.isatty():
+            progress = _bar(what, total)
             progress.start()
+        if progress is not None:
+            progress.update(progress.task_ids[0], completed=done)
     try:
         yield step
     finally:
-        if progress.live.is_started:
+        if progress is not None:
             with suppress(OSError):     # the terminal may have gone meanwhile
                 progress.stop()
+
+
+def _bar(what: str, total: int) -> 'Progress':
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn)
+    made = Progress(TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+                    TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+    made.add_task(what, total=total)
+    return made
 
 
 def differs(path: Path, data: bytes | None = None) -> bool:

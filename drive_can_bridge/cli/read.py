@@ -6,8 +6,6 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
-from rich.live import Live
-
 from drive_can_bridge.cli.command import above_zero, FAILED, print_json
 from drive_can_bridge.cli.drives import (
     add_words, complete_words, opened, read_all, source_of, split_words)
@@ -66,7 +64,10 @@ def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
     """Read again and again."""
     clock: Clock = args.clock
     due = clock.now()
-    live = Live(auto_refresh=False) if sys.stdout.isatty() and not args.json else None
+    live: Any = None
+    if sys.stdout.isatty() and not args.json:
+        from rich.live import Live
+        live = Live(auto_refresh=False)
     first = True
     try:
         if live is not None:

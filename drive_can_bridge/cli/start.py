@@ -8,12 +8,16 @@ A stop does not: what it needs to be sent by the local way is all that is import
 
 import sys
 
+from drive_can_bridge import __version__
 from drive_can_bridge.process.beginning import begin
 
 
 def main() -> int:
     """Run the command; return the exit code."""
     begin()
+    if sys.argv[1:] == ['--version']:
+        print(f'drive_can {__version__}')
+        return 0
     if sys.argv[1:2] == ['stop']:
         from drive_can_bridge.process.local_stop import begin as begin_stop
         begin_stop(sys.argv[2:])    # and go on: there may be bridges elsewhere

@@ -9,9 +9,8 @@ from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
-from drive_can_bridge.configuration.yaml_nodes import read_scalar
+from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
-from drive_can_bridge.protocols.families import FAMILIES
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
@@ -167,8 +166,11 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
             f'not written: {result}' if refused else result))
     if rows:
         print_table(_HEADINGS, rows, numbers=('value',))
-    lost = dict.fromkeys(FAMILIES[drive.facts.protocol].keeps_by
-                         for drive, outcome in outcomes if _is_lost(outcome))
+    losers = [drive for drive, outcome in outcomes if _is_lost(outcome)]
+    if not losers:
+        return
+    from drive_can_bridge.protocols.families import FAMILIES    # takes its time
+    lost = dict.fromkeys(FAMILIES[drive.facts.protocol].keeps_by for drive in losers)
     for text in lost:
         if text and not args.json:
             print(text)

@@ -17,7 +17,8 @@ that: :mod:`.direct`, and :mod:`.bridge`. To a bridge of this host it is the loc
 (:mod:`.local`), where that leads to it, else that through ROS (:mod:`.ros_way`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -32,7 +33,8 @@ __all__ = ['Drive', 'DriveCanError', 'Drives', 'Enabled', 'ReadOutcome', 'WriteO
 
 
 def find_source(params_file: str | Path | None = None, *, namespace: str | None = None,
-                nmt_start: bool = False, clock: Clock | None = None) -> Source:
+                nmt_start: bool = False, clock: Clock | None = None,
+                slow: Callable[[], AbstractContextManager[object]] = nullcontext) -> Source:
     """
     Say which drives there are, before anything is sent.
 
@@ -40,6 +42,7 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     :param namespace: of the bridge, where several run.
     :param nmt_start: directly: start CANopen nodes before they are asked.
     :param clock: what everything waits by; None: that of this machine.
+    :param slow: is entered for what may take more than a moment.
     :raises ConfigurationError: the file is wrong.
     :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
         namespaces; an argument that means nothing to the way that is taken.
@@ -53,7 +56,8 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
         try:
-            return DirectSource(params_file, clock, nmt_start=nmt_start)
+            with slow():
+                return DirectSource(params_file, clock, nmt_start=nmt_start)
         except OSError as error:
             raise DriveCanError(f'{error.filename or params_file}: '
                                 f'{error.strerror or error}') from error
@@ -63,8 +67,9 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     way = local_way(place, clock)
     if way is not None:
         return BridgeSource(way)
-    from drive_can_bridge.client.ros_way import RosWay
-    return BridgeSource(RosWay(place, clock))
+    with slow():
+        from drive_can_bridge.client.ros_way import RosWay
+        return BridgeSource(RosWay(place, clock))
 
 
 def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),

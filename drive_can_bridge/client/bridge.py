@@ -183,6 +183,8 @@ class BridgeSource:
     :param way: to them.
     """
 
+    listens = False
+
     def __init__(self, way: Way) -> None:
         self._way = way
         self._bridges = way.bridge_of

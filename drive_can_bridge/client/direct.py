@@ -408,6 +408,8 @@ class DirectSource:
     :raises ConfigurationError: the file is wrong.
     """
 
+    listens = True
+
     def __init__(self, params_file: str | Path, clock: Clock, *, nmt_start: bool = False) -> None:
         self.configuration: BridgeConfiguration = configuration_from_file(Path(params_file))
         self._clock = clock

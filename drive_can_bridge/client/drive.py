@@ -380,7 +380,11 @@ class Source(Protocol):
     Where drives come from: known by name before anything is opened or sent.
 
     Made by :func:`drive_can_bridge.client.find_source`.
+
+    :ivar listens: to open drives takes a moment.
     """
+
+    listens: bool
 
     @property
     def names(self) -> Sequence[str]:

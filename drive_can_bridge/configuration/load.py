@@ -26,10 +26,10 @@ from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.quality_check import check_qualities
+from drive_can_bridge.configuration.scalars import read_scalar, STRING_TAG
 from drive_can_bridge.configuration.schema import (
     ALL_OPTIONS, check_schema, check_value, checked_bridge, complete, definition,
 )
-from drive_can_bridge.configuration.yaml_nodes import read_scalar, STRING_TAG
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import unicodedata
 
 from drive_can_bridge.configuration.profile_check import RAW_NAME, RESERVED
-from drive_can_bridge.configuration.yaml_nodes import read_scalar
+from drive_can_bridge.configuration.scalars import read_scalar
 
 WIDTH = 99
 #: keys of an entry, in the order in which they are written; each group begins a line

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from drive_can_bridge.backup.document import raw_in_file, value_in_file
-from drive_can_bridge.configuration.yaml_nodes import read_scalar
+from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 

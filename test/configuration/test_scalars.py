@@ -6,7 +6,7 @@ import math
 from configuration_builders import SCALARS
 import pytest
 
-from drive_can_bridge.configuration.yaml_nodes import read_scalar, STRING_TAG
+from drive_can_bridge.configuration.scalars import read_scalar, STRING_TAG
 
 
 @pytest.mark.parametrize(('text', 'value'), SCALARS)

@@ -14,6 +14,7 @@ from clocks import REAL
 from hypothesis import given, strategies as st
 import pytest
 
+from drive_can_bridge import __version__
 from drive_can_bridge.process import local_server, presence
 from drive_can_bridge.process.local_server import Asked, LocalServer
 from drive_can_bridge.process.local_way import (
@@ -342,6 +343,16 @@ def test_longer_questions_than_allowed(host: Host) -> None:
         line.ask('who', 'x' * (ASKED_MAX + 1))
         answers(line)
     line.close()
+
+
+@pytest.mark.usefixtures('programs')
+def test_the_version_needs_no_argparse() -> None:
+    code = ('import sys; sys.argv = ["drive_can", "--version"]\n'
+            'before = set(sys.modules)\n'
+            'from drive_can_bridge.cli.start import main; assert main() == 0\n'
+            'assert not {"argparse", "drive_can_bridge.core"} & (set(sys.modules) - before)')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout == f'drive_can {__version__}\n'
 
 
 # -- what is imported before a stop is sent -------------------------------------------------------
