@@ -115,8 +115,11 @@ def _shown(outcome: ReadOutcome) -> str:
     """Write a value, and its name beside it."""
     if outcome.value is None:
         return '–'
-    name = outcome.parameter.name_of(outcome.value) if outcome.parameter else ''
-    return f'{value_text(outcome.value)} {name}' if name else value_text(outcome.value)
+    parameter = outcome.parameter
+    if parameter is None:
+        return value_text(outcome.value)
+    text, name = parameter.text(outcome.value), parameter.name_of(outcome.value)
+    return f'{text} {name}' if name else text
 
 
 def _rows(drives: Drives, outcomes: Sequence[tuple[Drive, ReadOutcome]],

@@ -33,7 +33,6 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.sentences import no_answer_offline, no_result
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.text import value_text
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.exchange.one_master import Ownership
@@ -384,8 +383,9 @@ class DirectDrive(Drive):
     def identity(self) -> str:
         names = self._drive.profile.identity
         outcomes = self.read(*names) if names else {}
-        return ' '.join(f'{name}={value_text(outcome.value)}'
-                        for name, outcome in outcomes.items() if outcome.value is not None)
+        return ' '.join(f'{name}={outcome.parameter.text(outcome.value)}'
+                        for name, outcome in outcomes.items()
+                        if outcome.parameter is not None and outcome.value is not None)
 
 
 def _paired(block: Sequence[tuple[str, Parameter]], outcomes: Sequence[Outcome],

@@ -24,6 +24,8 @@ from drive_can_bridge.core.text import value_text
 
 Value = Union[float, int, bool]
 
+#: object of CANopen that is written in hexadecimal
+_DEVICE_TYPE = 0x1000
 #: Physical limits are compared with this much tolerance, relative to one raw step, so that
 #: 30000 * 0.1 = 3000.0000000000005 does not fall out of "maximum: 3000".
 STEP_TOLERANCE = 1e-6
@@ -182,6 +184,12 @@ class Parameter:
     def stores(self) -> bool:
         """Stores what the drive has in its RAM when it is written: 1010h of CANopen."""
         return self.index == 0x1010
+
+    def text(self, value: Value) -> str:
+        """Write a value for people: a device type of CANopen (1000h) in hexadecimal, as EDS do."""
+        if self.index == _DEVICE_TYPE and not self.scaled:
+            return f'{value:08X}h'
+        return value_text(value)
 
     def shown(self, raw: int) -> str:
         """Write a value as the drive's manual does: with as many decimals as a raw step has."""

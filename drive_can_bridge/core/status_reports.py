@@ -252,8 +252,10 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
     elif reports.says(table.enabled):
         remarks.append(sentences.word_not_followed(word))
     if sending is ControlAction.QUICK_STOP:     # which is what keeps it there
-        remarks.append(sentences.word_stays() if reports.braking else
-                       sentences.now_disable())
+        if not reports.braking:
+            remarks.append(sentences.now_disable())
+        elif not more:      # else the family says that it brakes, and that the word stays
+            remarks.append(sentences.word_stays())
     elif wording is not None and reports.telling is not None:
         hint = wording.hint(reports.telling)
         remarks += [hint] if hint else []

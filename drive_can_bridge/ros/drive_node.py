@@ -28,7 +28,7 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
 from drive_can_bridge.core.sentences import answer_late, bridge_inactive, internal_error
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.text import printable, value_text
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
@@ -438,7 +438,7 @@ class IdentityReader:
         parameter, outcome = self._parameters[place], outcomes[0]
         if isinstance(outcome, ReadValue):
             self._failures = 0
-            value = value_text(parameter.value_from_raw(outcome.raw))
+            value = parameter.text(parameter.value_from_raw(outcome.raw))
             self._known.append(f'{parameter.name}={value}')
         elif isinstance(outcome, Failure):
             self._failures += 1

@@ -32,6 +32,12 @@ def test_word_raw_value(entry: Parameter, word: int, raw: int, value: object) ->
     assert type(made) is type(value)
 
 
+def test_a_device_type_is_written_in_hexadecimal() -> None:
+    device_type = parameter('device_type', None, index=0x1000, type=ParameterType.UINT32)
+    assert device_type.text(4026532422) == 'F0000246h'
+    assert parameter('serial', None, index=0x1018, subindex=4).text(4711) == '4711'
+
+
 @given(st.sampled_from([SPEED, RAMP, GAIN, parameter('o', 1, type=INT16, scale=-0.3, offset=7.0)]),
        st.integers(0, 0xFFFF))
 def test_every_word_survives(entry: Parameter, word: int) -> None:

@@ -503,3 +503,11 @@ class TestOneThatFallsOutBeforeItsEnableIsConfirmed:
         axis.live(0.3)
         assert axis.words() == ['0700', '0F00', '1F00', '0700', '0600']
         self.fails(axis, 0x0250)
+
+
+def test_that_the_word_stays_is_said_once() -> None:
+    axis = Axis(control_timeout=0.5).enabled()
+    axis.drive.braking = 10_000
+    axis.drive.objects[0x606C, 0] = b'\1\0\0\0'
+    (_, success, why), = axis.asks(ControlAction.QUICK_STOP, 0.8)
+    assert not success and why.count('the word stays') == 1
