@@ -16,6 +16,7 @@ from their motors, by these rules:
 5. A drive that runs when its bus is lost is said to run, perhaps.
 6. What can be talked to at the end has stopped then, in whatever state NMT has put its node; but
    for PKW, where nothing is sent by NMT at the end: such a node hears nothing, and is named.
+7. Nobody cuts off the braking of a quick stop: 0000h comes when the axis stands.
 
 Nothing in here asks a session what it owes, and no codec of the package is used.
 
@@ -152,8 +153,10 @@ class Servo(ServoDrive):
 
     def takes(self, sent: Frame) -> list[Frame]:
         answers = super().takes(sent)
-        if self.operational and sent.identifier == 0x200 + self.node:   # as its event timer would
-            answers += self.responses(255)
+        if self.operational and sent.identifier == 0x200 + self.node and (
+                by_event := self.responses(255)):   # as its event timer would
+            answers += by_event
+            self.runs_down()
         self.registers[1] = int(self.state == self.ENABLED)
         self.registers[2] = self.number(0x60FF)
         return answers
@@ -161,6 +164,46 @@ class Servo(ServoDrive):
     def restarts(self) -> list[Frame]:
         self.objects[0x60FF, 0] = bytes(4)
         return super().restarts()
+
+
+class StayingServo(Servo):
+    """
+    CiA 402: stays in quick stop active, with 606Ch at its last value, until it is sent 0000h.
+
+    So does the fake slave of ros2_canopen with Lely core 2.4.0, though its 605Ah is 2, and
+    CANopenNode 4 without a 605Ah. It brakes for so many looks at it, SYNCs and reads of 6041h.
+    """
+
+    stays = True
+    brakes = 40
+
+    def __init__(self, motor: Motor, node: int) -> None:
+        super().__init__(motor, node)
+        self.objects.update({(0x606C, 0): b'\x64\0\0\0', (0x6064, 0): bytes(4)})
+
+    def takes(self, sent: Frame) -> list[Frame]:
+        if sent.identifier == 0x600 + self.node and sent.data[:4] == bytes.fromhex('40416000'):
+            self.runs_down()
+        return super().takes(sent)
+
+    def becomes(self, state: int) -> None:
+        if state == self.QUICK_STOP != self.state:
+            self.braking = self.brakes
+        super().becomes(state)
+
+    def runs_down(self) -> None:
+        if self.state == self.QUICK_STOP and self.braking:
+            place = self.number(0x6064) + 100
+            self.objects[0x6064, 0] = place.to_bytes(4, 'little')
+        super().runs_down()
+
+
+class OptionlessServo(StayingServo):
+    """The same without a 605Ah."""
+
+    def __init__(self, motor: Motor, node: int) -> None:
+        super().__init__(motor, node)
+        del self.objects[0x605A, 0]
 
 
 @dataclass(frozen=True)
@@ -228,13 +271,13 @@ def _cannord(members: int = 1) -> Kind:
         unseen=4 * PERIOD * members)
 
 
-def _servo(**options: Any) -> Kind:
+def _servo(make: type[Servo] = Servo, **options: Any) -> Kind:
     return Kind(
         lambda: [drive('cia402', mode='pv', table=(TARGET,), request=(TARGET,), response=(),
                        period=PERIOD, parameter_timeout=0.1, heartbeat_producer=0.0,
                        heartbeat_timeout=0.0, **options)],
-        lambda moved, index: Servo(Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved),
-                                   index + 1))
+        lambda moved, index: make(Motor({1: 0, 2: 0}, setpoint=2, word=1, moved=moved),
+                                  index + 1))
 
 
 KINDS: dict[str, Kind] = {
@@ -255,6 +298,8 @@ KINDS: dict[str, Kind] = {
     'CiA 402, mapping assumed': _servo(mapping='assume'),
     'CiA 402, disabled by shutdown': _servo(disable_word='shutdown'),
     'CiA 402, by event': _servo(transmission='event'),
+    'CiA 402, stays in quick stop': _servo(StayingServo),
+    'CiA 402, stays in quick stop, no 605Ah': _servo(OptionlessServo),
     'CANnord': _cannord(),
     'CANnord, group of two': _cannord(2),
     'CANnord, group of four': _cannord(4),
@@ -465,8 +510,10 @@ class World:
         return self.bus and not (self.deaf or self.mute or self.refusing)
 
     def judge(self) -> None:
-        """Judge motors that run although they shall not."""
+        """Judge motors that run although they shall not, and those that do not brake."""
         for partner in self.partners:
+            if getattr(partner.device, 'cut_short', 0):
+                raise Violation(f'drive {partner.index + 1} is not let brake')
             runs = partner.motor.runs
             partner.left_over = partner.left_over and runs and not partner.wanted
             wanted = partner.wanted if self.control else (

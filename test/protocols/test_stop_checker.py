@@ -1,7 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Stories of drives that run, judged from their motors; and some that show a broken stop."""
 
-from collections.abc import Callable
 from itertools import islice
 from typing import Any
 
@@ -15,6 +14,7 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.setpoints import Setpoint
 from drive_can_bridge.core.stop_duty import Do, StopDuty
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop
+from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
 from drive_can_bridge.protocols.safe_stop import SafeStop
@@ -75,7 +75,7 @@ def _heard(self: ExchangeBook, received_at: float) -> None:
 
 HEARD, DONE = ExchangeBook.heard, SafeStop._done
 #: what is broken, and a story of a kind in which that shows
-DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
+DEFECTS: list[tuple[type, str, Any, str, Story]] = [
     (StopDuty, 'channel', _nothing, 'CANnord', (('bus down', 0.013),)),
     (StopDuty, 'channel', _nothing, 'PKW, no word', (('bus down', 0.013),)),
     (StopDuty, 'happened', lambda self, happened: Do.NOTHING, '29 bit, no word',
@@ -89,11 +89,13 @@ DEFECTS: list[tuple[type, str, Callable[..., Any], str, Story]] = [
     (SdoStop, '_may_be_stopped', lambda self, since: False, 'CiA 402',
      (('nmt stop', 0.0), ('end', 0.0))),
     (Setpoint, 'disarm', _nothing, '29 bit, no word', (('quiet', 0.9),)),
+    (Standing, 'holds', property(lambda self: self.watching), 'CiA 402, stays in quick stop',
+     (('quick_stop', 0.9), ('disable', 0.0))),
 ]
 
 
 @pytest.mark.parametrize(('owner', 'name', 'instead', 'kind', 'story'), DEFECTS)
-def test_what_is_broken_is_seen(owner: type, name: str, instead: Callable[..., Any], kind: str,
+def test_what_is_broken_is_seen(owner: type, name: str, instead: Any, kind: str,
                                 story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not broken(kind, story)
     monkeypatch.setattr(owner, name, instead)

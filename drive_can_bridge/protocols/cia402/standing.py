@@ -24,6 +24,7 @@ from itertools import chain
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
@@ -138,6 +139,7 @@ class Standing:
         self._velocity: int | None = None
         self._velocity_at, self._same_since, self._slow_since = -math.inf, math.inf, math.inf
         self._seen_low, self._in_a_row = False, 0
+        self._mute: set[int] = set()    # was asked, and did not tell
 
     def end(self) -> None:
         """Watch it no more."""
@@ -178,22 +180,37 @@ class Standing:
         """
         if self._threshold is None:
             reply = yield Ask(states.VELOCITY_THRESHOLD, attempts=1)
-            if reply.data is not None or reply.abort is not None:
+            if reply.data is not None or reply.abort is not None:   # one that is refused is 0
                 self._threshold = int.from_bytes((reply.data or b'')[:2], 'little')
         if self._velocity_object and not (sampled and self._velocity_object in self._places):
             reply = yield Ask(self._velocity_object, attempts=1)
-            if reply.abort is not None:
+            if reply.abort in sdo.ABSENT:
                 self._velocity_object = _INSTEAD[self._velocity_object]
-            elif reply.data is not None:
+            elif reply.data is None:
+                self._mute.add(self._velocity_object)
+            else:
                 length = 2 if self._velocity_object == states.VELOCITY_VL else 4
                 self._take_velocity(
                     int.from_bytes(reply.data[:length], 'little', signed=True), channel.now)
         if self._position_object and not (sampled and self._position_object in self._places):
             reply = yield Ask(self._position_object, attempts=1)
-            if reply.abort is not None:
+            if reply.abort in sdo.ABSENT:
                 self._position_object = 0
-            elif reply.data is not None:
+            elif reply.data is None:
+                self._mute.add(self._position_object)
+            else:
                 self.band.take(int.from_bytes(reply.data[:4], 'little', signed=True), channel.now)
+
+    @property
+    def _tells_position(self) -> bool:
+        """It may yet; one that was asked, and has never told since the beginning, does not."""
+        return bool(self._position_object) and (
+            self._position_object not in self._mute or self.band.since < math.inf)
+
+    @property
+    def _tells_velocity(self) -> bool:
+        return bool(self._velocity_object) and (
+            self._velocity_object not in self._mute or self._velocity is not None)
 
     def _take_velocity(self, velocity: int, now: float) -> None:
         if velocity != self._velocity:
@@ -209,12 +226,12 @@ class Standing:
     @property
     def stands(self) -> bool:
         """Nothing has said for long enough that the axis moves."""
-        if not self._position_object and not self._velocity_object:
+        if not self._tells_position and not self._tells_velocity:
             return self._says_so
-        if self._position_object and not self.band.stays(STILL):
+        if self._tells_position and not self.band.stays(STILL):
             return False
-        return (not self._velocity_object or self._velocity_at - self._slow_since >= STILL
-                or bool(self._position_object) and self._counts_for_nothing)
+        return (not self._tells_velocity or self._velocity_at - self._slow_since >= STILL
+                or self._tells_position and self._counts_for_nothing)
 
     @property
     def _counts_for_nothing(self) -> bool:
@@ -248,7 +265,7 @@ class Standing:
         That is enough for what users ask for, and says nothing else.
         """
         return (self._state is State.QUICK_STOP_ACTIVE
-                and not self._position_object and not self._velocity_object
+                and not self._tells_position and not self._tells_velocity
                 and not self._says_so and self._now - self._since >= self._timeout)
 
 

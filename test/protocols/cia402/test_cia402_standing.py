@@ -173,6 +173,15 @@ class TestWhatSaysThatItMoves:
         axis.live(0.6)
         assert axis.talk.control_outcomes() == [HOLDS]
 
+    @pytest.mark.parametrize('answer', ['8000000000000008', ''])
+    def test_one_that_refuses_or_does_not_answer_says_nothing(self, answer: str) -> None:
+        """Nobody is caught in `still braking` by that; 6064h decides alone."""
+        axis = Axis(parameter_timeout=0.05)
+        drive = axis.drive = TurningServo(5, {**OBJECTS, (0x605A, 0): b'\6\0'})
+        axis.enabled()
+        drive.instead = {'406c6000': answer and answer[:2] + '6C6000' + answer[8:]}
+        assert axis.asks(QUICK_STOP, 1.0) == [HOLDS]
+
     @pytest.mark.parametrize(('pdos', 'asked'), [([1, 2], False), ([1], True)])
     def test_a_velocity_that_travels_is_not_asked_for(self, pdos: list[int], asked: bool) -> None:
         velocity = parameter('velocity', None, index=0x606C, subindex=0, type=POSITION.type)
