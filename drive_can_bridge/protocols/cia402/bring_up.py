@@ -51,7 +51,6 @@ _HEARTBEAT_WAIT = 0.5
 #: looks at a state that a heartbeat has yet to tell
 _LOOKS = 5
 _POWERS = (-3, -4, -5, -6, -2, -1, 0)
-_RUNNING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
 
 class BringUp:
@@ -163,22 +162,22 @@ class BringUp:
             raw = int.from_bytes(reply.data[:2], 'little')
             state = states.state_of(raw)
             self._rules.standing.status(raw, self._channel.now)
-            # it stops by itself, whatever it is told
-            braking = reacting = state is State.FAULT_REACTION
-            if not reacting and state not in _RUNNING:
+            if state not in states.MOVING:
                 break
             self._stopped_at = min(self._stopped_at, self._channel.now)
-            found = (sentences.found_braking if reacting else sentences.found_enabled)(state.value)
+            # a fault reaction ends by itself, whatever it is told; a quick stop takes its course
+            braking = state is State.FAULT_REACTION or (
+                state is State.QUICK_STOP_ACTIVE and (yield from self._brakes()))
+            found = (sentences.found_braking if braking else sentences.found_enabled)(state.value)
             if self._channel.now >= until:
-                runs = found if reacting else sentences.found_running(state.value)
+                runs = found if braking else sentences.found_running(state.value)
                 raise End(Outcome(Found.RUNS, together((runs, refusal))))
             if not looks and found != self._found:
                 self._found = found
                 self._session.report.note(Noted(found, warning=True))
             wanted = DISABLE_WORDS[self._options.disable_word]
-            if state is State.QUICK_STOP_ACTIVE:    # which takes its course
+            if state is State.QUICK_STOP_ACTIVE:
                 wanted = states.DISABLE_VOLTAGE
-                braking = yield from self._brakes()
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted
                 refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)

@@ -34,7 +34,7 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
 from drive_can_bridge.protocols.cia402.control import DriveRules
-from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, STILL
+from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, place_of, STILL
 
 _DONE = states.BIT_12 | states.TARGET_REACHED
 #: 6098h: the present position becomes the reference, and nothing moves
@@ -78,7 +78,7 @@ class Homing:
         self._step = Step.NONE
         self._deadline = math.inf
         self._standing = rules.standing
-        self._latches = [Band(max(1.0, each.parameter.arming_tolerance / abs(each.measured.scale)))
+        self._latches = [Band(place_of(each.parameter, each.measured))
                          for each in session.setpoints.held]
         # samples in which axes stay in their bands; the oldest one is latched
         self._stay: deque[Sequence[int]] = deque(maxlen=_LATCHING_SAMPLES + 1)

@@ -24,6 +24,7 @@ from itertools import chain
 import math
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
@@ -270,10 +271,15 @@ class Standing:
 
 
 def _width(drive: DriveConfiguration) -> float:
-    """Return what counts as one place, in raw steps of 6064h: as much as arms a command."""
+    """Return the width of the band of 6064h."""
     table = drive.profile.parameters
     for each in (*drive.cyclic_request, *table.values()):
         measured = table.get(each.neutral_from)
         if measured is not None and measured.index == states.POSITION:
-            return max(1.0, each.arming_tolerance / abs(measured.scale) * (1.0 + _ROUNDING))
+            return place_of(each, measured)
     return 1.0
+
+
+def place_of(target: Parameter, measured: Parameter) -> float:
+    """Return what counts as one place, in raw steps of what is measured: as much as arms."""
+    return max(1.0, target.arming_tolerance / abs(measured.scale) * (1.0 + _ROUNDING))

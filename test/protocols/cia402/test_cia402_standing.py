@@ -99,6 +99,9 @@ class TestDrivesThatStayInQuickStopWhatever605AhSays:
         axis.live(5.0)
         assert '605#2B40600000000000' not in axis.take()
         assert not axis.session.online
+        told = [note.text for note in axis.talk.events(Noted)]
+        braking = says('found_braking', state=State.QUICK_STOP_ACTIVE.value)
+        assert told == [braking, says('may_still_be_running', why=braking)]
         drive.braking = 1
         axis.live(5.0)
         assert axis.session.online
