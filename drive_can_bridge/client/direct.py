@@ -176,6 +176,9 @@ class BusConversation:
         """End: what the drives do now nobody knows."""
         self._fail(BusUnavailable(f'bus {bus}: {reason}'))
 
+    def bus_told(self, bus: str, text: str) -> None:
+        """Go on: what an adapter does otherwise changes no answer."""
+
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """End likewise."""
         kind = BusMisconfigured if misconfigured else DriveCanError

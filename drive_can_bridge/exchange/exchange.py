@@ -549,6 +549,10 @@ class BusExchange:
                 member.take(member.session.bus_down, now, reason)
         self._listener.bus_lost(self.bus.name, reason)
 
+    def bus_told(self, text: str) -> None:
+        """Tell what people should know of the adapter."""
+        self._listener.bus_told(self.bus.name, text)
+
     def bus_misconfigured(self, reason: str) -> None:
         """Give up: the configuration of the bus is wrong."""
         self.bus_state, self.bus_reason = 'misconfigured', reason

@@ -63,6 +63,9 @@ class BusListener(Protocol):
     def bus_lost(self, bus: str, reason: str) -> None:
         """Record that the bus is gone, or could not be opened."""
 
+    def bus_told(self, bus: str, text: str) -> None:
+        """Record what people should know of its adapter."""
+
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """End the bridge: the exchange cannot go on."""
 

@@ -388,6 +388,10 @@ class BridgeRuntime:
         self._log.speaker(f'bus {bus}').error(with_outlook(reason, again))
         self._flight.bus_lost(bus)
 
+    def bus_told(self, bus: str, text: str) -> None:
+        """Log it."""
+        self._log.speaker(f'bus {bus}').warning(text)
+
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """Record that an exchange cannot go on."""
         text = f'buses.{bus}: {reason}'

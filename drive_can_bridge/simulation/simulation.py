@@ -182,6 +182,9 @@ class BusPlayer:
             self._complain(f'bus {self.bus.name}: open')
         self._opened, self._complained = True, False
 
+    def bus_told(self, text: str) -> None:
+        self._complain(f'bus {self.bus.name}: {text}')
+
     def bus_lost(self, reason: str) -> None:
         """Tell once that the bus is gone, or could not be opened."""
         if not self._complained:

@@ -12,6 +12,9 @@ from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
 #: what is told of an adapter that does not take what it was handed
 REFUSED_FRAMES = 'the adapter refuses frames'
+#: and of one that hands them back
+ECHOES = ('the adapter hands back what it was handed to send: one frame is dropped for each; look '
+          'for a setting of it that ends this')
 
 
 class Counts(NamedTuple):
@@ -49,6 +52,7 @@ class EndPoint(ABC):
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
     :ivar controller: state of the controller as far as it tells, '' while all is well.
     :ivar rejected_frames: what arrived and is of no use.
+    :ivar tell: takes what people should know of it, once each; None: nobody does.
     :ivar error_witness: sees the identifier and data of every error frame; None: nobody does.
     """
 
@@ -62,6 +66,7 @@ class EndPoint(ABC):
         self.controller = ERROR_ACTIVE
         self.bus_off_count = 0
         self.error_witness: Callable[[int, bytes], None] | None = None
+        self.tell: Callable[[str], None] | None = None
 
     @abstractmethod
     def receive(self, timeout: float) -> Frame | None:

@@ -64,6 +64,9 @@ class LinkListener(Protocol):
     def bus_lost(self, reason: str) -> None:
         """Note that the bus is gone, or could not be opened; ``reason`` is new."""
 
+    def bus_told(self, text: str) -> None:
+        """Note what people should know of the adapter."""
+
     def bus_misconfigured(self, reason: str) -> None:
         """No attempt will ever succeed. The link has given up."""
 
@@ -150,6 +153,7 @@ class Link:
         self._heard = False
         self._closing = self._tried = False
         self._reported = ''
+        self._told: set[str] = set()
         self._end, self._first_attempt = clock.wake_event(), clock.wake_event()
         self._thread = clock.worker(self._run, f'bus {bus.name}')
         self.frames_sent = 0
@@ -285,6 +289,7 @@ class Link:
                     return
                 self.taken = False
                 port.error_witness = self.error_witness
+                port.tell = self._tell_once
                 frame = port.receive(RECEIVE_TIMEOUT)
                 received_at = self._now() - port.age
                 self._loss = self._blocked = self._no_room_since = None
@@ -315,6 +320,12 @@ class Link:
             self._listener.bus_lost(reason)
         self._reported = reason
         self._tell_tried()
+
+    def _tell_once(self, text: str) -> None:
+        """Tell what is the same after each opening."""
+        if text not in self._told:
+            self._told.add(text)
+            self._listener.bus_told(text)
 
     def _open_in_time(self) -> EndPoint | None:
         """

@@ -28,7 +28,8 @@ from drive_can_bridge.transport.adapters import check_channel
 from drive_can_bridge.transport.bus_identity import (
     adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES,
 )
-from drive_can_bridge.transport.end_point import Counts, EndPoint, REFUSED_FRAMES
+from drive_can_bridge.transport.echo import Echo, Verdict
+from drive_can_bridge.transport.end_point import Counts, ECHOES, EndPoint, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
@@ -83,6 +84,8 @@ class Port(EndPoint):
         self._now, self._stamp = clock.now, clock.stamp
         self.host_stamps = host_stamps
         self._foreign = None if host_stamps else ForeignClock()
+        # on SocketCAN an equal frame is another master's
+        self._echo = None if host_stamps else Echo(clock)
         self._bus = bus
         self._lock = lock
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
@@ -146,7 +149,19 @@ class Port(EndPoint):
             self._malformed()
             return None
         self._malformed_in_row = 0
-        return Frame(message.arbitration_id, data, message.is_extended_id)
+        frame = Frame(message.arbitration_id, data, message.is_extended_id)
+        return frame if self._echo is None or self._is_new(self._echo, frame) else None
+
+    def _is_new(self, echo: Echo, frame: Frame) -> bool:
+        """Look whether a frame is not one of ours that came back."""
+        before = echo.verdict
+        if not echo.is_echo(frame):
+            return True
+        if echo.verdict is not Verdict.ECHOES:      # perhaps: nobody's
+            self.rejected_frames += 1
+        elif before is not echo.verdict and self.tell is not None:
+            self.tell(ECHOES)
+        return False
 
     def _age_of(self, stamp: float, now: float) -> float:
         if self._foreign is not None:
@@ -196,6 +211,16 @@ class Port(EndPoint):
         """Hand a frame to the adapter. See the base class."""
         message = can.Message(arbitration_id=frame.identifier, data=frame.data,
                               is_extended_id=frame.extended)
+        if self._echo is not None:
+            self._echo.sending(frame)
+        try:
+            self._send(message, timeout)
+        except BaseException:
+            if self._echo is not None:
+                self._echo.not_sent()
+            raise
+
+    def _send(self, message: can.Message, timeout: float) -> None:
         try:
             if self._socket is not None and not self._socket.has_room(timeout):
                 raise TransportError('send: transmit queue full')

@@ -80,6 +80,9 @@ class BusNotes:
     def __init__(self) -> None:
         self.told: list[tuple[Any, ...]] = []
 
+    def bus_told(self, bus: str, text: str) -> None:
+        pass
+
     def bus_opened(self, bus: str) -> None:
         self.told.append(('opened', bus))
 

@@ -44,6 +44,7 @@ class FakePort:
         self.has_room: bool | None = None
         self.looks = 0
         self.closed = False
+        self.tell: Callable[[str], None] | None = None
         self.age = 0.0
         self.punctual = False
         self.waits: set[float] = set()
@@ -103,6 +104,9 @@ class Listener:
 
     def bus_lost(self, reason: str) -> None:
         self.told.append(f'lost: {reason}')
+
+    def bus_told(self, text: str) -> None:
+        self.told.append(text)
 
     def bus_misconfigured(self, reason: str) -> None:
         self.told.append(f'misconfigured: {reason}')
