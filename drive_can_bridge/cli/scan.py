@@ -24,7 +24,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.output import may_overwrite, waiting, write_atomically
 from drive_can_bridge.configuration.load import (
     configuration_from_file, configuration_from_overrides)
-from drive_can_bridge.configuration.yaml_nodes import read_scalar
+from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
