@@ -35,6 +35,21 @@ class Outbox:
         self._frames.append(frame)
         self._left.append(left)
 
+    @property
+    def waiting(self) -> bool:
+        """Something is to be sent."""
+        return bool(self._frames)
+
+    def drop(self, unwanted: Callable[[Frame], bool], now: float) -> None:
+        """Leave out what waits and is not to be sent any more: it counts as refused."""
+        waiting = list(zip(self._frames, self._left))
+        self.clear()
+        for frame, left in waiting:
+            if not unwanted(frame):
+                self.put(frame, left)
+            elif left is not None:
+                left(False, now)
+
     def take(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
         frames = self._frames

@@ -128,6 +128,8 @@ class Session(ABC):
     services: DriveServices
     #: it can look for its reference
     homes = False
+    #: what came with a frame is to be taken before anything is sent because of that
+    looks_ahead = False
     _acyclic: AcyclicPart
 
     def __init__(self, drive: DriveConfiguration, control: ControlMachine | None, *,

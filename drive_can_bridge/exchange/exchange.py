@@ -56,6 +56,8 @@ PATIENCE, LITTLE_PATIENCE = LOST_TIME, 0.05
 LOOK_PERIOD = 0.05
 #: s by which the reader may be back too late before the timer thread does its work
 GRACE = 0.02
+#: frames that may have come in one packet and are looked at before something is sent
+LOOK_AHEAD = 8
 #: s until what was last sent is told again
 REQUEST_PERIOD = 1.0
 
@@ -512,16 +514,13 @@ class BusExchange:
             now = self._clock()
             if now - self._last_pass >= LOST_TIME:
                 self._notice_lost_time(now)
-            self.received_bits += bits_on_bus(len(frame[1]), frame[2])
-            if self._note is not None:
-                self._note(frame, arrived, False)
-            member = self._router.find(frame)
+            member = self._find(frame, arrived, now)
             if member is None:
-                for hearer in (hearers := self._router.hearers(frame)):
-                    hearer.take(hearer.session.receive_frame, frame, now, now - arrived)
-                self.frames_rejected += not hearers
                 return
-            member.take(member.session.receive_frame, frame, now, now - arrived)
+            if member.session.looks_ahead:
+                member.take(self._take_with_others, member, frame, now, now - arrived)
+            else:
+                member.take(member.session.receive_frame, frame, now, now - arrived)
             due = member.soonest
             if due >= self._wake_at:
                 return
@@ -529,6 +528,36 @@ class BusExchange:
                 self._wake_at = due
                 return
         self._wake.ring()
+
+    def _find(self, frame: Frame, arrived: float, now: float) -> Member | None:
+        """Count a frame, and return whose it is; what has no owner is handed out here."""
+        self.received_bits += bits_on_bus(len(frame[1]), frame[2])
+        if self._note is not None:
+            self._note(frame, arrived, False)
+        member = self._router.find(frame)
+        if member is None:
+            for hearer in (hearers := self._router.hearers(frame)):
+                hearer.take(hearer.session.receive_frame, frame, now, now - arrived)
+            self.frames_rejected += not hearers
+        return member
+
+    def _take_with_others(self, member: Member, frame: Frame, now: float, age: float) -> None:
+        """Take a frame, and before anything is sent because of it what came in one packet."""
+        session = member.session
+        session.receive_frame(frame, now, age)
+        for _ in range(LOOK_AHEAD):
+            if not session.outbox.waiting:
+                return
+            more = self.link.look()
+            if more is None:
+                return
+            following, age = more
+            now = self._clock()
+            owner = self._find(following, now - age, now)
+            if owner is member:
+                session.receive_frame(following, now, age)
+            elif owner is not None:
+                owner.take(owner.session.receive_frame, following, now, age)
 
     def bus_opened(self) -> None:
         """Begin (again) with every drive."""

@@ -214,6 +214,25 @@ class Link:
         self.frames_sent += 1
         return True
 
+    def look(self) -> tuple[Frame, float] | None:
+        """
+        Return a frame that is there already, and its age in s; None: there is none.
+
+        In the reader thread, while it hands over the frame before.
+        """
+        port = self._port
+        if port is None or self._loss is not None or self._blocked is not None:
+            return None
+        try:
+            frame = port.receive(0.0)
+        except BusUnavailable as error:
+            self._loss = self.last_error = in_words(error)  # the reader sees to it
+            return None
+        if frame is None:
+            return None
+        self.frames_received += 1
+        return frame, port.age
+
     def _no_room(self) -> None:
         now = self._now()
         if self._no_room_since is None:

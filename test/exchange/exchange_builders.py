@@ -23,6 +23,7 @@ class FakeLink:
         self.sent: list[str] = []
         self.refusing = False
         self.started = self.stopped = False
+        self.coming: list[Frame] = []       # with the frame that is taken
 
     def start(self) -> None:
         self.started = True
@@ -35,6 +36,9 @@ class FakeLink:
             return False
         self.sent.append(str(sent))
         return True
+
+    def look(self) -> tuple[Frame, float] | None:
+        return (self.coming.pop(0), 0.0) if self.coming else None
 
     def take(self) -> list[str]:
         sent, self.sent = self.sent, []

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import time
 import uuid
 
-from builders import drive
+from builders import drive, frame, INT32, parameter
 import can
 from clocks import REAL
 from exchange_builders import all_routes, Bench
@@ -49,6 +49,22 @@ def online() -> Bench:
     assert bench.at(10.004) == SHORT_NEUTRAL[1:]
     assert bench.at(10.010) == []
     return bench
+
+
+def test_what_came_in_one_packet_is_taken_before_anything_is_sent() -> None:
+    """The answer of a node and its boot-up frame: no request of before follows."""
+    target = parameter('target', None, index=0x60FF, subindex=0, type=INT32)
+    bench = Bench(drive('cia402', name='servo', station=5, mode='pv', table=(target,),
+                        request=(target,), response=()))
+    bench.begin()
+    assert bench.link.take()[-1] == '605#4041600000000000'
+    bench.link.coming = [frame('705#00'), frame('706#05'), frame('705#7F')]
+    assert bench.hears('585#4B41600050020000', 10.01) == ['605#4041600000000000']   # again
+    assert bench.link.coming == []
+    assert bench.exchange.frames_rejected == 1
+    bench.link.coming = [frame('706#05')]
+    assert bench.hears('705#7F', 10.03) == []
+    assert len(bench.link.coming) == 1, 'nothing is to be sent, so nobody looks'
 
 
 def test_both_begin_at_once() -> None:

@@ -175,6 +175,23 @@ def make(bench: World, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[...
     assert not bench.clock.tasks, 'a thread is left'
 
 
+def test_what_is_there_already_can_be_looked_at(make: Callable[..., Bench],
+                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    found, heard = list[object](), list[Frame]()
+
+    def look(_: Listener, frame: Frame, age: float) -> None:
+        bench.port.age = 0.25
+        found.extend((bench.link.look(), bench.link.look(), bench.link.look()))
+        heard.append(frame)
+    monkeypatch.setattr(Listener, 'frame_received', look)
+    bench = make()
+    bench.port.coming.extend((ANSWER, FRAME, BusUnavailable('unplugged')))
+    wait_for(lambda: bench.listener.told[-1] == 'lost: unplugged')
+    assert heard == [ANSWER]
+    assert found == [(FRAME, 0.25), None, None]
+    assert bench.link.frames_received == 2
+
+
 def test_open_read_send_close(make: Callable[..., Bench]) -> None:
     bench = make()
     assert bench.stations == {3}

@@ -109,6 +109,9 @@ class Cia402Session(Session):
     :ivar exchange: its cycles.
     """
 
+    #: a boot-up frame may come with the answer before it
+    looks_ahead = True
+
     def __init__(self, drive: DriveConfiguration, beat: Beat | None = None,
                  heartbeat: BridgeHeartbeat | None = None) -> None:
         options = drive.options
@@ -483,6 +486,7 @@ class Cia402Session(Session):
             self.services.fail_all(sentences.no_answer_because(reason))
             self._channel.clear()
             self._stop.forget()
+            self.outbox.drop(self._of_the_conversation, now)
             self._close(reason, now, START_SPACING)
         elif state is NmtState.STOPPED and self._stop.running:
             self._no_answer_comes(now)
@@ -493,6 +497,12 @@ class Cia402Session(Session):
             self._close(sentences.node_state(state.text), now, START_PERIOD)
         else:
             self._again.heard(now, hurry=True)
+
+    def _of_the_conversation(self, frame: Frame) -> bool:
+        """Tell whether a frame is for this node, which has restarted since it was made."""
+        return frame.identifier in self._masters or (
+            frame.identifier == network.NMT_IDENTIFIER
+            and frame.data[1] == self.configuration.station)
 
     def _no_pdos_at_the_end(self, state: NmtState, now: float) -> None:
         """Have a node told by SDO, at the end, that takes no PDOs any more."""

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """In which NMT state a node is, and what it may be asked there: a stop above all."""
 
-from builders import read
+from builders import frame, read
 import pytest
 from saying import says
 from servo_builders import Axis, FITS, POSITION
@@ -199,6 +199,45 @@ class TestWhatElseItIsAsked:
         axis.says('705#7F')
         axis.deliver(axis.talk.submits(read(POSITION), axis.now))
         assert '605#4064600000000000' in axis.take()
+
+
+class TestRestarts:
+    """Nothing of the conversation before goes out behind the boot-up frame."""
+
+    @staticmethod
+    def amidst(**options: object) -> Axis:
+        """Be in the middle of the set-up, the answer to 1400h.02h on its way."""
+        axis = Axis(**options)      # type: ignore[arg-type]
+        takes = axis.drive.takes
+        axis.drive.takes = (        # type: ignore[method-assign]
+            lambda sent: [] if str(sent).startswith('605#40001402') else takes(sent))
+        axis.deliver(axis.talk.bus_up(axis.now))
+        axis.deliver(axis.talk.activate(axis.now))
+        assert axis.take()[-1] == '605#4000140200000000'
+        return axis
+
+    def test_where_both_are_taken_before_anything_is_sent(self) -> None:
+        axis = self.amidst()
+        axis.session.receive_frame(frame('585#4F001402FF000000'), axis.now)
+        axis.session.receive_frame(frame('705#00'), axis.now)
+        assert [text for text in axis.talk.sent() if text[:4] in ('605#', '000#')] == []
+        axis.live(0.3)
+        again = [text for _, text in axis.log if text.startswith('605#')]
+        assert again[0] == '605#4041600000000000'
+
+    def test_what_all_drives_share_goes_out(self) -> None:
+        axis = self.amidst()
+        axis.session.outbox.put(frame('080#'))
+        axis.session.outbox.put(frame('77F#05'))
+        axis.session.outbox.put(frame('000#0106'))
+        axis.session.outbox.put(frame('000#0105'))
+        axis.session.receive_frame(frame('705#00'), axis.now)
+        assert axis.talk.sent() == ['080#', '77F#05', '000#0106']
+
+    def test_a_stop_that_is_owed_goes_out(self) -> None:
+        axis = running()
+        axis.session.receive_frame(frame('705#00'), axis.now)
+        assert DISABLE in axis.talk.sent()
 
 
 class TestStoppedAtTheEnd:
