@@ -35,6 +35,8 @@ _POLICY, _TLS_BRIDGE, _TLS_CLIENT = 'policy.xml', 'tls_bridge.xml', 'tls_client.
 READING = ('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters')
 WRITING = ('set_parameters', 'set_parameters_atomically')
 CONTROL = ('enable', 'reset_fault')
+#: what a bridge asks those of other hosts for, and their drives, when it passes a stop on
+PASSED_ON = ('quick_stop', 'get_parameter_types', 'get_parameters', 'list_parameters')
 #: a managed node says how it is, and is told
 STATES = ('get_available_states', 'get_available_transitions', 'get_state',
           'get_transition_graph')
@@ -128,8 +130,13 @@ def _add_bridge(profiles: ElementTree.Element, nodes: list[NodeNames], namespace
         profile = _enclave_profile(profiles, namespace, node.node)
         shared = [_EVENTS, _LOG, _DIAGNOSTICS] if number == 0 else [_EVENTS]
         _rule(profile, 'topics', 'publish', [*shared, *_own(node.shown)])
-        _rule(profile, 'topics', 'subscribe', [_CLOCK, _EVENTS, *_own(node.taken)])
+        passing = number == 0
+        _rule(profile, 'topics', 'subscribe', [
+            _CLOCK, _EVENTS, *_own(node.taken), *(_anywhere('online') if passing else ())])
         _rule(profile, 'services', 'reply', _own((*node.asked, *node.obeyed)))
+        if passing:
+            _rule(profile, 'services', 'request', [
+                name for each in PASSED_ON for name in _anywhere(each)])
 
 
 def _add_client(profiles: ElementTree.Element, nodes: list[NodeNames], namespace: str, *,
@@ -170,6 +177,11 @@ def _rule(profile: ElementTree.Element, kind: str, verb: str, names: Iterable[st
 
 def _own(names: Iterable[str]) -> list[str]:
     return [f'~/{name}' for name in names]
+
+
+def _anywhere(name: str) -> tuple[str, str]:
+    """Return what any drive, or bridge, may call something, in a namespace or not."""
+    return f'/*/{name}', f'/*/*/{name}'
 
 
 def _absolute(place: str, node: NodeNames, names: Iterable[str]) -> list[str]:
