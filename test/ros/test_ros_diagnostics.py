@@ -112,6 +112,16 @@ def test_a_round_that_users_held_up_is_no_slow_drive(bridge: StartBridge,
     assert says('slow_exchange', period=0.1) in told_of_a_long_round()
 
 
+def test_a_limit_that_is_not_in_effect_is_an_error(
+        bridge: StartBridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(by_hand())
+    one.online()
+    why = sentences.limit_in_vain('torque_limit (6072h.00h) stays 100 % although 30 % is sent')
+    monkeypatch.setattr(type(one.node.drives['conveyor'].session), 'error', why)
+    report = reporters(one)[1].report(clock().now())
+    assert (report.level, report.message) == (DiagnosticStatus.ERROR, why)
+
+
 def test_what_is_over_is_not_told_again(bridge: StartBridge) -> None:
     one = bridge(by_hand())
     one.online()

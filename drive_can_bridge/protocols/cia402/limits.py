@@ -19,7 +19,7 @@ import math
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
-from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
@@ -38,6 +38,7 @@ class _Limit:
     :ivar before: its word before what is sent now, as it was read; None: not known.
     :ivar looked_for: the word that was sent when it was looked at last; None: it was not yet.
     :ivar over: nothing more is to be found out.
+    :ivar otherwise: that it has a third value, in words; '' if not.
     """
 
     def __init__(self, parameter: Parameter, place: int) -> None:
@@ -45,6 +46,7 @@ class _Limit:
         self.before: int | None = None
         self.looked_for: int | None = None
         self.over = False
+        self.otherwise = NOTHING
 
     def text(self, word: int) -> str:
         """Write a word as a value with its unit."""
@@ -59,12 +61,11 @@ class LimitCheck:
     :param sent: what left last.
     :param judged: is called when something came of a look.
     :ivar without_effect: which limit is not in effect, in words; '': none is known to be.
-    :ivar otherwise: which one has a third value, likewise.
     """
 
     def __init__(self, limits: list[Parameter], sent: LastSent, channel: SdoChannel,
                  judged: Callable[[], None]) -> None:
-        self.without_effect = self.otherwise = NOTHING
+        self.without_effect = NOTHING
         self._limits = [_Limit(each, sent.parameters.index(each)) for each in limits]
         self._sent, self._channel, self._judged = sent, channel, judged
         self._open: list[_Limit] = []
@@ -87,15 +88,20 @@ class LimitCheck:
 
     def begin(self) -> None:
         """Begin to look: exchanges follow."""
-        self._looking, self.otherwise = None, NOTHING
+        self._looking = None
         for limit in self._limits:
-            limit.looked_for, limit.over = None, False
+            limit.looked_for, limit.over, limit.otherwise = None, False, NOTHING
         self._open = list(self._limits)
 
     def stop(self) -> None:
         """Look at nothing any more: the channel was cleared."""
         self._looking = None
         self._open = []
+
+    @property
+    def otherwise(self) -> Sentence:
+        """Which limits have a third value; '': none, as far as anybody knows."""
+        return together(each.otherwise for each in self._limits)
 
     @property
     def unseen(self) -> Sentence:
@@ -141,15 +147,16 @@ class LimitCheck:
 
     def _judge(self, limit: _Limit, shown: int, sent: int, *, in_effect: bool) -> None:
         first, limit.looked_for = limit.looked_for is None, sent
+        limit.otherwise = NOTHING
         if in_effect:
             limit.over = not first and shown != limit.before
             limit.before = shown
             return
         said = (named(limit.parameter), limit.text(shown), limit.text(sent))
-        limit.over = not first
-        if shown != limit.before:
-            self.otherwise = sentences.limit_otherwise(*said)
+        if shown != limit.before:   # and looked at again with each change
+            limit.otherwise = sentences.limit_otherwise(*said)
         else:
+            limit.over = True
             self._stuck, self.without_effect = limit, sentences.limit_without_effect(*said)
 
     def _looked(self, _: None) -> None:

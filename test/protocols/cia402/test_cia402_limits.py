@@ -225,6 +225,9 @@ class TestLimits:
         axis.live(1.0)
         assert not axis.session.error
         assert axis.session.warning == says('limit_otherwise', shown='80 %', sent='90 %')
+        bounds(axis, 50.0)
+        axis.live(1.0)
+        assert not axis.session.warning
 
     def test_lost_answers_are_asked_for_again(self) -> None:
         axis = limited(DropsLimit).enabled()
