@@ -15,6 +15,8 @@ import threading
 import time
 from typing import Generic, Protocol, TypeVar
 
+from drive_can_bridge.memory import data_limit
+
 #: CLOCK_MONOTONIC stands still while the machine is suspended; the drives do not
 _CLOCK = getattr(time, 'CLOCK_BOOTTIME', time.CLOCK_MONOTONIC)
 
@@ -116,7 +118,12 @@ class Bell:
 
 
 class SystemThread(threading.Thread):
-    """A thread that may be joined whatever became of it."""
+    """A thread that may be joined whatever became of it, and begins if memory is short."""
+
+    def start(self) -> None:
+        """Begin."""
+        with data_limit.room():
+            super().start()
 
     def join(self, timeout: float | None = None) -> None:
         """Wait for its end."""

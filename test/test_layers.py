@@ -22,7 +22,8 @@ PACKAGE = CHECKOUT / 'drive_can_bridge'
 INTERNAL: dict[str, set[str]] = {
     '': set(),
     'resources': {''},
-    'clock': {''},
+    'clock': {'', 'memory'},
+    'memory': {''},
     'process': {'', 'clock'},
     'core': {''},
     'protocols': {'', 'core'},
@@ -34,7 +35,7 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
-        'exchange', 'process', 'ros.client', 'ros.messages', 'ros.recognition'},
+        'exchange', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
@@ -394,9 +395,9 @@ SYSTEM_CLOCK = {'time', 'time_ns', 'localtime', 'gmtime', 'strftime', 'ctime', '
                 'CLOCK_REALTIME', 'datetime'}
 #: who may wait by himself, or ask for a time that nobody injects: processes, descriptors, signals,
 #: and a thread that never goes on
-OWN_WAYS = {'clock.py', 'process/locks.py', 'process/scheduling.py', 'process/signals.py',
-            'process/standard_outputs.py', 'ros/demo/commander.py', 'ros/rcl/escaped.py',
-            'view/live.py'}
+OWN_WAYS = {'clock.py', 'process/locks.py', 'process/scheduling.py',
+            'process/signals.py', 'process/standard_outputs.py', 'ros/demo/commander.py',
+            'ros/rcl/escaped.py', 'view/live.py'}
 WAYS = {'monotonic', 'monotonic_ns', 'perf_counter', 'sleep', 'thread_time', 'process_time',
         'clock_gettime', 'Thread', 'Event', 'Condition', 'Timer', 'Semaphore', 'SimpleQueue',
         'Queue'}

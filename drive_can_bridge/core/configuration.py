@@ -112,6 +112,7 @@ class BridgeConfiguration:
     Everything one bridge process does.
 
     :param joint_state_rate: Hz of the message with all joints; 0: there is none.
+    :param memory_limit_mb: MB beside what is in use when the bridge becomes active; 0: no limit.
     :param warnings: readable lines about what is allowed but suspicious (bus load over 70 %,
         a key that the adapter does not know).
     :param standard: parameters of ROS itself that stand beside ours, as they were read.
@@ -120,6 +121,7 @@ class BridgeConfiguration:
     autostart: bool = True
     diagnostics_period: float = 1.0
     joint_state_rate: float = 50.0
+    memory_limit_mb: int = 1024
     buses: dict[str, BusConfiguration] = field(default_factory=dict)
     drives: dict[str, DriveConfiguration] = field(default_factory=dict)
     profile_directories: tuple[str, ...] = ('',)

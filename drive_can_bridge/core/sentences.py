@@ -638,6 +638,9 @@ request_unreadable = Text(
     'the middleware cannot read a request of {service}: {reason} (clients need the same '
     'RMW_IMPLEMENTATION)',
     do='use one middleware for all')
+no_memory_limit = Text(
+    'no memory limit (memory_limit_mb): {reason}',
+    do='none is needed where all use one middleware')
 service_given_up = Text(
     '{service} is not served any more: {times} of its requests have stopped a thread each '
     '(clients need the same RMW_IMPLEMENTATION)',

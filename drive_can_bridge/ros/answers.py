@@ -16,7 +16,7 @@ import warnings
 
 from rclpy.service import Service
 
-from drive_can_bridge.clock import Clock, Mailbox, Worker
+from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.sentences import answer_not_delivered
 from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
@@ -48,8 +48,11 @@ class Answers:
         #: clients out of reach: how many answers for them wait
         self._waiting: dict[bytes, int] = {}
         self._late: Mailbox[Callable[[], None] | None] = Mailbox(clock)
-        self._thread: Worker | None = None
         self._ending = False
+        # now: later on there may be no memory for it
+        self._thread = clock.worker(self._run, 'late answers')
+        if rcl is not None:
+            self._thread.start()
 
     def send(self, service: Service, message: Any, header: Any) -> None:
         """
@@ -79,8 +82,7 @@ class Answers:
         with self._lock:
             self._ending = True
         self._late.put(None)
-        if self._thread is not None:
-            self._thread.join(5.0)
+        self._thread.join(5.0)
 
     def _defer(self, rcl: RclServices, response: Response) -> None:
         """Leave an answer to the thread that may wait; enough wait there: it is lost."""
@@ -90,9 +92,6 @@ class Answers:
             room = waiting < WAITING_MAX and not self._ending
             if room:
                 self._waiting[caller] = waiting + 1
-                if self._thread is None:
-                    self._thread = self._clock.worker(self._run, 'late answers')
-                    self._thread.start()
         if room:
             self._late.put(partial(self._deliver_late, rcl, response))
         else:

@@ -49,6 +49,7 @@ from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.sentences import bus_hangs, rearm_would_jump, requests_hold_up
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.memory import reserve
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.ros.answers import Answers
 from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
@@ -441,7 +442,7 @@ class BridgeNode(LifecycleNode):
         """Return what serves the stops of a bus: one that hangs holds up those of no other."""
         if bus not in self._control_threads:
             self._control_threads[bus] = self._service_thread(
-                f'control {bus}', raise_priority, share=1.0)
+                f'control {bus}', _prepare_control, share=1.0)
         return self._control_threads[bus]
 
     def _activate(self) -> None:
@@ -528,6 +529,12 @@ class BridgeNode(LifecycleNode):
     def diagnostics(self) -> Diagnostics | None:
         """What reports on buses and drives, from configure to cleanup."""
         return None if self._runtime is None else self._runtime.diagnostics
+
+
+def _prepare_control() -> None:
+    """Have stops served at once, and whatever others have allocated."""
+    raise_priority()
+    reserve()
 
 
 def _rcl_services(services: Iterable[Service], warn: Callable[[str], None]) -> RclServices | None:

@@ -25,10 +25,11 @@ from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.events import DriveState, Event, MappingDiffered, StationLost
-from drive_can_bridge.core.sentences import nothing_recorded
+from drive_can_bridge.core.sentences import no_memory_limit, nothing_recorded
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.exchange.exchange import BusExchange, stop_all
 from drive_can_bridge.exchange.one_master import InUse, Ownership
+from drive_can_bridge.memory import data_limit, MEGABYTE, reserve
 from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
@@ -124,6 +125,11 @@ class FlightWatch:
         self._calls = 0     # that wait for their answer
         self._service = node.create_service(TriggerService, '~/save_trace', self._save,
                                             callback_group=ReentrantCallbackGroup())
+
+    @property
+    def memory(self) -> int:
+        """Bytes that the records may take."""
+        return self._recorder.memory
 
     def note_of(self, bus: str) -> Callable[..., object] | None:
         """Return what takes every frame of a bus; None: nobody does."""
@@ -237,6 +243,7 @@ class BridgeRuntime:
         #: what is wrong with buses, as long as they are opened for the first time
         self._misconfigured: list[str] | None = []
         with ExitStack() as closing:    # the last first
+            closing.callback(data_limit.lift)
             closing.callback(self.exchanges.clear)
             closing.callback(self._own().release)
             domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
@@ -328,12 +335,27 @@ class BridgeRuntime:
         for exchange in self.exchanges.values():
             exchange.activate()
         self._attendance.begin()
+        self._limit_memory()
         self._log.info(f'active: {counted(len(self.drives), "drive")} on '
                        f'{counted(len(self.exchanges), "bus", "buses")}')
 
+    def _limit_memory(self) -> None:
+        """Limit what requests may take; who must go on has what that takes."""
+        megabytes = self.configuration.memory_limit_mb
+        if megabytes:
+            # for the main thread: whoever takes everything takes its heap, too
+            spare = self._clock.worker(reserve, 'reserve')
+            spare.start()
+            spare.join()
+            try:
+                data_limit.set(megabytes * MEGABYTE + self._flight.memory)
+            except OSError as error:
+                self._log.warning(no_memory_limit(str(error)))
+
     def stop(self) -> None:
         """Stop the drives safely, if they run."""
-        failures = stop_all(self.exchanges.values(), self._clock)
+        with data_limit.room():
+            failures = stop_all(self.exchanges.values(), self._clock)
         self._attendance.end()      # which may be waiting for a bus that hangs
         for bus, reason in failures.items():
             self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
@@ -372,8 +394,9 @@ class BridgeRuntime:
     # -- from the exchanges (BusListener) ---------------------------------------------------------
 
     def _prepare_thread(self) -> None:
-        """Make a thread of an exchange punctual."""
+        """Make a thread of an exchange punctual, and have what it needs."""
         self._priority = raise_priority()
+        reserve()
 
     def bus_opened(self, bus: str) -> None:
         """Log it."""

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.sentences import ends_before_stop, may_still_be_running
+from drive_can_bridge.memory import keep_reserves
 from drive_can_bridge.process.environment import domain_problem
 from drive_can_bridge.process.scheduling import be_punctual
 from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
@@ -37,6 +38,7 @@ checks a parameter file, 'drive_can demo' shows the bridge with simulated drives
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bridge until a signal; return the exit code."""
     arguments = list(sys.argv if args is None else args)
+    keep_reserves()
     be_punctual()
     # in a process of our own, signals are looked after to the very end
     clock = SteadyClock()

@@ -17,7 +17,7 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.service import Service
 
-from drive_can_bridge.clock import Clock, Worker
+from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.sentences import (
     request_hangs, request_hung, request_unreadable, requests_hold_up)
 from drive_can_bridge.ros.middleware import GONE, RCLError
@@ -85,7 +85,10 @@ class Requests:
         self._wake = clock.wake_event()
         self._idle = True
         self._ending = False
-        self._thread: Worker | None = None
+        # now: later on there may be no memory for it
+        self._thread = clock.worker(self._run, 'requests')
+        if rcl is not None:
+            self._thread.start()
 
     def take(self, service: Service, go_on: GoOn) -> tuple[Any, Any] | None:
         """
@@ -112,7 +115,7 @@ class Requests:
         self._taking[own] = taking
         if self._idle:
             self._idle = False
-            self._look_on()
+            self._wake.ring()
         try:
             return rcl.take(service, partial(self._threw, taking))
         finally:
@@ -128,28 +131,20 @@ class Requests:
         """End."""
         self._ending = True
         self._wake.ring()
-        if self._thread is not None:
-            self._thread.join(5.0)
+        self._thread.join(5.0)
 
     # -- the thread that looks how long it takes --------------------------------------------------
 
-    def _look_on(self) -> None:
-        if self._thread is None:
-            self._thread = self._clock.worker(self._run, 'requests')
-            self._thread.start()
-        else:
-            self._wake.ring()
-
     def _run(self) -> None:
         while not self._ending:
-            self._wake.wait(self._clock.now() + HANGS)
-            for own, taking in list(self._taking.items()):
-                self._look(own, taking)
             self._idle = True
             if self._taking:    # or one that began just now
                 self._idle = False
             else:
                 self._wake.wait()
+            self._wake.wait(self._clock.now() + HANGS)
+            for own, taking in list(self._taking.items()):
+                self._look(own, taking)
 
     def _look(self, own: int, taking: _Taking) -> None:
         if taking.told and not taking.thrown or (

@@ -92,7 +92,10 @@ class Ring:
             while len(full) > 1 and (full[1][0] < now - self._seconds
                                      or len(full) >= _BLOCKS_MAX):
                 full.popleft()
-            self._block = bytearray(_BLOCK_SIZE)
+            try:
+                self._block = bytearray(_BLOCK_SIZE)
+            except MemoryError:     # the oldest goes for it; the exchange must go on
+                self._block = full.popleft()[1]
             self._place = 0
             self._began = now
 
@@ -200,6 +203,11 @@ class FlightRecorder:
     def buses(self) -> list[str]:
         """The recorded buses."""
         return list(self._buses)
+
+    @property
+    def memory(self) -> int:
+        """Bytes that all of it may take."""
+        return len(self._buses) * MEMORY_MAX
 
     def ring(self, bus: str) -> Ring | None:
         """Return what keeps the frames of a bus; None: it is not recorded."""

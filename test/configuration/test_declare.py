@@ -24,6 +24,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('autostart', True),
         ('diagnostics_period', 1.0),
         ('joint_state_rate', 50.0),
+        ('memory_limit_mb', 1024),
         ('profile_directories', [str(tmp_path)]),
         ('buses.main.interface', 'virtual'),
         ('buses.main.channel', 'demo'),

@@ -61,6 +61,12 @@ def test_good(good: dict[str, Any]) -> None:
      [at('drives.conveyor.station', 'wrong_kind', kind='a bytes', allowed='an integer')]),
     ('drives.conveyor.period', float('nan'),
      [at('drives.conveyor.period', 'not_finite', allowed='a number of 0.001 to 60')]),
+    *[('memory_limit_mb', value, [at('memory_limit_mb', code, **{
+        'allowed': 'an integer of 128 to 1048576, or 0 for no limit', **fields})])
+      for value, code, fields in (
+          (-1, 'out_of_range', {'value': -1}), (64.0, 'wrong_type', {
+              'value': 64.0, 'kind': 'a number'}),
+          ('512', 'wrong_type', {'value': '512', 'kind': 'a string'}))],
     ('drives.conveyor', 5,
      [at('drives.conveyor', 'value_and_below', below='bus'),
       at('drives.conveyor', 'wrong_type', value=5, kind='an integer', allowed='a mapping')]),
@@ -70,8 +76,9 @@ def test_good(good: dict[str, Any]) -> None:
     ('unknown.key', 5,
      [at('unknown', 'unknown_key',
          hint=says('allowed', words=(
-             'autostart, diagnostics_period, joint_state_rate, profile_directories, buses, '
-             'drives, use_sim_time, start_type_description_service')))]),
+             'autostart, diagnostics_period, joint_state_rate, memory_limit_mb, '
+             'profile_directories, buses, drives, use_sim_time, '
+             'start_type_description_service')))]),
 ])
 def test_problem(good: dict[str, Any], name: str, value: object, expected: list[str]) -> None:
     assert problems({**good, name: value}) == expected
