@@ -74,8 +74,9 @@ class Cia402Options(NodeOptions):
         60.0, 's until a homing that has not ended counts as failed.', minimum=0.1, maximum=3600)
     nmt_start: bool = option(
         True, 'Send NMT: pre-operational for the set-up, start behind it, again after a boot-up, '
-        'and at most once a second while it is offline. false: none, and the mapping is written '
-        'only where the node is found pre-operational.')
+        'at most once a second while it is offline, and pre-operational before a stop to a node '
+        'that NMT has stopped. false: none, and the mapping is written only where the node is '
+        'found pre-operational.')
 
 
 class Cia402(Family):

@@ -50,6 +50,17 @@ class TestWatched:
         assert axis.session.online
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
 
+    @pytest.mark.parametrize('behaviour', [0, 2])
+    def test_one_that_leaves_operational_by_itself_in_motion_is_told_to_stop(
+            self, behaviour: int) -> None:
+        """Pre-operational or stopped, as its 1029h says: its motor goes on."""
+        axis = Axis(make=WatchesSync, objects={(0x1029, 1): bytes((behaviour,))}).enabled()
+        axis.commands(0.0, 100.0)
+        axis.now += 0.05
+        axis.live(0.12)     # a heartbeat
+        assert axis.drive.state in (axis.drive.ON, axis.drive.READY)
+        assert not [note for note in axis.talk.events(Noted) if note.danger]
+
     def test_a_stall_does_not_either(self) -> None:
         axis = Axis(make=WatchesSync).enabled()
         axis.now += 1.5
