@@ -165,6 +165,32 @@ class HomingServo(LateServo):
         self.becomes(self.state)
 
 
+class StepperServo(HomingServo):
+    """
+    A stepper, as users report it: its state machine runs each 30 ms, at a period of 20 ms.
+
+    It homes to a switch, and has an error of the homing before (bit 13) until the next begins.
+    """
+
+    def __init__(self, node: int, objects: dict[tuple[int, int], bytes] | None = None) -> None:
+        super().__init__(node, objects)
+        self.before = 0x2000
+        self.waits = 0                  # units of 10 ms since it ran
+
+    def write(self, index: int, subindex: int, content: bytes) -> None:
+        if index == 0x6040:
+            self.objects[index, subindex] = content
+        else:
+            super().write(index, subindex, content)
+
+    def runs_down(self) -> None:
+        self.waits += 2
+        if self.waits >= 3:
+            self.waits -= 3
+            super().write(0x6040, 0, self.objects[0x6040, 0])
+        super().runs_down()
+
+
 class LelyHomingServo(HomingServo):
     """
     Lely core 2.4.0 with the fake CiA 402 slave of ros2_canopen.

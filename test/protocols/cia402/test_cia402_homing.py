@@ -2,7 +2,7 @@
 """The end of a homing, as drives show it that are late, done at once, or left off as they were."""
 
 from builders import INT32, parameter, RAM
-from literal_servos import HomingServo, LelyHomingServo
+from literal_servos import HomingServo, LelyHomingServo, StepperServo
 import pytest
 from saying import says
 from servo_builders import Axis, OBJECTS
@@ -168,6 +168,22 @@ def test_an_encoder_that_dithers_costs_no_homing(dither: int) -> None:
         assert success is not fails
         assert drive.state == drive.ENABLED
         assert set(targets(axis, 8)) <= {20, 20 + dither}
+
+
+@pytest.mark.parametrize('mode', ['csp', 'pp'])
+@pytest.mark.parametrize('late', [0, 1])
+@pytest.mark.parametrize('phase', [0, 1, 2])
+def test_a_stepper_with_a_state_machine_of_30_ms_at_a_period_of_20(
+        mode: str, late: int, phase: int) -> None:
+    """Also where TPDOs are built before the RPDO of the same SYNC acts, as Lely does."""
+    axis, drive = meet(mode, kind=StepperServo, period=0.02)
+    drive.late_status, drive.waits = late, phase    # type: ignore[attr-defined]
+    for _ in range(2):
+        drive.before = 0x2000
+        assert home(axis, 1.5) == HOMED
+    assert (drive.found, drive.broken_off) == (2, 0)
+    assert axis.asks(ControlAction.DISABLE)[0][:2] == ('disable', True)
+    assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]
 
 
 def test_a_slave_of_lely_that_starts_on_bit_2_and_keeps_its_bits() -> None:
