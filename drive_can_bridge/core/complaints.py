@@ -314,7 +314,10 @@ heartbeat_too_short = Text(
     '{timeout:g} s is not longer than heartbeat_producer ({producer:g} s), allowed is more, or 0')
 setpoint_of_other_mode = Text("'{name}' is the setpoint of another mode than '{mode}'")
 pdo_twice = Text('a PDO stands twice, allowed is once')
-pdos_too_small = Text('{count} PDO{plural} of 8 bytes cannot carry {listed}, needed are {needed}')
+pdos_too_small = Text(
+    '{count} PDO{plural} of 8 bytes cannot carry {listed}, needed are {needed}: write {write}',
+    '{count} PDO{plural} of 8 bytes cannot carry {listed}, needed are {needed}, and there are no '
+    'more: leave entries away')
 setpoint_missing = Text(
     "mode '{name}' has its setpoint in {index:04X}h.{subindex:02X}h, which is missing, allowed "
     'is to add it')

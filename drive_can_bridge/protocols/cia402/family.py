@@ -45,11 +45,11 @@ class Cia402Options(NodeOptions):
         'configure', 'What becomes of the PDOs: configure (written, each read back), verify '
         '(read; not cycled where they differ), assume (not looked at).')
     request_pdos: IntegerList = option(
-        (1,), 'Numbers of the receive PDOs to be filled, in order: control word, then '
-        'cyclic_request.', minimum=1, maximum=PDO_MAX)
+        (), 'Numbers of the receive PDOs to be filled, in order: control word, then '
+        'cyclic_request; none: as many as needed, from 1.', minimum=1, maximum=PDO_MAX)
     response_pdos: IntegerList = option(
-        (1,), 'Numbers of the transmit PDOs to be filled, in order: status word, then '
-        'cyclic_response.', minimum=1, maximum=PDO_MAX)
+        (), 'Numbers of the transmit PDOs to be filled, in order: status word, then '
+        'cyclic_response; none: as many as needed, from 1.', minimum=1, maximum=PDO_MAX)
     transmission: Literal['sync', 'event'] = option(
         'sync', 'sync: one SYNC a period and bus; event: the drive sends by its event timer.')
     heartbeat_producer: float = option(
@@ -244,10 +244,13 @@ class Cia402(Family):
             if len(set(numbers)) < len(numbers):
                 yield Complaint(key, complaints.pdo_twice())
             needed = len(pdo.distribute([pdo.width(each) for each in (first, *parameters)]))
-            if needed > len(numbers):
+            count = len(numbers) or PDO_MAX
+            if needed > count:
+                free = [each for each in range(1, PDO_MAX + 1) if each not in numbers]
+                more = [*numbers, *free[:needed - count]]
                 yield Complaint(key, complaints.pdos_too_small(
-                    count=len(numbers), plural='s' * (len(numbers) != 1), listed=listed,
-                    needed=needed))
+                    count=count, plural='s' * (count != 1), listed=listed, needed=needed,
+                    write=f'{key}: {more}' if needed <= PDO_MAX else ''))
 
     def _check_mode(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         name: str | None = drive.options.mode

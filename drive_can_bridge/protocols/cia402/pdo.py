@@ -173,8 +173,8 @@ def receive_pdos(node: int, numbers: Sequence[int],
     """
     Return the RPDOs that carry parameters to a drive.
 
-    :param numbers: of the PDOs to be filled, in order. Of too few of them, the last parameters
-        are left out.
+    :param numbers: of the PDOs to be filled, in order; none: as many as needed, from 1. Of too
+        few of them, the last parameters are left out.
     """
     return _pdos(numbers, parameters, RPDO_BASE + node, RPDO_COMMUNICATION)
 
@@ -190,4 +190,4 @@ def _pdos(numbers: Sequence[int], parameters: Sequence[Parameter], base: int,
     places = distribute([width(each) for each in parameters])
     return [Pdo(number, base + PDO_STEP * (number - 1), communication + number - 1,
                 tuple(parameters[place] for place in inside))
-            for number, inside in zip(numbers, places)]
+            for number, inside in zip(numbers or range(1, PDO_MAX + 1), places)]

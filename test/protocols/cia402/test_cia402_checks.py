@@ -13,6 +13,7 @@ from servo_builders import (
 
 from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.families import FAMILIES
 
 FAMILY = FAMILIES['cia402']
@@ -82,13 +83,21 @@ def test_a_period_that_jitters() -> None:
 
 
 def test_lists_that_are_too_short_say_what_is_needed() -> None:
-    assert wrong(response=(POSITION, VELOCITY)) == {'response_pdos': says(
-        'pdos_too_small', count=1, plural='', listed='cyclic_response', needed=2)}
+    assert wrong(response=(POSITION, VELOCITY), response_pdos=(1,)) == {'response_pdos': says(
+        'pdos_too_small', count=1, plural='', listed='cyclic_response', needed=2,
+        write='response_pdos: [1, 2]')}
+    assert wrong(response=(POSITION, VELOCITY), response_pdos=(2,)) == {'response_pdos': says(
+        'pdos_too_small', write='response_pdos: [2, 1]')}
+    assert wrong(response=(POSITION, VELOCITY)) == {}   # as many as needed, from 1
+    many = [replace(POSITION, name=f'p{n}', index=0x2000 + n) for n in range(9)]
+    assert wrong(response=many) == {'response_pdos': says(
+        'pdos_too_small', count=4, needed=5, write='')}
     assert wrong(response=(POSITION, VELOCITY), response_pdos=(1, 3)) == {}
     # 2 + 4 bytes, then 4 + 2: no entry is torn
     assert wrong(request=(VELOCITY_TARGET, replace(
-        VELOCITY_TARGET, name='other', index=0x2000))) == {'request_pdos': says(
-            'pdos_too_small', count=1, plural='', listed='cyclic_request', needed=2)}
+        VELOCITY_TARGET, name='other', index=0x2000)), request_pdos=(3,)) == {
+            'request_pdos': says('pdos_too_small', count=1, plural='', listed='cyclic_request',
+                                 needed=2, write='request_pdos: [3, 1]')}
     assert wrong(response_pdos=(1, 1)) == {'response_pdos': says('pdo_twice')}
 
 
@@ -194,3 +203,9 @@ def test_identifiers() -> None:
     assert set(claimed) == {0x000, 0x080, 0x085, 0x205, 0x285, 0x485, 0x585, 0x605, 0x705, 0x77F}
     assert not claimed[0x080].heard
     assert not claimed[0x77F].heard
+
+
+def test_as_many_pdos_as_needed_from_1() -> None:
+    made = servo(response=(POSITION, VELOCITY))
+    assert [each.number for each in request_pdos(made)] == [1]
+    assert [each.number for each in response_pdos(made)] == [1, 2]
