@@ -477,10 +477,13 @@ class DriveChecker:
                 continue
             parameter = Parameter(name=name, listed=False)
             if self._loaded is not None:
+                known = self._loaded.profile.parameters
                 if name not in self._loaded.names:
+                    fit = [each for each in self._loaded.names if each not in known
+                           or not _direction_problem(key, known[each])]
                     self._wrong((key,), complaints.not_in_profile(
-                        name=name, hint=suggestion(name, self._loaded.names)), at=at)
-                parameter = self._loaded.profile.parameters.get(name, parameter)
+                        name=name, hint=suggestion(name, fit)), at=at)
+                parameter = known.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
                 self._wrong((key,), message, at=at)

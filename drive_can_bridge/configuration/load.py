@@ -301,8 +301,9 @@ def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | No
             return NOTHING
         available = ', '.join(FAMILIES)
         if isinstance(value, str):
-            return complaints.unknown_protocol(
-                value=value, near=hint(value, FAMILIES), allowed=available)
+            near = complaints.two_protocols() if value.lower() == 'canopen' else \
+                hint(value, FAMILIES)
+            return complaints.unknown_protocol(value=value, near=near, allowed=available)
         return complaints.no_protocol(value=value, allowed=available)
     if keyword != 'additionalProperties':
         return None

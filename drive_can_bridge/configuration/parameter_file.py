@@ -14,6 +14,7 @@ import re
 from typing import Any, NamedTuple
 
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
+from drive_can_bridge.configuration.schema import definition
 from drive_can_bridge.configuration.yaml_nodes import (
     BrokenYaml, Kind, Node, read_documents, Rules, TreeReader)
 from drive_can_bridge.core import complaints
@@ -24,6 +25,8 @@ from drive_can_bridge.core.text import nearest
 PARAMETERS_KEY = 'ros__parameters'
 #: tells the section of a bridge from those of other nodes
 MARK = 'buses'
+#: what holds entries by name, and what one of them is
+_OURS = {'buses': 'bus', 'drives': 'drive'}
 #: tell a profile, which is no file for nodes
 _PROFILE_KEYS = {'protocols', 'parameters'}
 #: how much a key has to look like that to be a slip of the pen, and no namespace
@@ -104,6 +107,8 @@ class _FileReader:
                     key.text, [PARAMETERS_KEY], cutoff=_SLIP) is not None:
                 # rcl compares the beginning only, and would take a longer one for the real one
                 self._note(key.line, here, complaints.misspelt(allowed=PARAMETERS_KEY))
+            elif not path and key.text in _OURS:
+                self._note(key.line, here, complaints.without_head(entry=PARAMETERS_KEY))
             elif value.kind is Kind.MAPPING:
                 self._names(value, here)
             else:
@@ -123,7 +128,8 @@ class _FileReader:
         if node.kind is not Kind.MAPPING:
             self._note(line, (*path, PARAMETERS_KEY), complaints.no_parameters())
             return
-        reader = TreeReader(self._file, Rules.PARAMETERS)
+        reader = TreeReader(self._file, Rules.PARAMETERS, {
+            (name,): definition(kind)['properties'] for name, kind in _OURS.items()})
         reader.read(node)
         self.sections.append(Section(name, reader.tree, reader.refused))
         self.problems.extend(reader.refused)

@@ -77,6 +77,8 @@ class ProfileStore:
                         for path in directory.glob(f'*{SUFFIX}')})
         places = ', '.join(map(str, self._directories)) or 'no directory'
         hint = suggestion(name, known) if known else complaints.no_profile_at_all()
+        if name.lower().endswith(('.eds', '.dcf')):
+            hint = complaints.to_be_imported(name=name)
         return complaints.unknown_profile(name=name, hint=hint, places=places)
 
 

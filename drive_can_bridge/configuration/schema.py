@@ -107,6 +107,9 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
     elif 'propertyNames' in error.relative_schema_path:
         here = (*path, error.instance)
         yield here, _message(error), here
+    elif error.validator == 'minProperties' and any(
+            place[:-1] == path for place in tree.damaged):
+        yield path, NOTHING, path   # it had some, and what is wrong with them was said
     elif path and isinstance(path[-1], int):
         yield path[:-1], _message(error), path
     else:
@@ -122,6 +125,14 @@ def _message(error: ValidationError) -> Sentence:
         if isinstance(value, float) and not math.isfinite(value):
             return complaints.not_finite(value=value, allowed=allowed(schema))
         kind = describe_type(value)
+        if isinstance(value, bool) and schema.get('type') == 'string':
+            return complaints.word_as_bool(value=value, kind=kind, allowed=allowed(schema))
+        if isinstance(value, str) and schema.get('type') == 'array':
+            return complaints.one_entry(value=value, kind=kind, allowed=allowed(schema))
+        number = _number_in(value, schema) if isinstance(value, str) else None
+        if number is not None:
+            return complaints.number_in_words(value=value, kind=kind, allowed=allowed(schema),
+                                              number=value_text(number))
         if isinstance(value, (bool, int, float, str)):
             return complaints.wrong_type(value=value, kind=kind, allowed=allowed(schema))
         return complaints.wrong_kind(kind=kind, allowed=allowed(schema))
@@ -143,6 +154,25 @@ def _message(error: ValidationError) -> Sentence:
     if error.validator == 'maxProperties':
         return complaints.too_many_entries(count=len(value), allowed=schema['maxProperties'])
     return complaints.wrong(value=value, allowed=allowed(schema))
+
+
+_NUMBER = re.compile(r'([0-9]+(?:\.[0-9]+)?) *([A-Za-z/]*)')
+_FACTORS = {'': 1.0, 's': 1.0, 'ms': 1e-3, 'us': 1e-6, 'bit/s': 1.0, **{
+    f'{letter}{unit}': factor for letter, factor in (('k', 1e3), ('m', 1e6))
+    for unit in ('', 'bit', 'bit/s', 'bps', 'baud')}}
+
+
+def _number_in(text: str, schema: Any) -> float | int | None:
+    """Return the number that a text with quotes, or with a unit, stands for: ``1M``, ``20ms``."""
+    found = _NUMBER.fullmatch(text.strip())
+    types = schema.get('type')
+    if found is None or types not in ('number', 'integer') or found[2].lower() not in _FACTORS:
+        return None
+    value = round(float(found[1]) * _FACTORS[found[2].lower()], 9)
+    low, high = schema.get('minimum', -math.inf), schema.get('maximum', math.inf)
+    if not low <= value <= high or types == 'integer' and not value.is_integer():
+        return None
+    return int(value) if types == 'integer' else value
 
 
 def allowed(schema: Any) -> str:

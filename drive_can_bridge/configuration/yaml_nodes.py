@@ -7,11 +7,12 @@ refuses (aliases, anchors that stand twice). No recursion: no nesting of a file 
 of the C stack. Everything wrong is noted and reading goes on.
 """
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping
 from enum import Enum
 from errno import EFBIG, EINVAL
 from pathlib import Path as FilePath
 import re
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
@@ -178,11 +179,14 @@ class TreeReader:
 
     What spoils this mapping only is noted in the tree.
 
+    :param entries: of mappings that hold entries by name, the keys that an entry may have.
     :ivar refused: what spoils the whole file.
     """
 
-    def __init__(self, file: str, rules: Rules) -> None:
+    def __init__(self, file: str, rules: Rules,
+                 entries: Mapping[Path, Container[str]] = MappingProxyType({})) -> None:
         self.tree = Tree({}, file)
+        self._entries = entries
         self.refused: list[Problem] = []
         self._parameters = rules is Rules.PARAMETERS
         self._why = ' (rcl refuses the file)' if self._parameters else ''
@@ -199,7 +203,7 @@ class TreeReader:
 
     def _mapping(self, node: Node, path: Path, target: dict[str, Any]) -> None:
         lines = self.tree.lines
-        for key, value in node.pairs:
+        for key, value in self._in_place(node, path):
             problem = _key_problem(key)
             if problem:
                 self.refused.append(self.tree.problem(path, problem)._replace(line=key.line))
@@ -222,6 +226,37 @@ class TreeReader:
             if read is not _UNREADABLE:
                 target[key.text] = read
 
+    def _in_place(self, node: Node, path: Path) -> Iterator[tuple['Node', 'Node']]:
+        """Yield keys and values, without those that were meant to stand below an entry."""
+        keys = self._entries.get(path)
+        empty: Node | None = None       # an entry without anything below it
+        displaced: list[int] = []
+        for key, value in (*node.pairs, (_END, _END)):
+            if keys is not None and empty is not None and key.text in keys \
+                    and value.kind is not Kind.MAPPING:
+                displaced.append(key.line)
+                continue
+            if empty is not None:
+                here = (*path, empty.text)
+                self.tree.lines[here] = empty.line
+                self._note(here, complaints.not_below(
+                    why=self._why, first=displaced[0], last=displaced[-1]) if displaced
+                    else self._no_value(empty.text, path))
+                empty, displaced = None, []
+            if keys is not None and not _key_problem(key) and _is_empty(value):
+                empty = key
+            elif key is not _END:
+                yield key, value
+
+    def _no_value(self, key: str, path: Path) -> Sentence:
+        """Say that a key has no value, and why, where that can be seen."""
+        for separator, message in ((':', complaints.no_space), (' ', complaints.no_colon)):
+            name, found, value = key.partition(separator)
+            if found and value.strip():
+                self.tree.incomplete.add(path)
+                return message(why=self._why, key=name, value=value.strip())
+        return complaints.no_value(why=self._why)
+
     def _value(self, node: Node, path: Path) -> Any:
         if node.kind is Kind.SCALAR:
             return self._scalar(node, path)
@@ -238,8 +273,8 @@ class TreeReader:
         return _UNREADABLE
 
     def _scalar(self, node: Node, path: Path) -> Any:
-        if not node.text and not node.quoted:
-            self._note(path, complaints.no_value(why=self._why))
+        if _is_empty(node):
+            self._note(path, self._no_value(str(path[-1]), path[:-1]))
         elif '\0' in node.text:
             self._note(path, complaints.nul())
         else:
@@ -266,6 +301,14 @@ class TreeReader:
             else:
                 items.append(value)
         return _UNREADABLE if path in self.tree.damaged else items
+
+
+#: stands behind the last key of a mapping
+_END = Node(Kind.LIST, 0, [])
+
+
+def _is_empty(node: Node) -> bool:
+    return node.kind is Kind.SCALAR and not node.text and not node.quoted
 
 
 def _key_problem(key: Node) -> Sentence:

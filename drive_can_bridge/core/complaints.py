@@ -21,6 +21,8 @@ nothing_allowed = Text('nothing is allowed here')
 allowed_below = Text('allowed is {entry} below it')
 list_empty = Text('{listed} is empty')
 no_profile_at_all = Text('there is no profile at all')
+two_protocols = Text(' (a drive of CiA 402 is cia402, a Schneider TeSys T is canopen_pkw)')
+to_be_imported = Text('a profile is made of it by: drive_can profile import {name} -o drive.yaml')
 
 # -- values and keys
 missing = Text('missing, allowed is {allowed}')
@@ -28,6 +30,11 @@ unknown_key = Text('unknown key, {hint}')
 unknown_key_of_bridge = Text("unknown key, did you mean '{word}'? It is set by the bridge itself")
 wrong_type = Text('{value!r} is {kind}, allowed is {allowed}')
 wrong_kind = Text('{kind}, allowed is {allowed}')
+number_in_words = Text('{value!r} is {kind}, allowed is {allowed}: write {number}')
+word_as_bool = Text(
+    '{value!r} is {kind} (so are on, off, yes and no without quotes), allowed is {allowed}: write '
+    'it in quotes')
+one_entry = Text('{value!r} is {kind}, allowed is {allowed}: write [{value}]')
 not_finite = Text('{value!r} is not a finite number, allowed is {allowed}')
 unknown_word = Text('{value!r} is unknown{near}, allowed is {allowed}')
 out_of_range = Text('{value!r} is out of range, allowed is {allowed}')
@@ -67,6 +74,9 @@ nothing_configured = Text(
 file_is_for = Text('{file} is for {nodes}')
 no_mapping = Text('no mapping, allowed is NODE_NAME: {{{entry}: …}}')
 no_mapping_refused = Text('no mapping (rcl refuses the file), {hint}')
+without_head = Text(
+    'stands at the beginning of the file, allowed is below /**/drive_can_bridge: and {entry}:, '
+    'each indented by two more spaces')
 no_parameters = Text('no mapping, allowed are parameters')
 no_node_name_above = Text('no node name above it, allowed is NODE_NAME: {{{entry}: …}}')
 no_node_name = Text(
@@ -91,6 +101,11 @@ key_with_nul = Text('a key with a NUL character, allowed is a name')
 dots = Text('a key with dots, allowed are nested keys')
 alias = Text('an alias{why}, allowed is the value itself')
 no_value = Text('no value{why}, allowed is a value, or [] for an empty list')
+no_space = Text('no value{why}: a space is missing behind the colon, write {key}: {value}')
+no_colon = Text('no value{why}: a colon is missing, write {key}: {value}')
+not_below = Text(
+    'no value{why}: the lines {first} to {last} stand beside it, not below it, indent them by two '
+    'more spaces')
 nul = Text('a NUL character, allowed is text without')
 garbling_mapping = Text(
     'an empty mapping (rcl garbles what follows), allowed is to leave the key out')
@@ -102,6 +117,10 @@ more = Text('and {count} more')
 
 # -- buses
 no_interface = Text('{name!r} is no interface of python-can, {hint}')
+channel_of_kernel = Text(
+    '{name!r} is a SocketCAN device, allowed is interface: socketcan with channel: {name}')
+channel_of_serial = Text(
+    '{name!r} is a serial port, allowed is interface: slcan with channel: {name}')
 driver_missing = Text(
     "the driver of interface '{interface}' is missing ({why}), allowed is one that is installed")
 no_serial_port = Text(
@@ -319,8 +338,11 @@ pdos_too_small = Text(
     '{count} PDO{plural} of 8 bytes cannot carry {listed}, needed are {needed}, and there are no '
     'more: leave entries away')
 setpoint_missing = Text(
+    "mode '{name}' has its setpoint in {index:04X}h.{subindex:02X}h, which is missing, allowed is "
+    'to add {parameter}',
     "mode '{name}' has its setpoint in {index:04X}h.{subindex:02X}h, which is missing, allowed "
-    'is to add it')
+    'is to add it',
+    fields='name index subindex parameter')
 setpoint_limit = Text(
     '{name!r} is the setpoint of {mode}, which is no limit; allowed in what bounds the drive')
 setpoint_type = Text('{type}, the setpoint of {name} is {wanted}')
@@ -368,16 +390,48 @@ built_in = Text("'{name}' is built in for {family}, allowed is any other name")
 CODES = catalogue(globals(), do='correct the file as the text says, and validate it again')
 
 
+#: what is called otherwise by other stacks, and by people: our word -> theirs
+_OTHER_WORDS = {
+    'station': 'node_id nodeid node-id node can_id id address slave slave_id unit unit_id',
+    'bitrate': 'baudrate baud baud_rate bit_rate speed',
+    'channel': 'port device dev',
+    'interface': 'type bustype adapter driver',
+    'protocol': 'family driver profile_type',
+    'profile': 'eds eds_file dcf parameter_table table',
+    'period': 'cycle cycle_time interval rate frequency sync_period',
+    'cyclic_request': 'setpoints commands rpdo request outputs',
+    'cyclic_response': 'feedback actual_values tpdo response inputs',
+    'command_timeout': 'timeout watchdog',
+    'mode': 'operation_mode mode_of_operation modes_of_operation',
+    'cia402': 'ds402 dsp402 dsp-402 cia_402 cia-402 402 servo',
+    'cannord': 'nord',
+    'canopen_pkw': 'tesys tesys_t ltmr pkw',
+    'datamodel_extended': 'datamodel',
+}
+_OURS: dict[str, list[str]] = {}
+for _our, _theirs in _OTHER_WORDS.items():
+    for _their in _theirs.split():
+        _OURS.setdefault(_their, []).append(_our)
+
+
+def _meant(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that is meant by another one, or None."""
+    words = list(known)
+    folded = word.lower()
+    return next((each for each in (folded, *_OURS.get(folded, ())) if each in words),
+                nearest(word, words))
+
+
 def hint(word: str, known: Iterable[str]) -> Sentence:
-    """Write the nearest known word as a remark in brackets, or nothing."""
-    match = nearest(word, known)
+    """Write the known word that is meant as a remark in brackets, or nothing."""
+    match = _meant(word, known)
     return near(word=match) if match else NOTHING
 
 
 def suggestion(word: str, known: Iterable[str]) -> Sentence:
     """Write the end of a sentence on an unknown word: the nearest known one, or all."""
     words = list(known)
-    match = nearest(word, words)
+    match = _meant(word, words)
     if match is not None:
         return did_you_mean(word=match)
     if not words:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 import importlib
 import inspect
 import logging
+import re
 from typing import Any
 
 import can
@@ -65,6 +66,10 @@ def check_interface(interface: str) -> Sentence | None:
     """Say why an interface can never be used on this machine; None: it may."""
     known = sorted(can.interfaces.BACKENDS)
     if interface not in can.interfaces.BACKENDS:
+        if re.fullmatch(r'v?s?l?can[0-9]+', interface):
+            return complaints.channel_of_kernel(name=interface)
+        if interface.startswith('/dev/'):
+            return complaints.channel_of_serial(name=interface)
         return complaints.no_interface(name=interface, hint=suggestion(interface, known))
     try:
         adapter = _adapter_class(interface)

@@ -53,7 +53,7 @@ CASES = [
       at('f.yaml:6: buses.main.interfaces', 'unknown_key',
          hint=says('did_you_mean', word='interface'))]),
     ('interface: virtual', 'interface: yes',
-     [at('f.yaml:6: buses.main.interface', 'wrong_type', value=True, kind='a bool',
+     [at('f.yaml:6: buses.main.interface', 'word_as_bool', value=True, kind='a bool',
          allowed='a string')]),
     ('      main:\n', '      "ma in":\n',
      [at('f.yaml:5: buses.ma in', 'wrong', value='ma in',

@@ -91,7 +91,7 @@ def test_what_was_declared_configures_the_same(tmp_path: Path) -> None:
     ('drives.conveyor.command_timeout', float('inf'),
      'inf is not a finite number, allowed is a number of 0 to 3600'),
     ('drives.conveyor.command_timeout', '1',
-     "'1' is a string, allowed is a number of 0 to 3600"),
+     "'1' is a string, allowed is a number of 0 to 3600: write 1"),
     ('drives.conveyor.rearm', 'immediate', None),
     ('drives.conveyor.rearm', 'imediate',
      "'imediate' is unknown (did you mean 'immediate'?), allowed is neutral or immediate"),

@@ -66,7 +66,8 @@ def test_good(good: dict[str, Any]) -> None:
       for value, code, fields in (
           (-1, 'out_of_range', {'value': -1}), (64.0, 'wrong_type', {
               'value': 64.0, 'kind': 'a number'}),
-          ('512', 'wrong_type', {'value': '512', 'kind': 'a string'}))],
+          ('512', 'number_in_words', {
+              'value': '512', 'kind': 'a string', 'number': '512'}))],
     ('drives.conveyor', 5,
      [at('drives.conveyor', 'value_and_below', below='bus'),
       at('drives.conveyor', 'wrong_type', value=5, kind='an integer', allowed='a mapping')]),

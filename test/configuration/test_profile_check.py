@@ -48,13 +48,13 @@ CASES = [
       at('f.yaml:23: drives.lift.profile', 'profile_for_others', name='table', protocols='cannord',
          family='datamodel_extended')]),
     ('protocols: [datamodel_extended]', 'protocols: [datamodel]',
-     ["table.yaml:2: protocols: 'datamodel' is unknown (did you mean 'datamodel_standard'?), "
+     ["table.yaml:2: protocols: 'datamodel' is unknown (did you mean 'datamodel_extended'?), "
       f'allowed is {PROTOCOLS}']),
     ('protocols: [datamodel_extended]', 'protocols: []',
      [at('table.yaml:2: protocols', 'number_of_values', count=0, allowed='at least 1')]),
     ('protocols: [datamodel_extended]', 'protocols: datamodel_extended',
      ["table.yaml:2: protocols: 'datamodel_extended' is a string, allowed is a list of "
-      f'{PROTOCOLS}']),
+      f'{PROTOCOLS}: write [datamodel_extended]']),
     ('protocols: [datamodel_extended]\n', '',
      [f'table.yaml:1: protocols: missing, allowed is a list of {PROTOCOLS}']),
     ('parameter: word', 'parameter: actual',

@@ -264,7 +264,10 @@ class Cia402(Family):
             if all(each.listed for each in drive.cyclic_request):
                 yield Complaint('cyclic_request', (
                     complaints.setpoint_missing(
-                        name=name, index=mode.index, subindex=mode.subindex)))
+                        name=name, index=mode.index, subindex=mode.subindex, parameter=next((
+                            each.name for each in drive.profile.parameters.values() if (
+                                each.index, each.subindex or 0) == (mode.index, mode.subindex)),
+                            ''))))
         elif setpoint.limit:
             yield Complaint(f'profile.parameters.{setpoint.name}.limit', (
                 complaints.setpoint_limit(name=setpoint.name, mode=name)))
