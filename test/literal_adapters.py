@@ -260,13 +260,14 @@ class Socketcand:
     :ivar port: where it listens, on the loopback.
     :ivar sent: what it was to bring to the bus.
     :ivar connections: how often somebody has connected.
+    :ivar raw: how often somebody has got as far as raw mode.
     """
 
     WORDS = ('< hi >', '< ok >', '< ok >')
 
     def __init__(self, words: tuple[str, ...] = WORDS) -> None:
         self.sent: list[str] = []
-        self.connections = 0
+        self.connections = self.raw = 0
         self._words = words
         self._listening = socket.create_server(('127.0.0.1', 0))
         self.port: int = self._listening.getsockname()[1]
@@ -295,6 +296,7 @@ class Socketcand:
                     self.sent.append(message[7:].strip())
                 elif words:
                     connected.sendall(words.pop(0).encode())
+                    self.raw += not words
 
     def say(self, text: str | bytes) -> None:
         """Write to who is connected."""

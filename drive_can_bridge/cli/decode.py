@@ -66,7 +66,7 @@ def run(args: Namespace) -> int:
     """
     Decode a trace to its end, or a bus until a signal.
 
-    :return: 0; 1 where nothing could be read.
+    :return: 0; 1 where nothing could be read, or a bus was lost meanwhile.
     :raises WrongUsage: no trace, no such drive, or a file that would be written over.
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened, channels of
         which nobody knows which is the bus.
@@ -106,13 +106,14 @@ def run(args: Namespace) -> int:
     if args.file is not None and Path(args.file).is_file():     # a pipe is read only once
         channels.look_ahead(record.channel for record in read_records(Path(args.file), _ignore))
     selection = Selection(args.drive, args.only)
+    code = 0
     with ExitStack() as stack:
         sinks, endings = _sinks(args, configuration, selection, stack)
         tracer = Tracer(configuration, _together(sinks), channels)
         if args.summary:
             endings.append(lambda: _summarise(tracer, selection.names, as_json=args.json))
         if first is None:
-            _live(args, configuration, tracer)
+            code = _live(args, configuration, tracer)
         else:
             with nullcontext() if _prints(args) else _waiting(args.file):
                 take = tracer.take
@@ -122,7 +123,7 @@ def run(args: Namespace) -> int:
         tracer.finish()
         for ending in endings:
             ending()
-    return 0
+    return code
 
 
 def _ignore(_: str) -> None:
@@ -183,7 +184,7 @@ def _flushed(line: str) -> None:
     sys.stdout.flush()
 
 
-def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> None:
+def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -> int:
     with closing(Taps(configuration, args.clock)) as taps:
         try:
             for record in taps.records(args.seconds):
@@ -193,6 +194,7 @@ def _live(args: Namespace, configuration: BridgeConfiguration, tracer: Tracer) -
                     tracer.take(record)
         except KeyboardInterrupt:
             pass
+    return taps.code
 
 
 def _draw(plotter: Plotter, path: str) -> None:

@@ -10,7 +10,8 @@ import sys
 from typing import Any, TextIO
 
 from drive_can_bridge.cli.command import (
-    above_zero, add_params_file, add_seconds, complain, output_path, print_json, WrongUsage)
+    above_zero, add_params_file, add_seconds, complain, FAILED, output_path, print_json,
+    WrongUsage)
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration
@@ -63,6 +64,11 @@ class Taps:
             except TimeoutError:
                 return
 
+    @property
+    def code(self) -> int:
+        """The exit code: 1 where a bus was lost meanwhile."""
+        return FAILED if any(tap.was_down for tap in self.taps) else 0
+
     def close(self) -> None:
         """Stop listening; say what could not be taken."""
         for tap in self.taps:
@@ -86,7 +92,7 @@ def define(parser: ArgumentParser) -> None:
         'SocketCAN it works beside a running bridge.')
     parser.epilog = (
         f'Formats, by suffix: {", ".join(WRITABLE)}. Only .log, the format of candump, '
-        'loses nothing.')
+        'loses nothing. Exit code 1: a bus was lost meanwhile; all else is in the trace.')
     parser.add_argument('-o', '--output', metavar='FILE', type=output_path, required=True,
                         help='the trace; an existing file, or what --rotate has made of it, is '
                              'replaced')
@@ -103,6 +109,7 @@ def run(args: Namespace) -> int:
     """
     Record until a signal.
 
+    :return: 0; 1 where a bus was lost meanwhile.
     :raises WrongUsage: a suffix that cannot be written.
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened.
     :raises OSError: a file cannot be read or written.
@@ -135,7 +142,7 @@ def run(args: Namespace) -> int:
             print_json(counter.document(output))
         else:
             print(counter.line(output))
-    return 0
+    return taps.code
 
 
 def _record(records: Iterator[Record | float], clock: Clock, output: '_Rotating',

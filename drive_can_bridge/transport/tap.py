@@ -13,7 +13,7 @@ import can
 
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
-from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
 from drive_can_bridge.core.frame import Record, RecordKind
 from drive_can_bridge.transport.bus_identity import adapter_of, is_absent
 from drive_can_bridge.transport.failures import gone, in_words, with_outlook
@@ -57,6 +57,7 @@ class Tap:
     :param label: what its entries give as their channel.
     :param records: takes the entries.
     :param complain: takes a line when the bus is lost, and when it is back.
+    :ivar was_down: the bus was lost at least once, and what was on it then.
     :ivar lost: entries that nobody took in time.
     :ivar heard_until: until when everything that was on the bus is among the entries, s by the
         clock of this machine. That nobody put an entry there does not say that there was none.
@@ -70,6 +71,7 @@ class Tap:
         self._clock = clock
         self.label = label
         self.lost = 0
+        self.was_down = False
         self.heard_until = self._today()
         self._heard = False
         self._records = records
@@ -112,7 +114,11 @@ class Tap:
                     self._complain(f'bus {self.bus.name}: open again')
                 while not self._closing:
                     self._listen(self._port)
+            except BusMisconfigured as error:   # the adapter is another one now
+                self._complain(f'bus {self.bus.name}: {in_words(error)}')
+                self._closing = True
             except BusUnavailable as error:
+                self.was_down = True
                 if self._port is not None:
                     reason = gone(adapter_of(self.bus)) if is_absent(self.bus) else in_words(error)
                     self._complain(f'bus {self.bus.name}: '
