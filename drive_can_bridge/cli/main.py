@@ -174,7 +174,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     try:
         if argv is None:
             let_signals_in()
-        code = _run(arguments, clock or SteadyClock())
+        code = _run(arguments, clock or SteadyClock(), alone=argv is None)
         sys.stdout.flush()
         return code
     except BrokenPipeError:
@@ -271,18 +271,23 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     return module, args
 
 
-def _run(arguments: list[str], clock: Clock) -> int:
+def _run(arguments: list[str], clock: Clock, *, alone: bool) -> int:
     module, args = understood(arguments)
     args.clock = clock
+    libraries = None
     if args.subcommand not in WITHOUT_BUS:
         from drive_can_bridge.transport.library_logs import Few, LibraryLogs
-        LibraryLogs(Few(complain).say, clock.now).install()
+        libraries = LibraryLogs(Few(complain).say, clock.now)
+        libraries.install()
     try:
         code: int = module.run(args)
     except WrongUsage as error:
         action = f' {args.action}' if 'action' in args else ''
         complain(f'{PROGRAM} {args.subcommand}{action}: {error}')
         return WRONG_USAGE
+    finally:
+        if libraries is not None and not alone:     # else they may have more to say
+            libraries.take_away()
     return code
 
 

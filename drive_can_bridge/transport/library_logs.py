@@ -29,11 +29,17 @@ class LibraryLogs(logging.Handler):
 
     def install(self) -> None:
         """Take it in place of who did before."""
+        self.take_away()
+        logging.getLogger().addHandler(self)
+        logging.captureWarnings(True)
+
+    @staticmethod
+    def take_away() -> None:
+        """Let nobody take it any more."""
         root = logging.getLogger()
         for handler in [each for each in root.handlers if isinstance(each, LibraryLogs)]:
             root.removeHandler(handler)
-        root.addHandler(self)
-        logging.captureWarnings(True)
+        logging.captureWarnings(False)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take a line. From any thread; the lock of this handler is held."""
