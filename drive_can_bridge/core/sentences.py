@@ -638,6 +638,10 @@ request_unreadable = Text(
     'the middleware cannot read a request of {service}: {reason} (clients need the same '
     'RMW_IMPLEMENTATION)',
     do='use one middleware for all')
+other_middleware = Text(
+    'the bridge {bridge} runs on {theirs}, this shell on {ours} (RMW_IMPLEMENTATION): services do '
+    'not work between them',
+    do='set RMW_IMPLEMENTATION as the bridge has it')
 no_memory_limit = Text(
     'no memory limit (memory_limit_mb): {reason}',
     do='none is needed where all use one middleware')

@@ -34,6 +34,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.environment import domain_problem
+from drive_can_bridge.ros.client.foreign import foreign
 
 # What makes messages from their definitions comes with every type support, is used by none, and
 # takes 0.15 s to be imported; its package goes without where it cannot be.
@@ -168,6 +169,7 @@ class Service:
     def __init__(self, node: HasHandle, service_type: Any, name: str, timeout: float,
                  again: float = math.inf) -> None:
         self._type = service_type
+        self._node, self._name = node, name
         self._timeout = timeout
         self._again = again
         check_is_valid_srv_type(service_type)
@@ -182,6 +184,11 @@ class Service:
         """Somebody offers it."""
         with self._handle:
             return bool(self._handle.service_server_is_available())
+
+    @property
+    def foreign(self) -> bool:
+        """Only another middleware offers it, which is sent nothing."""
+        return bool(foreign(self._node, self._name))
 
     @property
     def busy(self) -> bool:
@@ -209,6 +216,9 @@ class Service:
             self._unsent.append(call)
 
     def _send(self, call: _Call, now: float) -> None:
+        if self.foreign:
+            call.unasked()
+            return
         if call.again_at == math.inf:   # for the first time
             call.deadline = now + self._timeout
         call.again_at, call.seen_at = now + self._again, now
@@ -241,7 +251,7 @@ class Service:
                 call.seen_at = now
             if now >= call.deadline or now - call.seen_at > GONE:
                 self._end(call, None)
-            elif now >= call.again_at and ready:
+            elif now >= call.again_at and ready and not self.foreign:
                 self._send(call, now)
 
     def _end(self, call: _Call, response: Any) -> None:
@@ -391,6 +401,11 @@ class _Host:
         if greeting is None or not self._waiting:
             return
         if now >= self._greet_at and greeting.ready:
+            if greeting.foreign:
+                waiting, self._waiting = self._waiting, []
+                for each in waiting:
+                    each.unasked()
+                return
             greeting.send(GREETING[1].Request(), self._told(now, _nothing), now)
             self._greet_at = now + self._pause
             self._pause *= 2.0

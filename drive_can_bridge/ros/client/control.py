@@ -23,6 +23,7 @@ from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unoffered
 from drive_can_bridge.process.presence import Present, short
 from drive_can_bridge.ros.client.calls import (
     HasHandle, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
+from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.client.search import (
     find_bridges, find_drives, Graph, Search, Seeing)
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
@@ -46,7 +47,15 @@ class _Stopping:
         self._inbox: Inbox | None = None
         self._service = Service(client_node, Trigger, f'{node}/quick_stop', STOP_TIMEOUT,
                                 STOP_AGAIN)
-        self._service.send(Trigger.Request(), self._take, now, 2.0 * OFFER_TIMEOUT)
+        self._service.send(Trigger.Request(), self._take, now, 2.0 * OFFER_TIMEOUT,
+                           self._unasked)
+
+    def _unasked(self) -> None:
+        reason = why_not(self._client_node, self.node)
+        if reason is None:
+            self._take(None)
+        else:
+            self.answer = Answer(self.node, False, f'{reason}: {RUNNING}')
 
     def _take(self, response: Any) -> None:
         self._said = response
@@ -129,7 +138,8 @@ class Stop:
 
     def _seen(self) -> list[str]:
         """Return drives that are new in the graph, in the namespaces of bridges."""
-        if self._search.settled:
+        if self._search.settled and not any(
+                each.foreign for each in self._search.found.values()):
             return []
         return self._around({*self._drives, *self._elsewhere})
 
@@ -162,7 +172,8 @@ class Stop:
         silent = [name for name in found if not found[name].answered]
         around = self._around(self.drives) if silent and self._words else []
         shown = {each.name: each for each in present}
-        told = [Answer(name, False, does_not_answer(), bridge=True) for name in silent
+        told = [Answer(name, False, why_not(self._client_node, name, name) or does_not_answer(),
+                       bridge=True) for name in silent
                 if may_match(shown.get(short(name), Present(0, None, name, 0)), around,
                              self._words)]
         told += [twins(name, names.count(name)) for name in found if names.count(name) > 1]

@@ -29,6 +29,7 @@ from drive_can_bridge.core.text import is_ros_name
 from drive_can_bridge.process.environment import nobody
 from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
+from drive_can_bridge.ros.client.foreign import foreign, why_not
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
 #: s between two looks at what has arrived
@@ -154,12 +155,14 @@ class Found:
     :ivar drives: names of its drives, in the order of the configuration; None: not known yet.
     :ivar others: the bridges that it sees, itself among them; None: not known yet.
     :ivar silent: it has not answered in time.
+    :ivar foreign: it has another middleware, and is not asked.
     """
 
     name: str
     drives: tuple[str, ...] | None = None
     others: tuple[str, ...] | None = None
     silent: bool = False
+    foreign: bool = False
 
     @property
     def answered(self) -> bool:
@@ -218,7 +221,8 @@ class Search:
     @property
     def settled(self) -> bool:
         """All bridges are known, and each one has answered, or is silent."""
-        return ((any(each.answered for each in self.found.values()) or self._only is not None)
+        return ((any(each.answered or each.foreign for each in self.found.values())
+                 or self._only is not None)
                 and all(each.answered or each.silent for each in self.found.values()))
 
     def over(self, now: float) -> bool:
@@ -256,8 +260,10 @@ class Search:
         for name in filter(is_ros_name, names):     # anybody may tell anything
             if (name not in self.found and self._namespace in (None, namespace_of(name))
                     and (self._only is None or name in self._only)):
-                self.found[name] = Found(name)
-                self._ask(self.found[name], now)
+                other = bool(foreign(self._client_node, f'{name}/save_trace'))
+                self.found[name] = Found(name, silent=other, foreign=other)
+                if not other:
+                    self._ask(self.found[name], now)
 
     def _ask(self, bridge: Found, now: float) -> None:
         def take_others(response: GetParameters.Response | None) -> None:
@@ -302,6 +308,7 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     :raises SilentBridge: it does not answer.
     """
     search = _search(graph, namespace, lambda names: bool(stand_apart(names)))
+    _must_talk(graph, search.found.values())
     names = search.names
     must_stand_together(names)
     silent = [name for name in names if not search.found[name].answered]
@@ -323,9 +330,22 @@ def find_bridges(graph: Graph, pattern: str) -> list[Found]:
     """
     found = [each for each in _search(graph, None, lambda _: False).found.values()
              if fnmatchcase(namespace_of(each.name), pattern)]
+    _must_talk(graph, found)
     if not found or not all(each.answered for each in found):
         raise _none(graph, pattern, found, [each.name for each in found if not each.answered])
     return found
+
+
+def _must_talk(graph: Graph, found: Iterable[Found]) -> None:
+    """
+    See that bridges have the middleware of this process.
+
+    :raises SilentBridge: they do not.
+    """
+    reasons = [reason for each in found if not each.answered
+               and (reason := why_not(graph.client_node, each.name, each.name))]
+    if reasons:
+        raise SilentBridge('; '.join(reasons))
 
 
 def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],

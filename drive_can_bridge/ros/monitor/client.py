@@ -31,6 +31,7 @@ from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
+from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
@@ -373,7 +374,15 @@ class Operations:
             else:
                 done(Outcome(False, may_still_be_running(
                     no_answer_to_stop(patience) if service.ready else nobody_takes(name))))
-        service.send(request(), take, now)
+        service.send(request(), take, now, unasked=lambda: self._unasked(drive, take, done))
+
+    def _unasked(self, drive: str, take: Callable[[Any], None],
+                 done: Callable[[Outcome], None]) -> None:
+        reason = why_not(self._node, drive)
+        if reason is None:
+            take(None)
+        else:
+            done(Outcome(False, may_still_be_running(reason)))
 
     def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
               now: float) -> None:
@@ -384,7 +393,8 @@ class Operations:
                  else _UNCONFIRMED)
         self._ask(drive, 'set_parameters',
                   SetParameters.Request(parameters=[parameter_message(name, value)]), take, now,
-                  lambda: done(_UNASKED))
+                  lambda: done(_UNASKED if (reason := why_not(self._node, drive)) is None
+                               else Outcome(False, reason)))
 
     def read(self, drive: str, names: Sequence[str],
              done: Callable[[Sequence[Value | None]], None], now: float) -> None:

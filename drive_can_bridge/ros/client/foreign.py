@@ -1,0 +1,62 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+Services of another middleware, recognised before anything is sent to them.
+
+Fast DDS and Cyclone DDS discover each other, and topics work between them; services never do, and
+their requests may do harm on the other side. The first two bytes of an endpoint's gid say who made
+its middleware (RTPS 2.5, 9.3.1.5 and 8.3.3.1.3: vendor identifiers).
+"""
+
+from typing import Any, Protocol
+
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.sentences import other_middleware
+from drive_can_bridge.ros.recognition import namespace_of
+
+VENDORS = {b'\x01\x0f': 'Fast DDS', b'\x01\x10': 'Cyclone DDS'}
+_OURS = {'rmw_fastrtps_cpp': 'Fast DDS', 'rmw_fastrtps_dynamic_cpp': 'Fast DDS',
+         'rmw_cyclonedds_cpp': 'Cyclone DDS'}
+#: what a node is called that is found by its drives only
+_BRIDGE = 'drive_can_bridge'
+
+
+class _Node(Protocol):
+    handle: Any
+
+
+def ours() -> str:
+    """Return the middleware of this process; '': one that nobody of ours knows."""
+    return _OURS.get(rclpy_implementation.rclpy_get_rmw_implementation_identifier(), '')
+
+
+def foreign(node: _Node, service: str) -> str:
+    """
+    Return the middleware of all who offer a service, if that is known and another one than ours.
+
+    :param service: full name.
+    """
+    with node.handle:
+        readers = rclpy_implementation.rclpy_get_subscriptions_info_by_topic(
+            node.handle, f'rq{service}Request', True)
+    found = {VENDORS.get(bytes(reader['endpoint_gid'][:2]), '') for reader in readers}
+    own = ours()
+    return found.pop() if own and len(found) == 1 and own not in found else ''
+
+
+def why_not(node: _Node, name: str, bridge: str = '') -> Sentence | None:
+    """
+    Say why services of a node do not work with this process; None: they may.
+
+    :param name: full name of a bridge, or of one of its drives.
+    :param bridge: whose that is; '': of the one in its namespace.
+    """
+    for service in 'get_parameters', 'quick_stop', 'save_trace':
+        theirs = foreign(node, f'{name}/{service}')
+        if theirs:
+            is_bridge = service == 'save_trace' or name.endswith(f'/{_BRIDGE}')
+            return other_middleware(
+                bridge or (name if is_bridge else f'{namespace_of(name)}/{_BRIDGE}'),
+                theirs, ours())
+    return None
