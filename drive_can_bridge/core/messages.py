@@ -18,7 +18,7 @@ wherever text is wanted, which tells programs and tests what it says without bei
 A sentence that gives the reason of another one has it among its fields, code and all.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from string import Formatter
 from typing import Any
 
@@ -44,6 +44,9 @@ class Sentence(str):
         said.code, said.fields = code, fields or {}
         return said
 
+
+#: what a way to write a number is made of; anything else joins
+_NUMBERS = '.,0123456789Xgf'
 
 #: where there is nothing to be said
 NOTHING = Sentence()
@@ -77,26 +80,43 @@ class Text:
     def __init__(self, *texts: str, do: str = '', fields: str = '',
                  **how: Callable[[Any], str]) -> None:
         self.code, self.do, self.texts = '', do, texts
-        parsed = [list(Formatter().parse(text)) for text in texts]
-        in_text = [[name for _, name, _, _ in text if name] for text in parsed]
-        self.fields = tuple(fields.split()) or tuple(dict.fromkeys(sum(in_text, [])))
-        self.optional = frozenset(sum(in_text, [])) - set(in_text[-1])
-        *self._variants, (_, self._pieces) = [
-            (self.optional.intersection(names),
-             [(before, name, how.get(name or '') or _writer(spec or '', conversion))
-              for before, name, spec, conversion in text])
-            for names, text in zip(in_text, parsed)]
+        *self._variants, self._last = [_Variant(text, how) for text in texts]
+        in_text = [name for each in (*self._variants, self._last) for name in each.fields]
+        self.fields = tuple(fields.split()) or tuple(dict.fromkeys(in_text))
+        self.optional = frozenset(in_text).difference(self._last.fields)
 
     def __call__(self, *args: Any, **fields: Any) -> Sentence:
         if args:
             fields = {**dict(zip(self.fields, args)), **fields}
-        pieces = self._pieces
-        for wanted, variant in self._variants:
-            if all(_is_there(fields.get(name)) for name in wanted):
-                pieces = variant
-                break
-        return Sentence(''.join([before + write(fields[name]) if name else before
-                                 for before, name, write in pieces]), self.code, fields)
+        for variant in self._variants:
+            if all(_is_there(fields.get(name)) for name in variant.fields
+                   if name in self.optional):
+                return Sentence(variant.write(fields), self.code, fields)
+        return Sentence(self._last.write(fields), self.code, fields)
+
+
+class _Variant:
+    """One text of a row, with what :meth:`str.format` cannot write set apart."""
+
+    def __init__(self, text: str, how: Mapping[str, Callable[[Any], str]]) -> None:
+        self.fields: list[str] = []
+        self._apart: list[tuple[str, str, Callable[[Any], str]]] = []
+        self._text = ''
+        for before, name, spec, conversion in Formatter().parse(text):
+            self._text += before.replace('{', '{{').replace('}', '}}')
+            if not name:
+                continue
+            self.fields.append(name)
+            write = how.get(name) or _writer(spec or '', conversion)
+            if write is not None:
+                self._apart.append((f'_{len(self.fields)}', name, write))
+                name, spec = self._apart[-1][0], ''
+            self._text += f'{{{name}:{spec}}}'
+
+    def write(self, fields: dict[str, Any]) -> str:
+        if self._apart:
+            fields = {**fields, **{key: write(fields[name]) for key, name, write in self._apart}}
+        return self._text.format(**fields)
 
 
 def catalogue(module: dict[str, Any], do: str = '') -> dict[str, Text]:
@@ -115,18 +135,13 @@ def _is_there(value: Any) -> bool:
     return bool(value) or value == 0 and value is not False
 
 
-def _writer(spec: str, conversion: str | None) -> Callable[[Any], str]:
+def _writer(spec: str, conversion: str | None) -> Callable[[Any], str] | None:
     if conversion == 'r':
         return show
     if spec == '?':
         return lambda value: ''
     if spec.startswith('#'):
         return lambda value: counted(value, spec[1:])
-    if not spec:
-        return format
-
-    def write(value: Any) -> str:
-        if isinstance(value, Collection) and not isinstance(value, str):
-            return spec.join(map(str, value))
-        return format(value, spec)
-    return write
+    if spec.strip(_NUMBERS):
+        return lambda value: spec.join(map(str, value))
+    return None
