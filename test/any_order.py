@@ -23,7 +23,7 @@ from drive_can_bridge.core.control import ControlAction, ControlCompleted, Contr
 from drive_can_bridge.core.events import Noted, RequestCompleted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import Failure, ReadRequest, WriteRequest
+from drive_can_bridge.core.requests import Failure, FailureKind, ReadRequest, WriteRequest
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 #: more than rounding errors, less than anything that matters
@@ -300,7 +300,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.session.services.submit(request, self.now)
         refused = any(
             isinstance(event, RequestCompleted) and event.request is request
-            and Failure(sentences.busy()) in event.outcomes
+            and Failure(FailureKind.UNAVAILABLE, sentences.busy()) in event.outcomes
             for event in self.session.report.events)
         possible = self.observer.active and self.observer.bus and len(request) > 0
         if refused or possible and waiting == 65:   # 64 wait; one more may be under way

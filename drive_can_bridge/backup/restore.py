@@ -27,8 +27,9 @@ from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutc
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
-from drive_can_bridge.core.requests import tells_nothing
+from drive_can_bridge.core.requests import Failure, FailureKind
 from drive_can_bridge.core.roles import Role
+from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.core.text import printable, value_text
 
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
@@ -37,8 +38,9 @@ _PATIENCE_STEP = 0.5
 #: times that a step afterwards is written to a drive of which nothing is heard, for its cells may
 #: wear, and to one that is there and does not answer it
 _ATTEMPTS = 3
-_NO_PARAMETER = 'the drive has no such parameter'
-_NO_BITS = 'cannot be read, so its other bits cannot be kept'
+_NO_PARAMETER = Failure(FailureKind.INVALID, uncoded('the drive has no such parameter'))
+_NO_BITS = Failure(
+    FailureKind.INVALID, uncoded('cannot be read, so its other bits cannot be kept'))
 
 
 class LeftAlone(Enum):
@@ -293,7 +295,7 @@ class FailedStep:
 
     parameter: str
     kind: StepKind
-    reason: str
+    failure: Failure
 
     @property
     def text(self) -> str:
@@ -302,15 +304,17 @@ class FailedStep:
             follows = 'Whether what was written is stored is not known'
         else:
             follows = _FOLLOWS[self.kind]
-        return f'{self.parameter}: {self.reason}. {follows}'
+        return f'{self.parameter}: {self.failure.reason}. {follows}'
 
     @property
     def unknown(self) -> bool:
         """The drive may have done it all the same."""
-        return tells_nothing(self.reason)
+        return self.failure.kind.unheard
 
 
-_NOT_ATTEMPTED = {StepKind.AFTER: 'not set back', StepKind.STORE: 'not written'}
+_NOT_ATTEMPTED = {
+    StepKind.AFTER: Failure(FailureKind.INVALID, uncoded('not set back')),
+    StepKind.STORE: Failure(FailureKind.INVALID, uncoded('not written'))}
 _FOLLOWS = {
     StepKind.BEFORE: 'No setting was written',
     StepKind.AFTER: 'Look at it by hand: the drive may still be in the mode in which settings '
@@ -378,7 +382,7 @@ class Restorer:
         self._attempted = False
         self._wrote = False
         self._words = dict(plan.found)
-        self._unseen: dict[str, list[str]] = {}     # what became of steps that cannot be read
+        self._unseen: dict[str, list[Failure | None]] = {}    # steps that cannot be read
         self._reasons: dict[str, str] = {}
         self._result = RestoreResult()
         table = drive.facts.restore
@@ -533,28 +537,28 @@ class Restorer:
         return (StepKind.STORE if parameter is not None and parameter.stores
                 else StepKind.AFTER)
 
-    def _note(self, kind: StepKind, step: RestoreStep, reason: str) -> None:
-        if reason:
-            self._result.steps.append(FailedStep(step.parameter, kind, reason))
+    def _note(self, kind: StepKind, step: RestoreStep, failure: Failure | None) -> None:
+        if failure is not None:
+            self._result.steps.append(FailedStep(step.parameter, kind, failure))
         if kind is StepKind.STORE:
-            self._result.stored = not reason
+            self._result.stored = failure is None
 
-    def _take(self, step: RestoreStep) -> str:
+    def _take(self, step: RestoreStep) -> Failure | None:
         """Take a step before the settings; return why it failed."""
         parameter = self._drive.find(step.parameter)
         if parameter is None:
             return _NO_PARAMETER
         if parameter.readable:
-            reason = self._look(step.parameter, parameter)
-            if reason:
-                return reason
+            failure = self._look(step.parameter, parameter)
+            if failure is not None:
+                return failure
         elif not is_whole(step, parameter):
             return _NO_BITS
         found = self._words.get(step.parameter)
         word = (found or 0) & ~step.mask | step.bits
-        return '' if word == found else self._put(parameter, word, blind=False)
+        return None if word == found else self._put(parameter, word, blind=False)
 
-    def _take_back(self, step: RestoreStep, *, blind: bool, last: bool) -> str:
+    def _take_back(self, step: RestoreStep, *, blind: bool, last: bool) -> Failure | None:
         """
         Take a step after the settings; return why it failed.
 
@@ -570,51 +574,50 @@ class Restorer:
             kept = self._words.get(step.parameter)
         found: int | None = None
         if parameter.readable and not (blind and (is_whole(step, parameter) or kept is not None)):
-            reason = self._look(step.parameter, parameter)
-            if reason:
+            failure = self._look(step.parameter, parameter)
+            if failure is not None:
                 self._unanswered = True
-                return reason
+                return failure
             found = self._words[step.parameter]
             kept = found if kept is None else kept
         elif kept is None and not is_whole(step, parameter):
             return _NO_BITS
         word = (kept or 0) & ~step.mask | step.bits
         if not parameter.readable:
-            reason = self._put_unseen(parameter, word, last=last)
+            failure = self._put_unseen(parameter, word, last=last)
         else:
-            reason = '' if word == found else self._put(parameter, word, blind=True)
-        if not reason and any((parameter.name, word) == (change.name, change.word)
-                              for change in self._plan.changes):
+            failure = None if word == found else self._put(parameter, word, blind=True)
+        if failure is None and any((parameter.name, word) == (change.name, change.word)
+                                   for change in self._plan.changes):
             self._note_written(parameter.name)      # as it is to be, if nothing else was done
-        return reason
+        return failure
 
-    def _look(self, name: str, parameter: Parameter) -> str:
+    def _look(self, name: str, parameter: Parameter) -> Failure | None:
         """Read the parameter of a step; return why it could not be read."""
         outcome = self._drive.read(name)[name]
         if outcome.raw is None:
             self._lost = True
-            return outcome.reason
+            return _failure(outcome)
         self._words[name] = parameter.word_from_raw(outcome.raw)
-        return ''
+        return None
 
-    def _put(self, parameter: Parameter, word: int, *, blind: bool) -> str:
+    def _put(self, parameter: Parameter, word: int, *, blind: bool) -> Failure | None:
         """Write what a step wants; return why it is not there."""
         name = parameter.name
         written = self._write_step(name, value_of_word(parameter, word), blind=blind)
         if not written.ok:
             # it may have been taken all the same, or the drive refuses what it has already
-            unanswered = tells_nothing(written.reason)
             if not parameter.readable:
-                self._lost = unanswered and not self._is_there()
+                self._lost = written.unheard and not self._is_there()
             else:
-                self._lost = bool(self._look(name, parameter))
+                self._lost = self._look(name, parameter) is not None
             if self._lost or not parameter.readable or self._words[name] != word:
-                self._unanswered = self._unanswered or unanswered
-                return written.reason
+                self._unanswered = self._unanswered or written.unheard
+                return _failure(written)
         self._words[name] = word
-        return ''
+        return None
 
-    def _put_unseen(self, parameter: Parameter, word: int, *, last: bool) -> str:
+    def _put_unseen(self, parameter: Parameter, word: int, *, last: bool) -> Failure | None:
         """Write a step that cannot be read; again only where the drive is there, or at last."""
         tried = self._unseen.setdefault(parameter.name, [])
         if len(tried) == _ATTEMPTS:
@@ -628,7 +631,7 @@ class Restorer:
     def _is_there(self) -> bool:
         """Tell whether the drive answers, by something that it gave before."""
         name = next(iter(self._plan.found), None)
-        return name is None or not tells_nothing(self._drive.read(name)[name].reason)
+        return name is None or not self._drive.read(name)[name].unheard
 
     def _write_step(self, name: str, value: Value, *, blind: bool) -> WriteOutcome:
         heard: list[WriteOutcome] = []
@@ -662,6 +665,10 @@ class Restorer:
                 reason = self._reasons.get(name, '') or outcome.reason
                 self._result.wrong.append(
                     NotAsInFile(name, self._plan.wanted[name], outcome.value, reason))
+
+
+def _failure(outcome: ReadOutcome | WriteOutcome) -> Failure:
+    return Failure(outcome.kind or FailureKind.INVALID, uncoded(outcome.reason))
 
 
 def _is(outcome: ReadOutcome, word: int) -> bool:

@@ -52,6 +52,7 @@ GROUPS: dict[str, dict[str, str]] = {
         'panel': 'show all bridges and their drives in a browser',
         'record': 'write everything on the buses of a parameter file to a trace',
         'decode': 'say what the frames of a trace, or of a bus, mean',
+        'explain': 'say what a code of diagnostics means, and what to do',
     },
     'Parameters of drives': {
         'read': 'read parameters of a drive',
@@ -86,6 +87,7 @@ EXAMPLES: dict[str, tuple[str, str]] = {
     'record': ('record -p robot.yaml -o trace.log',
                'record -p robot.yaml -o trace.blf --seconds 60'),
     'decode': ('decode trace.log -p robot.yaml', 'decode --live -p robot.yaml --only changes'),
+    'explain': ('explain not_armed', 'explain silent_since --json'),
     'read': ('read conveyor', 'read conveyor ramp_time p30 --watch 1'),
     'write': ('write conveyor ramp_time=2.5', 'write p30=250 -p robot.yaml'),
     'backup': ('backup conveyor -o conveyor.yaml', 'backup -o backups/ --namespace /cell1'),
@@ -139,7 +141,7 @@ WITHOUT_BUS = (*GROUPS['By hand'], 'monitor', 'panel')
 #: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
 WITH_ROS = (*GROUPS['By hand'], *GROUPS['Parameters of drives'], 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
-SHOWING = ('validate', 'decode', 'profile')
+SHOWING = ('validate', 'decode', 'explain', 'profile')
 #: exit codes of what could not be done, where 1 says something else
 TROUBLE = {'compare': 2}
 #: what says itself where something is wrong: ``FILE:LINE:``, ``bus main:``, ``conveyor:``

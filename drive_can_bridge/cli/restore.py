@@ -17,7 +17,6 @@ from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.core.requests import tells_nothing
 from drive_can_bridge.core.text import counted, printable, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
 
@@ -140,7 +139,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         # maybe it says nothing at all: then nobody knows whether it is another one
         for asked in read_all(drive, names_to_read(backup, drive)[:1],
                               args.clock).values():
-            if not asked.ok and tells_nothing(asked.reason):
+            if asked.unheard:
                 complain(f'{drive.name}: nothing could be read: {asked.reason}\n{_NOTHING}.')
                 return False
     differing = strangers(backup, drive, identity)

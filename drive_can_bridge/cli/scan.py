@@ -239,10 +239,11 @@ def _collisions(path: Path) -> dict[str, str]:
     try:
         configuration_from_file(path)
     except ConfigurationError as error:
+        # of what was found on a bus, nothing else is wrong with a station
         keys = {problem: problem.fields['key'] for problem in error.problems
-                if isinstance(problem, Sentence) and problem.code == 'collides'}
+                if isinstance(problem, Sentence)}
         return {key.split('.')[1]: problem.partition(f'{key}: ')[2]
-                for problem, key in keys.items()}
+                for problem, key in keys.items() if key.endswith('.station')}
     return {}
 
 

@@ -11,6 +11,7 @@ from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
+from drive_can_bridge.core.requests import FailureKind
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
@@ -76,7 +77,8 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
                for name, each in _all_checked(drive, wanted).items()}
     if any(reason for _, reason in checked.values()):   # nobody wants half of a command
         _show(args, drives, wanted, [
-            (drive, WriteOutcome(name, False, drive.find(name), reason or _OTHER_REFUSED))
+            (drive, WriteOutcome(name, False, drive.find(name), reason or _OTHER_REFUSED,
+                                 kind=FailureKind.INVALID))
             for (drive, name), (_, reason) in checked.items()])
         return FAILED
     outcomes: list[tuple[Drive, WriteOutcome]] = []
@@ -91,7 +93,8 @@ def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
     finally:    # also where Ctrl-C, another master or the loss of the bus came between
         known = {(drive, outcome.name) for drive, outcome in outcomes}
         _show(args, drives, wanted, [*outcomes, *(
-            (drive, WriteOutcome(name, False, drive.find(name), ENDED_BEFORE))
+            (drive, WriteOutcome(name, False, drive.find(name), ENDED_BEFORE,
+                                 kind=FailureKind.UNAVAILABLE))
             for drive, name in checked if (drive, name) not in known)])
     return 0 if all(outcome.ok for _, outcome in outcomes) else FAILED
 

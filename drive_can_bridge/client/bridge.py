@@ -14,6 +14,7 @@ from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
     Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.requests import kind_of
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import facts_in, printable, taken_apart
 
@@ -135,7 +136,8 @@ class BridgedDrive(Drive):
         for name, parameter in asked:
             value = values.get(name)
             if value is None:
-                made.append(ReadOutcome(name, parameter, reason=reasons.get(name, _NO_VALUE)))
+                reason = reasons.get(name, _NO_VALUE)
+                made.append(ReadOutcome(name, parameter, reason=reason, kind=kind_of(reason)))
             else:
                 made.append(ReadOutcome(name, parameter, raw_of(parameter, value), value))
         return made
@@ -155,7 +157,7 @@ class BridgedDrive(Drive):
             if not trouble.asked:
                 raise
             return WriteOutcome.under_way(name, parameter, trouble)
-        return WriteOutcome(name, done, parameter, reason)
+        return WriteOutcome(name, done, parameter, reason, kind=None if done else kind_of(reason))
 
     def enabled(self) -> Enabled:
         facts = self._way.condition(self.name, age=self._period, patience=_DIAGNOSTICS_MARGIN)

@@ -25,10 +25,9 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, DriveCanError
 from drive_can_bridge.core.events import Event, RequestCompleted
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.requests import (
-    ABSENT, Failure, is_answer, Outcome, ReadRequest, ReadValue, Request, SILENT, WriteRequest,
+    Failure, FailureKind, is_answer, Outcome, ReadRequest, ReadValue, Request, WriteRequest,
     Written)
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.sentences import no_answer_offline, no_result
@@ -208,6 +207,7 @@ _ABSENT_FOR = 2.0
 #: s between looks whether a node has started, and s until there is no other look
 _START_PAUSE = 0.1
 _START_PATIENCE = 2.5
+_NO_RESULT = Failure(FailureKind.UNAVAILABLE, no_result())
 _START_HINT = 'a CANopen node that is not operational answers no PKW, --nmt-start starts it'
 
 
@@ -297,7 +297,8 @@ class DirectDrive(Drive):
                 waiting.append((blocks.pop(0), request))
             block, request = waiting.pop(0)
             outcomes = self._conversation.wait(request)
-            if Failure(no_answer_offline()) in outcomes:
+            if any(isinstance(each, Failure) and each.kind is FailureKind.OFFLINE
+                   for each in outcomes):
                 # the one before had no answer at all, which may have been the fault of its names
                 blocks.insert(0, block)
             else:
@@ -323,7 +324,7 @@ class DirectDrive(Drive):
         listed = [each for each in self.parameters.values()
                   if each.readable and self._session.roles.cells(each)]
         candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
-        outcome: Outcome = Failure(no_answer_offline())
+        outcome: Outcome = Failure(FailureKind.OFFLINE, no_answer_offline())
         for candidate in list(candidates)[:TRIES]:
             outcome, = self._wait_for((candidate,))
             if is_answer(outcome):
@@ -341,16 +342,17 @@ class DirectDrive(Drive):
         if isinstance(outcome, ReadValue):
             return ReadOutcome(name, parameter, outcome.raw,
                                parameter.value_from_raw(outcome.raw))
-        return ReadOutcome(name, parameter, reason=self._explained(
-            outcome.reason if isinstance(outcome, Failure) else no_result()))
+        failure = outcome if isinstance(outcome, Failure) else _NO_RESULT
+        return ReadOutcome(
+            name, parameter, reason=self._explained(failure), kind=failure.kind)
 
-    def _explained(self, reason: Sentence) -> str:
+    def _explained(self, failure: Failure) -> str:
         """Add what may be the matter with a drive that says nothing at all."""
-        silent = reason.code in ABSENT or (
-            reason.code in SILENT and not self._session.online)
+        silent = not self._session.online and failure.kind in (
+            FailureKind.OFFLINE, FailureKind.NO_ANSWER)
         if silent and self._start_frame is not None and not self._nmt_start:
-            return f'{reason}; {_START_HINT}'
-        return reason
+            return f'{failure.reason}; {_START_HINT}'
+        return failure.reason
 
     # -- writing ----------------------------------------------------------------------------------
 
@@ -358,7 +360,7 @@ class DirectDrive(Drive):
         if not (blind or self._session.online):     # what does not answer is told nothing
             _, failure = self._look()
             if failure is not None:
-                return WriteOutcome(name, False, parameter, self._explained(failure.reason))
+                return self._not_written(name, parameter, failure)
         request = WriteRequest(((parameter, self._directory.raw_from_user(parameter, value)),),
                                blind=blind)
         self._conversation.submit(self.name, request)
@@ -368,8 +370,11 @@ class DirectDrive(Drive):
             return WriteOutcome.under_way(name, parameter, trouble)
         if isinstance(outcome, Written):
             return WriteOutcome(name, True, parameter, outcome.note)
-        reason = outcome.reason if isinstance(outcome, Failure) else no_result()
-        return WriteOutcome(name, False, parameter, self._explained(reason))
+        return self._not_written(
+            name, parameter, outcome if isinstance(outcome, Failure) else _NO_RESULT)
+
+    def _not_written(self, name: str, parameter: Parameter, failure: Failure) -> WriteOutcome:
+        return WriteOutcome(name, False, parameter, self._explained(failure), kind=failure.kind)
 
     # -- state ------------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
+from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.sentences import write_not_confirmed
 from drive_can_bridge.process.signals import finish_first
@@ -63,6 +64,7 @@ class ReadOutcome:
     :param raw: integer read by the parameter's type; None where reading failed.
     :param value: in the unit of the parameter; None where reading failed.
     :param reason: why it failed, in words; '' where it did not.
+    :param kind: why it failed, for programs; None where it did not.
     """
 
     name: str
@@ -70,11 +72,17 @@ class ReadOutcome:
     raw: int | None = None
     value: Value | None = None
     reason: str = ''
+    kind: FailureKind | None = None
 
     @property
     def ok(self) -> bool:
         """There is a value."""
         return self.raw is not None
+
+    @property
+    def unheard(self) -> bool:
+        """It failed, and no frame of the drive came."""
+        return self.kind is not None and self.kind.unheard
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +95,7 @@ class WriteOutcome:
     :param reason: why it failed, in words; or that note.
     :param trouble: what ended the conversation while the drive was asked to take it: whether it
         did nobody knows; None: nothing.
+    :param kind: why it failed, for programs; None where it did not.
     """
 
     name: str
@@ -94,11 +103,17 @@ class WriteOutcome:
     parameter: Parameter | None = None
     reason: str = ''
     trouble: DriveCanError | None = None
+    kind: FailureKind | None = None
+
+    @property
+    def unheard(self) -> bool:
+        """It failed, and no frame of the drive came: the drive may have done it all the same."""
+        return self.kind is not None and self.kind.unheard
 
     @classmethod
     def under_way(cls, name: str, parameter: Parameter, trouble: DriveCanError) -> 'WriteOutcome':
         """Return that of a write under way when the conversation ended."""
-        return cls(name, False, parameter, NOT_CONFIRMED, trouble)
+        return cls(name, False, parameter, NOT_CONFIRMED, trouble, FailureKind.UNAVAILABLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,8 +256,9 @@ class Drive(ABC):
             if parameter is not None and parameter.readable:
                 asked.append((name, parameter))
             else:
-                yield ReadOutcome(name, parameter, reason='write-only' if parameter else
-                                  self._directory.unknown(name))
+                yield ReadOutcome(
+                    name, parameter, kind=FailureKind.INVALID,
+                    reason='write-only' if parameter else self._directory.unknown(name))
         asked.sort(key=lambda each: (each[1].number or 0, each[1].subindex or 0))
         yield from self.ask(asked)
 
@@ -266,7 +282,8 @@ class Drive(ABC):
                 parameter = self.find(name)
                 refusal = contradicted.get(name) or self.check(name, value)
                 if refusal or parameter is None:
-                    outcome = WriteOutcome(name, False, parameter, refusal)
+                    outcome = WriteOutcome(
+                        name, False, parameter, refusal, kind=FailureKind.INVALID)
                 else:
                     outcome = self.put(name, parameter, value, blind=blind)
                 found[name] = outcome

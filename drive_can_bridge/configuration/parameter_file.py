@@ -42,11 +42,13 @@ class Section(NamedTuple):
     The parameters of one node name; the tree has the problems that only they have.
 
     :param refused: what rcl refuses, or what makes it garble what follows.
+    :param twice: keys that stand twice.
     """
 
     name: str
     tree: Tree
     refused: list[Problem]
+    twice: list[Problem]
 
 
 class _FileReader:
@@ -59,6 +61,7 @@ class _FileReader:
     def __init__(self, path: FilePath) -> None:
         self.sections: list[Section] = []
         self.problems: list[Problem] = []
+        self.twice: list[Problem] = []      # of them, and of the sections: keys that stand twice
         self.broken = False
         self._file = str(path)
         self._lines: dict[Path, int] = {}
@@ -98,6 +101,7 @@ class _FileReader:
                 self._note(key.line, here, complaints.beside_parameters(entry=PARAMETERS_KEY))
             if here in self._lines:
                 self._note(key.line, here, complaints.duplicate_key(first=self._lines[here]))
+                self.twice.append(self.problems[-1])
                 continue
             self._lines[here] = key.line
             if key.text == PARAMETERS_KEY:
@@ -131,7 +135,7 @@ class _FileReader:
         reader = TreeReader(self._file, Rules.PARAMETERS, {
             (name,): definition(kind)['properties'] for name, kind in _OURS.items()})
         reader.read(node)
-        self.sections.append(Section(name, reader.tree, reader.refused))
+        self.sections.append(Section(name, reader.tree, reader.refused, reader.twice))
         self.problems.extend(reader.refused)
 
 
@@ -175,10 +179,10 @@ def unseen_problems(paths: Iterable[FilePath], node: str,
             continue
         for section in reader.sections:
             if _is_for(section.name, node):
-                found += section.tree.problems
+                found += section.twice
                 garbled += section.refused
-        found += [problem for problem in reader.problems if _is_for(problem.key, node)]
-    return [problem for problem in found if problem.message.code == 'duplicate_key'], garbled
+        found += [problem for problem in reader.twice if _is_for(problem.key, node)]
+    return found, garbled
 
 
 def _is_for(section: str, node: str) -> bool:
@@ -233,7 +237,7 @@ def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
     node = _some_node(own.name)
     together: dict[str, list[Tree]] = {}     # rcl lets a name stand where it stands first
     elsewhere: list[Problem] = []
-    for name, tree, _ in sections:
+    for name, tree, *_ in sections:
         other = _some_node(name)
         if _is_for(name, node):
             together.setdefault(name, []).append(tree)

@@ -181,6 +181,7 @@ class TreeReader:
 
     :param entries: of mappings that hold entries by name, the keys that an entry may have.
     :ivar refused: what spoils the whole file.
+    :ivar twice: keys that stand twice, which are among the problems of the tree.
     """
 
     def __init__(self, file: str, rules: Rules,
@@ -188,6 +189,7 @@ class TreeReader:
         self.tree = Tree({}, file)
         self._entries = entries
         self.refused: list[Problem] = []
+        self.twice: list[Problem] = []
         self._parameters = rules is Rules.PARAMETERS
         self._why = ' (rcl refuses the file)' if self._parameters else ''
 
@@ -211,9 +213,9 @@ class TreeReader:
                 continue
             here = (*path, key.text)
             if here in lines:
-                self.tree.problems.append(self.tree.problem(
-                    here, complaints.duplicate_key(first=lines[here]),
-                )._replace(line=key.line))
+                self.twice.append(self.tree.problem(
+                    here, complaints.duplicate_key(first=lines[here]))._replace(line=key.line))
+                self.tree.problems.append(self.twice[-1])
                 continue
             lines[here] = key.line
             # ROS itself reads topic names in QoS overrides, which may have dots.

@@ -91,11 +91,13 @@ class ControlCompleted:
     The outcome of a request; each gets exactly one.
 
     :param message: the state reached, or why it was not, for the answer of the service.
+    :param by_fault: a fault ended it; ``message`` gets a field ``fault`` when that is known.
     """
 
     request: ControlRequest
     success: bool
     message: Sentence
+    by_fault: bool = False
 
 
 _ENABLE, _DISABLE = ControlAction.ENABLE, ControlAction.DISABLE

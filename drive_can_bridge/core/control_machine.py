@@ -77,16 +77,19 @@ class Answers:
     def __init__(self) -> None:
         self._completed: list[ControlCompleted] = []
 
-    def complete(self, request: ControlRequest, success: bool, message: Sentence) -> None:
+    def complete(self, request: ControlRequest, success: bool, message: Sentence, *,
+                 by_fault: bool = False) -> None:
         """Answer one request."""
-        self._completed.append(ControlCompleted(request, success, message))
+        self._completed.append(ControlCompleted(request, success, message, by_fault))
 
-    def answer(self, operation: Operation, success: bool, message: Sentence) -> None:
+    def answer(self, operation: Operation, success: bool, message: Sentence, *,
+               by_fault: bool = False) -> None:
         """Answer all that wait for an operation."""
         for request in operation.requests:
             instead = request.action is not operation.action
             self.complete(
-                request, success, sentences.disabled_instead(message) if instead else message)
+                request, success, sentences.disabled_instead(message) if instead else message,
+                by_fault=by_fault)
         operation.requests.clear()
 
     def take(self) -> list[ControlCompleted]:
@@ -478,7 +481,7 @@ class ControlMachine:
             self._notes.append(sentences.fault_came(self._reports.text, self._reached))
         under_way = self._operation
         if under_way is not None and under_way.action is ControlAction.ENABLE:
-            self._end(False, sentences.fault_while_enabling(self._reports.text))
+            self._end(False, sentences.fault_while_enabling(self._reports.text), by_fault=True)
         elif self._sending is not ControlAction.RESET_FAULT and not (
                 self._sending is ControlAction.QUICK_STOP and self._reports.sound_ones_run):
             self._send(ControlAction.DISABLE)
@@ -545,10 +548,11 @@ class ControlMachine:
             self._reports.forget_answers()
             self._disregard.forget()
 
-    def _end(self, success: bool, message: Sentence, *, stays: bool = False) -> None:
+    def _end(self, success: bool, message: Sentence, *, stays: bool = False,
+             by_fault: bool = False) -> None:
         """Answer what is under way, if anything; unless its word stays, ``disable`` follows."""
         under_way, self._operation = self._operation, None
         if under_way is not None:
-            self._answers.answer(under_way, success, message)
+            self._answers.answer(under_way, success, message, by_fault=by_fault)
         if not stays:
             self._send(ControlAction.DISABLE)

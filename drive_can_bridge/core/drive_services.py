@@ -18,7 +18,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import Failure, is_answer, Outcomes, Request
+from drive_can_bridge.core.requests import Failure, FailureKind, is_answer, Outcomes, Request
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
@@ -72,13 +72,14 @@ class Conversation(Protocol):
     def request_control(self, request: ControlRequest, now: float) -> None:
         """Take what is asked of the drive by its control word."""
 
-    def request_refusal(self, now: float) -> Sentence:
-        """Say what of the drive itself forbids requests for parameters."""
+    def request_refusal(self, now: float) -> Failure | None:
+        """Return what of the drive itself forbids requests for parameters."""
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         """Record a request that was served, and answered."""
 
-    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence, *,
+                        offline: bool) -> Sentence:
         """Say why a control action cannot be asked for, where something else is usually said."""
 
 
@@ -142,7 +143,7 @@ class DriveServices:
         """How many requests for parameters wait behind the one being served."""
         return self._server.waiting
 
-    def fail_all(self, reason: Sentence) -> None:
+    def fail_all(self, failure: Failure) -> None:
         """
         Forget the requests for parameters that are under way, and answer them.
 
@@ -152,14 +153,15 @@ class DriveServices:
         requests = self._open.copy()
         self._open.clear()
         for request in requests:
-            self._refuse(request, reason, self._server.known(request))
+            self._refuse(request, failure, self._server.known(request))
 
     def _request(self, request: Request, now: float) -> None:
-        refusal = self._session.request_refusal(now) or self._absence
-        if not refusal and self.waiting >= WAITING_REQUESTS_MAX:
-            refusal = sentences.busy()
-        if refusal:
-            self._refuse(request, refusal)
+        failure = self._session.request_refusal(now)
+        absence = self._absence
+        if failure is None and (absence or self.waiting >= WAITING_REQUESTS_MAX):
+            failure = Failure(FailureKind.UNAVAILABLE, absence or sentences.busy())
+        if failure is not None:
+            self._refuse(request, failure)
         elif not len(request):
             self._complete(request, ())
         else:
@@ -171,9 +173,9 @@ class DriveServices:
         self._complete(request, outcomes)
         self._session.request_answered(request, outcomes)
 
-    def _refuse(self, request: Request, reason: Sentence, known: Outcomes = ()) -> None:
+    def _refuse(self, request: Request, failure: Failure, known: Outcomes = ()) -> None:
         """Answer a request with the same failure for every name behind those that are known."""
-        self._complete(request, (*known, *(Failure(reason),) * (len(request) - len(known))))
+        self._complete(request, (*known, *(failure,) * (len(request) - len(known))))
 
     def _complete(self, request: Request, outcomes: Outcomes) -> None:
         session, event = self._session, RequestCompleted(request, outcomes)
@@ -200,18 +202,19 @@ class DriveServices:
         session = self._session
         if action is ControlAction.HOME and not session.homes:
             return sentences.no_homing()
+        offline = False
         if session.control is None and action is not ControlAction.QUICK_STOP:
             refusal = sentences.no_control_section()
         elif self._absence:
             refusal = self._absence
         elif not session.online:
+            offline = session.state is not DriveState.MAPPING_DIFFERS
             refusal = (sentences.drive_offline_because(session.state.value)
-                       if session.state is DriveState.MAPPING_DIFFERS else
-                       sentences.drive_offline())
+                       if not offline else sentences.drive_offline())
         else:
             refusal = (
                 session.setpoints.untold_text if action is ControlAction.ENABLE else NOTHING)
-        return session.control_refusal(action, refusal)
+        return session.control_refusal(action, refusal, offline=offline)
 
     def write_refusal(self, parameter: Parameter) -> Sentence:
         """Say why users may not write this parameter now; '' if they may."""

@@ -36,9 +36,14 @@ class StationFound:
 
 @dataclass(frozen=True)
 class StationLost:
-    """The drive is offline; ``reason`` says in words what was missing."""
+    """
+    The drive is offline; ``reason`` says in words what was missing.
+
+    :param ordered: nothing was: it was deactivated, and its stop has run its course.
+    """
 
     reason: Sentence
+    ordered: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,12 +111,14 @@ class Noted:
     :param warning: somebody should do something about it.
     :param danger: at once: a drive may be running that should not.
     :param error: what is told is more than a warning.
+    :param new: it tells of something else than the one before: a drive may have any number.
     """
 
     text: Sentence
     warning: bool = False
     danger: bool = False
     error: bool = False
+    new: bool = False
 
 
 Event = Union[ProcessDataReceived, StationFound, StationLost, DriveFailed, MappingDiffered,

@@ -23,7 +23,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import Failure, ReadRequest, ReadValue
+from drive_can_bridge.core.requests import Failure, FailureKind, ReadRequest, ReadValue
 
 
 class Desk(Protocol):
@@ -55,8 +55,6 @@ class Watched(Protocol):
 
 #: 603Fh: manuals write what is in it, as in emergencies, with four hexadecimal digits
 ERROR_CODE = 0x603F
-#: how what a fault has ended is answered: with which one it is
-_ENDED = ('fault_while_enabling', 'fault_while_homing')
 
 
 class FaultWatch:
@@ -99,7 +97,7 @@ class FaultWatch:
                 self.sampled(event.raws, event.received_at)
             elif isinstance(event, StationLost):
                 self._gone()
-            elif isinstance(event, ControlCompleted) and event.message.code in _ENDED:
+            elif isinstance(event, ControlCompleted) and event.by_fault:
                 events.remove(event)
                 if not self._ended:
                     self._tell_at = self._now + self._session.configuration.control_timeout
@@ -129,7 +127,7 @@ class FaultWatch:
         if isinstance(outcome, ReadValue):
             self._known(outcome.raw)
         elif isinstance(outcome, Failure):
-            self.unread = (outcome.reason if outcome.reason.code != 'no_answer' else
+            self.unread = (outcome.reason if outcome.kind is not FailureKind.NO_ANSWER else
                            sentences.no_answer_briefly())
             self._tell(sentences.fault_unread(self.unread))
             self._have_refusals_tell(sentences.number_unread(self.unread))

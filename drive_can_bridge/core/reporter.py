@@ -6,6 +6,7 @@ It is the counterpart of the outbox: frames go to the drive, this goes to people
 """
 
 from collections.abc import Iterable
+from enum import Enum
 import math
 
 from drive_can_bridge.core.events import (
@@ -20,6 +21,14 @@ from drive_can_bridge.core.statistics import DriveStatistics
 TELL_LATE = 10.0
 
 
+class AdviceKind(Enum):
+    """What an advice on a drive that is not online rests on."""
+
+    CAUSE = 'on what was seen'
+    GUESS = 'on nothing but that it does not answer: what to look at when it was never seen'
+    MAPPING = 'on what it maps, which differs'
+
+
 class Reporter:
     """
     The reports of one session.
@@ -27,13 +36,14 @@ class Reporter:
     :param statistics: counts the frames that were rejected.
     :ivar events: what happened since they were taken last.
     :ivar advice: while the drive is not online: what is missing, and what to look at; '' else.
+    :ivar advice_kind: what that rests on.
     """
 
-    __slots__ = ('_statistics', '_tell_late_at', 'advice', 'events')
+    __slots__ = ('_statistics', '_tell_late_at', 'advice', 'advice_kind', 'events')
 
     def __init__(self, statistics: DriveStatistics, advice: Sentence) -> None:
         self.events: list[Event] = []
-        self.advice = advice
+        self.advise(advice)
         self._statistics = statistics
         self._tell_late_at = -math.inf
 
@@ -43,6 +53,18 @@ class Reporter:
         if events:
             self.events = []
         return events
+
+    def advise(self, text: Sentence, kind: AdviceKind = AdviceKind.CAUSE) -> None:
+        """Say what is missing, and what to look at."""
+        self.advice, self.advice_kind = text, kind
+
+    def guess(self, text: Sentence, *, unless: Sentence = NOTHING) -> None:
+        """
+        Say what to look at, of a drive of which is only known that it does not answer.
+
+        :param unless: what is known of it; '' if nothing is.
+        """
+        self.advise(unless or text, AdviceKind.CAUSE if unless else AdviceKind.GUESS)
 
     def note(self, event: Event) -> None:
         """Tell what happened."""
@@ -80,14 +102,14 @@ class Reporter:
 
     def found(self) -> None:
         """Tell that the drive exchanges process data."""
-        self.advice = NOTHING
+        self.advise(NOTHING)
         self.events.append(StationFound())
 
-    def lost(self, reason: Sentence, *, was_online: bool) -> None:
+    def lost(self, reason: Sentence, *, was_online: bool, ordered: bool = False) -> None:
         """Tell why the drive is offline; people hear of it when it was not."""
-        self.advice = reason
+        self.advise(reason)
         if was_online:
-            self.events.append(StationLost(reason))
+            self.events.append(StationLost(reason, ordered))
 
     def expired(self, setpoints: Iterable[Setpoint]) -> None:
         """Tell that no fresh command keeps these setpoints: they went neutral."""

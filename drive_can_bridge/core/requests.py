@@ -9,6 +9,7 @@ the order asked.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Union
 
 from drive_can_bridge.core import sentences
@@ -16,10 +17,32 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 
 
+class FailureKind(Enum):
+    """Why a parameter was not read or written, for programs."""
+
+    NO_ANSWER = 'the drive was asked, and did not answer'
+    OFFLINE = 'the drive is not there, or takes no requests'
+    NOT_SENT = 'the bus takes no frames'
+    REFUSED = 'the drive refused, or has something else than was written'
+    INVALID = 'the drive cannot be asked for that'
+    UNAVAILABLE = 'the bridge does not serve it now, whatever the drive'
+
+    @property
+    def unheard(self) -> bool:
+        """No frame of the drive came: it may have done it all the same, or not be there."""
+        return self not in (FailureKind.REFUSED, FailureKind.INVALID)
+
+    @property
+    def of_bridge(self) -> bool:
+        """It is no fault of the parameter: all others would have failed alike."""
+        return self in (FailureKind.OFFLINE, FailureKind.UNAVAILABLE)
+
+
 @dataclass(frozen=True)
 class Failure:
     """One parameter failed; ``reason`` says why in words."""
 
+    kind: FailureKind
     reason: Sentence
 
 
@@ -41,29 +64,35 @@ class Written:
     note: str = ''
 
 
+NOT_SENT = Failure(FailureKind.NOT_SENT, sentences.not_sent())
+
 Outcome = Union[Failure, ReadValue, Written]
 #: of a request: one for each name
 Outcomes = tuple[Outcome, ...]
 
-#: codes of failures for which no frame of the drive came
-SILENT = frozenset(['no_answer', 'no_answer_offline', 'no_answer_because'])
-ABSENT = frozenset(['drive_offline', 'drive_offline_because'])
-_NOTHING_SAID_TEXTS = (
-    'no answer', sentences.drive_offline(), sentences.bus_down(), sentences.not_sent(),
-    sentences.bridge_inactive(), sentences.busy())
-_NOTHING_SAID = SILENT | ABSENT | {'bus_down', 'not_sent', 'bridge_inactive', 'busy'}
+#: how reasons begin, in this order
+_TEXTS: dict[str, FailureKind] = {
+    sentences.no_answer_offline(): FailureKind.OFFLINE,
+    sentences.no_answer_briefly(): FailureKind.NO_ANSWER,
+    sentences.drive_offline(): FailureKind.OFFLINE,
+    sentences.not_sent(): FailureKind.NOT_SENT,
+    sentences.bus_down(): FailureKind.UNAVAILABLE,
+    sentences.bridge_inactive(): FailureKind.UNAVAILABLE,
+    sentences.busy(): FailureKind.UNAVAILABLE,
+}
 
 
 def is_answer(outcome: Outcome) -> bool:
     """Tell whether an outcome rests on something that the drive said."""
     if isinstance(outcome, Failure):
-        return outcome.reason.code not in _NOTHING_SAID
+        return not outcome.kind.unheard
     return not (isinstance(outcome, Written) and outcome.note)
 
 
-def tells_nothing(reason: str) -> bool:
-    """Tell whether a reason that came as mere text says that no frame of the drive came."""
-    return reason.startswith(_NOTHING_SAID_TEXTS)
+def kind_of(reason: str) -> FailureKind:
+    """Return the kind of a failure whose reason came as mere text: through ROS."""
+    return next((kind for text, kind in _TEXTS.items() if reason.startswith(text)),
+                FailureKind.REFUSED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +147,7 @@ class RetryPolicy:
     def unanswered(self, attempts: int | None = None, timeout: float | None = None) -> Failure:
         """Say that nobody answered; None: as often, and in so many s, as configured."""
         if self.offline():
-            return Failure(sentences.no_answer_offline())
-        return Failure(sentences.no_answer(
+            return Failure(FailureKind.OFFLINE, sentences.no_answer_offline())
+        return Failure(FailureKind.NO_ANSWER, sentences.no_answer(
             self.timeout if timeout is None else timeout,
             self.attempts if attempts is None else attempts))

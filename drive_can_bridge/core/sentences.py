@@ -77,11 +77,11 @@ too_many_bits = Text(
 wrong_type = Text('wrong type: {found}, expected {expected}', do='send a value of that type')
 not_a_bool = Text('{value} is not a bool', do='send true or false')
 not_a_number = Text('{value} is a bool, not a number', do='send a number')
-not_finite = Text('{value} is not a finite number', do='look at whoever commands this')
+not_finite = Text('{value} is not a finite number', do='look at what commands this drive')
 nan_refused = Text(
     'nan is not a finite number (a negative integer in a float field may arrive so, too: write '
     '300.0, not 300)',
-    do='look at whoever commands this')
+    do='look at what commands this drive')
 misplaced_integer = Text(
     '{value} is what arrives when an integer was put into a float field: write 300.0, not 300',
     do='have its publisher write floating-point numbers')
@@ -366,7 +366,7 @@ set_up_unanswered = Text(
     do='look at power, cable, node-ID and bit rate')
 found_enabled = Text(
     'found in state {state}: it is disabled before anything else',
-    do='look who has enabled it')
+    do='find out what has enabled it')
 found_braking = Text(
     'found in state {state}: it is not touched before that has ended',
     do='wait until the motor stands; then see which fault it is')
@@ -727,7 +727,7 @@ still_running = Text(
 disabled = Text('disabled: {enable}', do='enable it, if it is to move')
 disabled_and_commanded = Text(
     'disabled: {enable}; commands arrive, and change nothing',
-    do='enable it, or end who commands it')
+    do='enable it, or stop what commands it')
 not_armed = Text('not armed: publish {wanted: and }', do='publish what is named')
 slow_exchange = Text(
     'an exchange takes {mean} ms, the period is {period} ms: the drive is slow; choose a '

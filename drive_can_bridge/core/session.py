@@ -44,8 +44,9 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.neutral_stop import NeutralStop
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent, ProcessImage
-from drive_can_bridge.core.reporter import Reporter
-from drive_can_bridge.core.requests import Outcomes, Request, RetryPolicy
+from drive_can_bridge.core.reporter import AdviceKind, Reporter
+from drive_can_bridge.core.requests import (
+    Failure, FailureKind, Outcomes, Request, RetryPolicy)
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
@@ -236,12 +237,12 @@ class Session(ABC):
         owes = self.prepare_stop(now)
         if owes:
             self.stage = Stage.STOPPING
-        self.services.fail_all(reason)
+        self.services.fail_all(Failure(FailureKind.UNAVAILABLE, reason))
         self.withdraw(reason, now)
         if owes and self.begin_stop(now):
             return
         self._leave_owing(sentences.stop_not_possible())
-        self.go_idle(sentences.deactivated())
+        self.go_idle()
 
     def stop_left(self, why: Sentence = NOTHING) -> None:
         """
@@ -250,12 +251,12 @@ class Session(ABC):
         :param why: what is wrong with it; by default, nobody acknowledges it.
         """
         self._leave_owing(why or sentences.stop_not_answered())
-        self.go_idle(sentences.deactivated())
+        self.go_idle()
 
     def stop_ended(self) -> None:
         """End a stop by writes, if this one was for that: what it could not do, it has told."""
         if self.stage is Stage.STOPPING:
-            self.go_idle(sentences.deactivated())
+            self.go_idle()
 
     @property
     def stopped(self) -> bool:
@@ -271,7 +272,7 @@ class Session(ABC):
         """Begin to use the bus: it was opened."""
         self.bus_available = True
         if self.active and not self.serving:
-            self.report.advice = sentences.looked_for()
+            self.report.guess(sentences.looked_for())
             self.start_over(now)
 
     def bus_down(self, now: float, reason: str) -> None:
@@ -279,7 +280,7 @@ class Session(ABC):
         self.bus_available = False
         if self.unshown or not (self.active or self.stopped):
             self.duty.happened(Happened.SILENT)     # no answer to the stop will come
-        self.services.fail_all(sentences.bus_down())
+        self.services.fail_all(Failure(FailureKind.UNAVAILABLE, sentences.bus_down()))
         down = sentences.bus_is_down(self.configuration.bus, reason)
         self.lose(down, now)
         self.go_idle(down)
@@ -290,14 +291,18 @@ class Session(ABC):
         """Handle a stop that did not come to its end in time: the bus takes nothing."""
         self.duty.happened(Happened.SILENT)     # what has left of it was not answered
         self._leave_owing(sentences.stop_not_possible())
-        self.go_idle(sentences.deactivated())
+        self.go_idle()
         self.outbox.clear()
 
-    def go_idle(self, advice: Sentence) -> None:
-        """Send nothing more, and be offline."""
+    def go_idle(self, lost: Sentence = NOTHING) -> None:
+        """
+        Send nothing more, and be offline.
+
+        :param lost: why, if it is not that the bridge was deactivated.
+        """
         self.stage = Stage.IDLE
         self.fall_silent()
-        self.be_offline(advice)
+        self.be_offline(lost or sentences.deactivated(), ordered=not lost)
 
     def time_lost(self, now: float) -> None:
         """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
@@ -343,9 +348,9 @@ class Session(ABC):
         self.online = self.ever_online = True
         self.report.found()
 
-    def be_offline(self, reason: Sentence) -> None:
+    def be_offline(self, reason: Sentence, *, ordered: bool = False) -> None:
         """Record that the drive is offline, if it was not."""
-        self.report.lost(reason, was_online=self.online)
+        self.report.lost(reason, was_online=self.online, ordered=ordered)
         self.online = False
         self.went_offline()
 
@@ -411,17 +416,19 @@ class Session(ABC):
             self.control.request(request, now)
             self.control_changed(now)
 
-    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence, *,
+                        offline: bool) -> Sentence:
         """
         Say why a control action cannot be asked for; '' if it can.
 
         :param refusal: what is usually said.
+        :param offline: that is that the drive is offline.
         """
         return refusal
 
-    def request_refusal(self, now: float) -> Sentence:
-        """Say what of the drive itself forbids requests for parameters; '' if nothing."""
-        return NOTHING
+    def request_refusal(self, now: float) -> Failure | None:
+        """Return what of the drive itself forbids requests for parameters; None: nothing."""
+        return None
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:  # noqa: B027
         """Record a request for parameters that was served, and answered."""
@@ -559,3 +566,8 @@ class Session(ABC):
     def offline_advice(self) -> Sentence:
         """While not online: what is missing and what to look at; '' while online."""
         return self.defect or self.report.advice
+
+    @property
+    def guesses(self) -> bool:
+        """That rests on nothing but that the drive does not answer."""
+        return not self.defect and self.report.advice_kind is AdviceKind.GUESS

@@ -20,7 +20,8 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, Outcomes, ReadRequest, ReadValue, Request, RetryPolicy, WriteRequest)
+    Failure, FailureKind, Outcome, Outcomes, ReadRequest, ReadValue, Request, RetryPolicy,
+    WriteRequest)
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.transactor import ReplyT, StepT
@@ -107,7 +108,7 @@ Found = Union[tuple[int, ...], Failure]
 
 def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
     """Say that a drive has another raw integer than the one that was written."""
-    return Failure(sentences.read_back_differs(
+    return Failure(FailureKind.REFUSED, sentences.read_back_differs(
         value_text(parameter.value_from_raw(found)), value_text(parameter.value_from_raw(wanted))))
 
 
@@ -187,7 +188,7 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
             found = yield from self.read(span)
             if not isinstance(found, Failure):
                 words.update(zip(placement.addresses(span), found))
-            elif found.reason.code == 'no_answer_offline':
+            elif found.kind is FailureKind.OFFLINE:
                 gone = found
             else:
                 failures[span] = found
@@ -217,15 +218,15 @@ class Access(ABC, Generic[SpanT, StepT, ReplyT]):
         if request.atomic and len(items) > 1:
             misfit = self.misfit(items)
             together = () if misfit else (yield from write(items))
-            return together or (Failure(misfit),) * len(items)
+            return together or (Failure(FailureKind.INVALID, misfit),) * len(items)
         outcomes = self._known[request] = []
         gone: Failure | None = None
         for parameter, raw in items:
             outcome = self.aside(parameter, write=True) or gone
             if outcome is None:
                 outcome, = yield from write([(parameter, raw)])
-                if isinstance(outcome, Failure) and outcome.reason.code in (
-                        'no_answer_offline', 'not_sent'):
+                if isinstance(outcome, Failure) and outcome.kind in (
+                        FailureKind.OFFLINE, FailureKind.NOT_SENT):
                     gone = outcome
             outcomes.append(outcome)
         return self.known(request)

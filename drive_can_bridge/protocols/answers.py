@@ -141,4 +141,4 @@ class Answers:
                 session.lose(reason, now)
             elif session.duty.happened(Happened.UNANSWERED) is Do.STOP_BY_NUMBER:
                 session.report.warn(sentences.stop_not_answered(), may_run=True)
-            session.report.advice = self._silent
+            session.report.guess(self._silent)

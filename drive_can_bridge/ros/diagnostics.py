@@ -34,11 +34,6 @@ from drive_can_bridge.transport.failures import with_outlook
 
 #: s after the activation that a drive may take to be seen
 GRACE = 5.0
-#: what a session says while it looks for a drive: of what to correct at a first start, which this
-#: one has behind it
-_FIRST_START = frozenset((
-    'looked_for', 'maps_unread', 'cycles_unanswered', 'reads_unanswered', 'rounds_unanswered',
-    'silent', 'reconnected'))
 #: what a session says of a drive that sends something, so that power and cable are in order
 _ANSWERS = frozenset(('answers_without', 'answers_otherwise', 'pdo_length'))
 #: bus load above which a bus is never OK
@@ -60,7 +55,8 @@ def absence(drive: DriveNode) -> Sentence:
     since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))
     if answers:
         return sentences.offline_since(since, what)
-    if what.code in _FIRST_START:
+    # what to correct at a first start, this one has behind it
+    if session.guesses:
         what = drive.lost_for
     return sentences.silent_since(since, what)
 
@@ -105,8 +101,8 @@ class Attendance:
         for drive in missing:
             with drive.exchange.entered() as entered:
                 told = absence(drive) if entered else sentences.bus_hangs(drive.exchange.bus.name)
-            self._log.speaker(drive.name).warning(
-                told if told.code in ('never_seen', 'not_online') else sentences.not_seen(told))
+                of_drive = entered and drive.exchange.bus_state == 'up'
+            self._log.speaker(drive.name).warning(told if of_drive else sentences.not_seen(told))
         online = sum(drive.session.online for drive in self._drives)
         self._log.warning(sentences.drives_missing(
             online, len(self._drives), [drive.name for drive in missing]))

@@ -25,7 +25,8 @@ from drive_can_bridge.core.events import (
     StationLost)
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.requests import Failure, Outcome, ReadRequest, ReadValue, Request
+from drive_can_bridge.core.requests import (
+    Failure, FailureKind, Outcome, ReadRequest, ReadValue, Request)
 from drive_can_bridge.core.sentences import answer_late, bridge_inactive, internal_error
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
@@ -246,7 +247,7 @@ class DriveNode(DriveListener):
             if self.session.active:
                 self.times_lost += 1
                 self._log.warning(f'offline: {event.reason}', urgent=True)
-            elif event.reason.code == 'deactivated' and not self._may_run:
+            elif event.ordered and not self._may_run:
                 self._tell_stopped()    # else it was lost before the end of its stop
         elif isinstance(event, DriveFailed):
             self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
@@ -271,8 +272,7 @@ class DriveNode(DriveListener):
             self.warn('foreign master', event.text)
         elif isinstance(event, Noted):
             self._may_run = self._may_run or event.danger
-            if event.text.code == 'emergency':
-                # each tells of another error, and a drive may have any number of them
+            if event.new:
                 self._log.warn('emergency', event.text, few=FEW)
             elif event.error:
                 self._log.error(event.text)
@@ -372,7 +372,7 @@ class DriveNode(DriveListener):
         if completed is not None:
             completed(ControlCompleted(request, False, reason)
                       if isinstance(request, ControlRequest)
-                      else (Failure(reason),) * len(request))
+                      else (Failure(FailureKind.UNAVAILABLE, reason),) * len(request))
 
     def _submit_quietly(self, request: ReadRequest, completed: Completed) -> None:
         """Submit a request of our own, whose answer is for the executor."""

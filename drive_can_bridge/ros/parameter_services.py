@@ -23,7 +23,6 @@ from rclpy.qos import qos_profile_parameter_events
 
 from drive_can_bridge.core.directory import contradictions, NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
@@ -38,8 +37,6 @@ from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import CoroutineServices, Question, ServiceThread
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
-#: codes of reasons why a read may fail that say nothing about the parameter
-_NOT_ITS_FAULT = frozenset(['bridge_inactive', 'bus_down', 'busy', 'no_answer_offline'])
 #: names in one call
 NAMES_MAX = 1000
 #: names of one call that are logged, and looked at for what else might be meant, one by one
@@ -128,7 +125,7 @@ class ParameterServices:
             if wanted:
                 outcomes = await self._submit(
                     ReadRequest(tuple(parameter for _, parameter in wanted)))
-                failed: list[tuple[Parameter, Sentence]] = []
+                failed: list[tuple[Parameter, Failure]] = []
                 for (place, parameter), outcome in zip(wanted, outcomes):
                     if isinstance(outcome, ReadValue):
                         values[place] = parameter_value(
@@ -136,10 +133,9 @@ class ParameterServices:
                         self._unreadable.discard(parameter.name)
                         self._errors.pop(request.names[place], None)
                     elif isinstance(outcome, Failure):
-                        if parameter.listed and (
-                                outcome.reason.code not in _NOT_ITS_FAULT):
+                        if parameter.listed and not outcome.kind.of_bridge:
                             self._unreadable.add(parameter.name)
-                        failed.append((parameter, outcome.reason))
+                        failed.append((parameter, outcome))
                         self._remember(request.names[place], outcome.reason)
                 self._tell_outcomes('read', failed)
         elif request.names:
@@ -215,12 +211,12 @@ class ParameterServices:
                 blind=all(self._restore.ends_mode(parameter.name, parameter.word_from_raw(raw))
                           for _, parameter, raw in items)))
             written = []
-            failed: list[tuple[Parameter, Sentence]] = []
+            failed: list[tuple[Parameter, Failure]] = []
             for (place, parameter, raw), outcome in zip(items, outcomes):
                 name = request.parameters[place].name
                 results[place] = _result(outcome)
                 if isinstance(outcome, Failure):
-                    failed.append((parameter, outcome.reason))
+                    failed.append((parameter, outcome))
                 if isinstance(outcome, Written):
                     written.append((name, parameter, raw))
             self._tell_outcomes('set', failed)
@@ -250,7 +246,7 @@ class ParameterServices:
         names = [message.name for message in request.parameters]
         results = list(map(_result, outcomes))
         self._tell_outcomes('set', [
-            (parameter, outcome.reason) for (parameter, _), outcome in zip(items, outcomes)
+            (parameter, outcome) for (parameter, _), outcome in zip(items, outcomes)
             if isinstance(outcome, Failure)])
         self._announce([(name, parameter, raw) for name, (parameter, raw), outcome
                         in zip(names, items, outcomes) if isinstance(outcome, Written)])
@@ -296,13 +292,13 @@ class ParameterServices:
         if more > 0:
             self._failed(f'{what} parameters', f'{more} more names of the same call failed', more)
 
-    def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Sentence]]) -> None:
+    def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Failure]]) -> None:
         """Log what became of a call's names: of what is no fault of theirs what a log takes."""
         alike = 0
-        for parameter, reason in failures:
-            alike += reason.code in _NOT_ITS_FAULT
-            if alike <= BURST or reason.code not in _NOT_ITS_FAULT:
-                self._failed(f'{what} {_title(parameter)}', reason, 0)
+        for parameter, failure in failures:
+            alike += failure.kind.of_bridge
+            if alike <= BURST or not failure.kind.of_bridge:
+                self._failed(f'{what} {_title(parameter)}', failure.reason, 0)
         if alike > BURST:
             self._failed(f'{what} parameters',
                          f'{alike - BURST} more names of the same call failed', 0)

@@ -12,6 +12,7 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Access, Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
+from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
 
 #: bit of its mode, and what else stands in that parameter
@@ -116,7 +117,8 @@ class ScriptedDrive(Drive):
             self.events.append(('read', name, 0))
             if self._mute or self._hears_nothing:
                 self.now += SILENCE
-                yield ReadOutcome(name, parameter, reason='no answer; drive offline')
+                yield ReadOutcome(name, parameter, reason='no answer; drive offline',
+                                  kind=FailureKind.OFFLINE)
             else:
                 self.now += EXCHANGE
                 word = self.registers[name]
@@ -137,7 +139,8 @@ class ScriptedDrive(Drive):
             self.moving.append(name)
         if self._hears_nothing or fate is Fate.LOST:
             self.now += SILENCE
-            return WriteOutcome(name, False, parameter, 'no answer')
+            return WriteOutcome(
+                name, False, parameter, 'no answer', kind=FailureKind.NO_ANSWER)
         self.events.append(('write', name, int(value)))
         refused = fate is Fate.REFUSED or not (
             self._stores or name == 'mode' or self.in_mode)
@@ -153,11 +156,13 @@ class ScriptedDrive(Drive):
         self._mute = self._mute or fate is Fate.MUTE
         if self._mute or self._hears_nothing or fate is Fate.UNANSWERED:
             self.now += SILENCE
-            return WriteOutcome(name, False, parameter, 'no answer')
+            return WriteOutcome(
+                name, False, parameter, 'no answer', kind=FailureKind.NO_ANSWER)
         self.now += EXCHANGE
         self.signalled = self.signalled or fate in (Fate.SIGNAL, Fate.BROKEN_OFF)
         self.is_enabled = self.is_enabled or fate is Fate.ENABLED
-        return WriteOutcome(name, not refused, parameter, 'refused by the drive' * refused)
+        return WriteOutcome(name, not refused, parameter, 'refused by the drive' * refused,
+                            kind=FailureKind.REFUSED if refused else None)
 
     def write(self, values: Mapping[str, Value], *, blind: bool = False,
               told: Callable[[WriteOutcome], object] | None = None) -> dict[str, WriteOutcome]:

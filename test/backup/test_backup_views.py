@@ -16,6 +16,7 @@ from drive_can_bridge.backup.document import read_backup
 from drive_can_bridge.cli import restore
 from drive_can_bridge.client.direct import DirectDrive
 from drive_can_bridge.client.drive import WriteOutcome
+from drive_can_bridge.core.requests import kind_of
 
 STORIES = stories(__file__, 'commands.yaml')
 
@@ -112,7 +113,7 @@ class Story:
         def failed(drive: Any, name: str, parameter: Any, *args: Any, **options: Any,
                    ) -> WriteOutcome:
             if name == 'store_parameters':
-                return WriteOutcome(name, False, parameter, reason)
+                return WriteOutcome(name, False, parameter, reason, kind=kind_of(reason))
             return put(drive, name, parameter, *args, **options)
         self.patch.setattr(DirectDrive, 'put', failed)
 

@@ -9,8 +9,8 @@ from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.events import DriveState, Noted, SetpointsExpired
-from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.messages import NOTHING
+from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import CommandOutcome, Setpoints
 from drive_can_bridge.core.statistics import DriveStatistics
 

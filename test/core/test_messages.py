@@ -178,3 +178,56 @@ def test_every_complaint_has_a_story() -> None:
     told = {*named(STORIES, 'at', 'says')}
     told.update(code for path in STORIES for _, code, _ in rows_named_in(parsed(path), ''))
     assert complaints.CODES.keys() - told == set()
+
+
+#: what a text for people is called, wherever it is handed on
+TEXTS = {'advice', 'message', 'problem', 'reason', 'refusal', 'sentence', 'why'}
+#: how control flow would look into one
+LOOKS = {'endswith', 'find', 'index', 'partition', 'removeprefix', 'removesuffix', 'rpartition',
+         'split', 'startswith'}
+#: modules that look into one all the same: what for
+OTHER_TEXTS = {
+    'cli/scan.py': 'a problem without its place',
+    'cli/validate.py': 'a problem without its place',
+    'configuration/problems.py': 'a problem with its place',
+    'configuration/schema.py': 'a message of jsonschema',
+    'core/fault_watch.py': 'the same sentence, with the number of the fault',
+    'core/requests.py': 'the one place where what came through ROS becomes a kind',
+    'monitor/summary.py': 'an advice without the state before it',
+    'panel/drive_page.py': 'a refusal without its remedy',
+    'protocols/canopen/heard.py': 'which advice speaks of silence (it should have a kind)',
+    'protocols/canopen_pkw/observer.py': 'a frame',
+    'protocols/canopen_pkw/pkw.py': 'a frame',
+    'protocols/cia402/pdo_set_up.py': 'the same refusal, with what was meant; two of one reason',
+    'transport/failures.py': 'what becomes of a bus, added to why it is down',
+}
+
+
+def looks_into_texts(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Return where a text for people, its code or its fields decide about something."""
+    def name(node: ast.expr) -> str:
+        return str(getattr(node, 'attr', getattr(node, 'id', '')))
+
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            if any(isinstance(each, ast.Attribute) and each.attr == 'code'
+                   and name(each.value) in TEXTS for each in sides) or (
+                       any(isinstance(op, (ast.In, ast.NotIn)) for op in node.ops)
+                       and name(node.comparators[-1]) in TEXTS):
+                yield node.lineno, ast.unparse(node)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and (
+                node.func.attr in LOOKS and name(node.func.value) in TEXTS):
+            yield node.lineno, ast.unparse(node)
+        elif isinstance(node, ast.Attribute) and node.attr == 'fields' and (
+                name(node.value) in TEXTS):
+            yield node.lineno, ast.unparse(node)
+
+
+def test_no_control_flow_asks_for_a_code_or_a_text() -> None:
+    """A failure has a kind (:class:`.FailureKind`), an advice and an event too."""
+    paths = sorted(PRODUCT.rglob('*.py'))
+    found = [f'{path.relative_to(PRODUCT)}:{line}: {what}' for path in paths
+             for line, what in looks_into_texts(parsed(path))
+             if str(path.relative_to(PRODUCT)) not in OTHER_TEXTS]
+    assert found == []

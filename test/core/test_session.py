@@ -14,7 +14,7 @@ from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import RequestCompleted, StationLost
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.requests import Failure, Request
+from drive_can_bridge.core.requests import Failure, FailureKind, Request
 from drive_can_bridge.core.session import Session
 
 
@@ -100,7 +100,8 @@ def test_loss_of_the_bus() -> None:
     assert made.take_events() == [StationLost(DOWN)]
     assert made.take_frames() == []
     made.services.submit(read(GAIN), 5.0)
-    assert [event.outcomes for event in made.take_events()] == [(Failure('bus down'),)]
+    assert [event.outcomes for event in made.take_events()] == [
+        (Failure(FailureKind.UNAVAILABLE, 'bus down'),)]
 
 
 def test_refusals_in_order() -> None:
@@ -110,12 +111,14 @@ def test_refusals_in_order() -> None:
         change()
         made.services.submit(read(GAIN), 3.0)
         reasons += [event.outcomes for event in made.take_events()]
-    assert reasons == [(Failure('bridge inactive'),), (Failure('bus down'),)]
+    assert reasons == [(Failure(FailureKind.UNAVAILABLE, 'bridge inactive'),),
+                       (Failure(FailureKind.UNAVAILABLE, 'bus down'),)]
     assert made.waiting == 1
     made.waiting = 63
     made.services.submit(read(GAIN), 4.0)
     made.services.submit(read(GAIN, SPEED), 4.0)
-    assert [event.outcomes for event in made.take_events()] == [(Failure('busy'),) * 2]
+    assert [event.outcomes for event in made.take_events()] == [
+        (Failure(FailureKind.UNAVAILABLE, 'busy'),) * 2]
     assert made.statistics.requests_failed == 4
 
 

@@ -473,7 +473,7 @@ def test_stop_frames_that_the_bus_refuses_are_no_stop() -> None:
     assert bench.notes[0].events[-2:] == [
         Noted(says(
             'may_still_be_running', why=says('stop_not_possible')), warning=True, danger=True),
-        StationLost('deactivated')]
+        StationLost('deactivated', ordered=True)]
 
 
 def test_stop_that_comes_with_the_end_of_a_stall() -> None:

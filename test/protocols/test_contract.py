@@ -432,7 +432,7 @@ def test_deactivation_ends_neutral_and_then_silent(partner: Partner) -> None:
     assert session.stopped
     assert not session.online
     assert session.next_timer() == math.inf
-    assert partner.talk.events(StationLost) == [StationLost('deactivated')]
+    assert partner.talk.events(StationLost) == [StationLost('deactivated', ordered=True)]
     partner.live(5.0)
     assert partner.take() == []
 

@@ -197,18 +197,19 @@ class Group:
     # -- what the leader does for all -------------------------------------------------------------
 
     def control_refusal(self, session: Session, action: ControlAction,
-                        refusal: Sentence) -> Sentence:
+                        refusal: Sentence, *, offline: bool) -> Sentence:
         """
         Say why a control action cannot be asked for; '' if it can.
 
         :param refusal: what would be said of an inverter alone.
+        :param offline: that is that it is offline.
         """
         if session is not self._leader and action not in _STOPS:
             return sentences.group_is_led(self.leads, _SERVICES[action])
         # a stop is good for those that are there; who is missing for an enable, it says itself
         there = action is not ControlAction.RESET_FAULT and any(
             each.online for each in self._sessions)
-        return NOTHING if refusal.code == 'drive_offline' and there else refusal
+        return NOTHING if offline and there else refusal
 
     def stop_for(self, session: Session, request: ControlRequest, now: float) -> None:
         """Stop all, as a user of an inverter that is led has asked for: none stops alone."""

@@ -11,7 +11,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
+    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne, read_back
 from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
@@ -63,7 +63,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             return answer
         double = answer.double
         if span.width_known and double != (span.type.bits == 32):
-            return Failure(_width_text(span, double=double))
+            return Failure(FailureKind.REFUSED, _width_text(span, double=double))
         return (answer.answered,)
 
     def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
@@ -77,10 +77,10 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         if parameter.number is not None:
             return None
         if write:
-            return Failure(PROCESS_DATA_ONLY)
+            return Failure(FailureKind.INVALID, PROCESS_DATA_ONLY)
         raw = self._samples.last(parameter.name)
         return ReadValue(raw) if raw is not None else Failure(
-            sentences.process_data_not_received())
+            FailureKind.INVALID, sentences.process_data_not_received())
 
     # -- parts ------------------------------------------------------------------------------------
 
@@ -97,7 +97,8 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
                 return answer
             double = answer.double
             if not double and not -0x8000 <= raw <= 0xFFFF:
-                return Failure(sentences.not_in_bits(raw, 16, -0x8000, 0xFFFF))
+                return Failure(
+                    FailureKind.INVALID, sentences.not_in_bits(raw, 16, -0x8000, 0xFFFF))
         if not double and cells(parameter) & self._signed:
             raw = (raw + 0x8000 & 0xFFFF) - 0x8000
         array = parameter.subindex is not None
@@ -122,7 +123,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
                 return reply.response
             return (yield from _refusal(parameter, reply.response))
         if not reply.sent:
-            return Failure(sentences.not_sent())
+            return NOT_SENT
         if reply.contrary is not None:
             # without its sign where users see none
             wrote = parameter.raw_from_word(parameter.word_from_raw(value)) if (
@@ -138,9 +139,9 @@ def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, R
         reply = yield Ask(Task.READ_ELEMENTS, parameter.number or 0)
         answer = reply.response
         if answer is not None and answer.identifier == Response.ELEMENTS:
-            return Failure(sentences.no_such_element(
+            return Failure(FailureKind.REFUSED, sentences.no_such_element(
                 response.word, text, parameter.number or 0, answer.word))
-    return Failure(sentences.refused_by_drive(response.word, text))
+    return Failure(FailureKind.REFUSED, sentences.refused_by_drive(response.word, text))
 
 
 def _width_text(parameter: Parameter, *, double: bool) -> Sentence:

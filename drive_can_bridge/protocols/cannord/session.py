@@ -244,8 +244,9 @@ class CannordSession(Session):
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         self._timeout.request_answered(request, outcomes)
 
-    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
-        return self._group.control_refusal(self, action, refusal)
+    def control_refusal(self, action: ControlAction, refusal: Sentence, *,
+                        offline: bool) -> Sentence:
+        return self._group.control_refusal(self, action, refusal, offline=offline)
 
     def take_events(self) -> list[Event]:
         events = super().take_events()

@@ -148,7 +148,8 @@ class Node:
         """
         text = self.receive_emergency(network.decode_emergency(data))
         if text:
-            report.note(Noted(text, warning=self.emergency is not None))
+            lasts = self.emergency is not None
+            report.note(Noted(text, warning=lasts, new=lasts))
 
     def handle_timer(self, now: float) -> Change:
         """Do what is due."""

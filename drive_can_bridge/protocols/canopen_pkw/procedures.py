@@ -9,7 +9,8 @@ from collections.abc import Generator, Hashable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, Written
+from drive_can_bridge.core.requests import (
+    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, Written)
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
@@ -33,7 +34,8 @@ class RegisterAccess(Access[Span, Step, Reply]):
         reply = yield Read(span.address, span.count)
         if isinstance(reply, Answered):
             return reply.words[:span.count]
-        return self.retry.unanswered() if isinstance(reply, Silence) else Failure(reply.text)
+        return (self.retry.unanswered() if isinstance(reply, Silence) else
+                Failure(FailureKind.REFUSED, reply.text))
 
     def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         return self._write(items, blind=False)
@@ -68,9 +70,9 @@ class RegisterAccess(Access[Span, Step, Reply]):
             if isinstance(reply, Answered):
                 return Written()
             if isinstance(reply, Refused):
-                return Failure(reply.text)
+                return Failure(FailureKind.REFUSED, reply.text)
             if reply.refused:
-                return Failure(sentences.not_sent())
+                return NOT_SENT
             if reply.sent:
                 return self.retry.unanswered(1)
         return self.retry.unanswered()

@@ -41,6 +41,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.process_image import status_word
+from drive_can_bridge.core.requests import Failure, FailureKind
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
@@ -214,7 +215,7 @@ class PkwSession(Session):
         super().bus_down(now, reason)
 
     def begin(self, now: float) -> None:
-        self.report.advice = sentences.looked_for()
+        self.report.guess(sentences.looked_for())
         self._forget_exchange()
         self._rounds.start_over()
         self._node.begin(now)
@@ -252,7 +253,7 @@ class PkwSession(Session):
             gap = self._rounds.gap
             self._silent(sentences.lost_because(reason, gap) if gap else reason, now)
         elif reason and not self._node.heartbeat_lost:
-            self.report.advice = self._rounds.gap or sentences.rounds_unanswered()
+            self.report.guess(sentences.rounds_unanswered(), unless=self._rounds.gap)
 
     def lost(self, now: float, *, was_online: bool) -> None:
         if was_online:
@@ -311,14 +312,16 @@ class PkwSession(Session):
         if change is Change.RESTARTED:
             self.report.note(Noted(sentences.booted()))
             reason = sentences.device_restarted()
-            self._close(reason, sentences.no_answer_because(reason), now)
-            self.report.advice = sentences.restarted_waiting()
+            self._close(reason, Failure(
+                FailureKind.NO_ANSWER, sentences.no_answer_because(reason)), now)
+            self.report.advise(sentences.restarted_waiting())
         elif change is Change.NOT_OPERATIONAL:
             reason = self._node.refusal(now)
-            self._close(reason, sentences.drive_offline_because(reason), now)
+            self._close(reason, Failure(
+                FailureKind.OFFLINE, sentences.drive_offline_because(reason)), now)
         self._begin_rounds(now)
 
-    def _close(self, reason: Sentence, failure: Sentence, now: float) -> None:
+    def _close(self, reason: Sentence, failure: Failure, now: float) -> None:
         """Handle a node that takes no PDOs: none that was sent is answered any more."""
         self.lose(reason, now)
         self.services.fail_all(failure)
@@ -335,10 +338,11 @@ class PkwSession(Session):
             self._writers.stop(now)     # it may be listening
             self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
 
-    def request_refusal(self, now: float) -> Sentence:
-        """Say why nothing can be asked by PDOs for a while; '' if it can."""
+    def request_refusal(self, now: float) -> Failure | None:
+        """Return why nothing can be asked by PDOs for a while; None: it can."""
         text = self._node.refusal(now) if self.stage is Stage.RUNNING else NOTHING
-        return sentences.drive_offline_because(text) if text else NOTHING
+        return (Failure(FailureKind.OFFLINE, sentences.drive_offline_because(text)) if text else
+                None)
 
     def _node_says(self, identifier: int, data: bytes, now: float) -> bool:
         """Take a frame; tell whether it was the node's heartbeat or emergency message."""
@@ -454,7 +458,8 @@ class PkwSession(Session):
                       self.neutral_stop.next_timer())
         return soonest if self.control is None else min(soonest, self.control.next_timer())
 
-    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence, *,
+                        offline: bool) -> Sentence:
         return self._writers.control_refusal(action, refusal)
 
     # -- state ------------------------------------------------------------------------------------

@@ -249,7 +249,7 @@ class BringUp:
     def _beats(self) -> Procedure:
         """Wait for heartbeats that have ceased: it would be online again, and not watched."""
         if self._node.ceased:
-            self._session.report.advice = sentences.no_heartbeat(self._node.heartbeat_timeout)
+            self._session.report.advise(sentences.no_heartbeat(self._node.heartbeat_timeout))
             while self._node.ceased:
                 yield Ask(pause=LOOK_PERIOD)
 
@@ -263,14 +263,14 @@ class BringUp:
             yield Ask(pause=START_PAUSE)
             yield from self._becomes_operational()
         elif self._waits_for_start and self._node.state is not None:
-            self._session.report.advice = sentences.node_state(self._node.state.text)
+            self._session.report.advise(sentences.node_state(self._node.state.text))
             while self._waits_for_start:
                 yield Ask(pause=LOOK_PERIOD)
 
     def _sync_begins(self, beat: Beat) -> Procedure:
         """Wait until there is SYNC: a drive that watches it needs it when it is started."""
         while not beat.opened:
-            self._session.report.advice = sentences.sync_not_begun()
+            self._session.report.advise(sentences.sync_not_begun())
             yield Ask(pause=LOOK_PERIOD)
         pause = beat.before_start(self._channel.now) if self._options.nmt_start else 0.0
         if pause:
@@ -326,7 +326,7 @@ class BringUp:
                     word & (1 << measured.type.bits) - 1))
             if setpoints.known:
                 return
-            self._session.report.advice = setpoints.untold_text
+            self._session.report.advise(setpoints.untold_text)
             yield Ask(pause=5 * LOOK_PERIOD)
 
     def _choose_mode(self) -> Procedure:

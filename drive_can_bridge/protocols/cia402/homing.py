@@ -136,7 +136,7 @@ class Homing:
     def stop(self) -> None:
         """Forget it: the channel was cleared, or the drive is lost."""
         if self.under_way:
-            self._answer(False, self._stopped())
+            self._answer_stopped()
             self._finish()
 
     def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
@@ -245,7 +245,7 @@ class Homing:
         if failure and self._machine.operating:
             self._machine.drop(failure)     # in whatever mode it is, it is not driven
         elif failure:                       # it was stopped meanwhile
-            told = self._stopped()
+            self._answer_stopped()
         self._answer(not told, told or sentences.homed())
         if failure:
             self._go(Step.HOLDING)
@@ -255,7 +255,7 @@ class Homing:
     def _interrupted(self, status: int) -> None:
         """Go back to the mode of a drive that was stopped, as soon as it is disabled."""
         if self._request is not None:
-            self._answer(False, self._stopped())
+            self._answer_stopped()
         self._rules.homing_bits = 0
         self._deadline = math.inf
         # a mode that changes now would change how the drive brakes
@@ -303,16 +303,16 @@ class Homing:
         # PDOs do not pass through the channel: its own time may be that of long ago
         self._channel.run(look(), then, self._now)
 
-    def _stopped(self) -> Sentence:
+    def _answer_stopped(self) -> None:
         """Say how far it came; the watch for faults adds which one it was that stopped it."""
         step = self._step.value
-        return (sentences.fault_while_homing(step) if self._machine.fault else
-                sentences.homing_stopped(step))
+        self._answer(False, sentences.fault_while_homing(step) if self._machine.fault else
+                     sentences.homing_stopped(step), by_fault=self._machine.fault)
 
-    def _answer(self, success: bool, message: Sentence) -> None:
+    def _answer(self, success: bool, message: Sentence, *, by_fault: bool = False) -> None:
         request, self._request = self._request, None
         if request is not None:
-            self._session.report.note(ControlCompleted(request, success, message))
+            self._session.report.note(ControlCompleted(request, success, message, by_fault))
 
     def _finish(self) -> None:
         self._rules.homing_bits = None

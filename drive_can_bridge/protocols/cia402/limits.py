@@ -17,9 +17,9 @@ from collections.abc import Callable, Generator
 import math
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
-from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel

@@ -11,8 +11,8 @@ that tells the size of its status word as it is, another size than the profile h
 from collections.abc import Generator, Iterable
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.messages import Sentence, together
+from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Ask, Reply

@@ -12,7 +12,8 @@ from collections.abc import Generator, Sequence
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, RetryPolicy, Written
+from drive_can_bridge.core.requests import (
+    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne
 from drive_can_bridge.protocols.canopen import sdo
@@ -42,7 +43,7 @@ def cells(parameter: Parameter) -> Cells:
 
 def refused(code: int) -> Failure:
     """Say that a drive refused a transfer."""
-    return Failure(sentences.refused_by_drive(code, sdo.describe(code)))
+    return Failure(FailureKind.REFUSED, sentences.refused_by_drive(code, sdo.describe(code)))
 
 
 class SdoAccess(Access[Parameter, Ask, Reply]):
@@ -52,9 +53,10 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         super().__init__(channel, retry, OneByOne())
 
     def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
-        reply = yield from self._upload(span)
-        if isinstance(reply, Failure):
-            return reply
+        reply = yield Ask(span.index or 0, span.subindex or 0)
+        failure = self._failure(reply)
+        if failure is not None:
+            return failure
         data, wanted = reply.data or b'', width(span)
         if not _own_width(span):
             return (int.from_bytes(data, 'little'),)
@@ -65,7 +67,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             reply = reply._replace(padded=status.padded)
         word = reply.word(wanted, signed=span.type.signed)
         if word is None:
-            return Failure(sentences.other_length(len(data), span.type.value))
+            return Failure(FailureKind.REFUSED, sentences.other_length(len(data), span.type.value))
         return (word,)
 
     def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
@@ -73,7 +75,7 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         return ((yield from self._write(parameter, raw)),)
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
-        return Failure(NO_OBJECT) if parameter.index is None else None
+        return Failure(FailureKind.INVALID, NO_OBJECT) if parameter.index is None else None
 
     def misfit(self, items: Sequence[Item]) -> Sentence:
         return NOT_ATOMIC
@@ -84,17 +86,18 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         """Write one parameter; of one whose width only the drive knows, it is asked first."""
         length = width(parameter)
         if not _own_width(parameter):
-            found = yield from self._upload(parameter)
-            if isinstance(found, Failure):
-                if found.reason.fields.get('number') != sdo.READ_OF_WRITE_ONLY:
-                    return found
-                if not parameter.width_known:
-                    return Failure(sentences.width_unknown())
-            else:
-                length = len(found.data or b'')
+            reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
+            failure = self._failure(reply)
+            if failure is None:
+                length = len(reply.data or b'')
+            elif reply.abort != sdo.READ_OF_WRITE_ONLY:
+                return failure
+            elif not parameter.width_known:
+                return Failure(FailureKind.INVALID, sentences.width_unknown())
             low, high = -1 << 8 * length - 1, (1 << 8 * length) - 1
             if not low <= raw <= high:
-                return Failure(sentences.not_in_bits(raw, 8 * length, low, high))
+                return Failure(
+                    FailureKind.INVALID, sentences.not_in_bits(raw, 8 * length, low, high))
         data = (raw & (1 << 8 * length) - 1).to_bytes(length, 'little')
         timeout = self.retry.timeout
         if parameter.stores:
@@ -104,18 +107,17 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
             return Written()
         if reply.abort is not None:
             return refused(reply.abort)
-        return self.retry.unanswered(1, timeout) if reply.sent else Failure(sentences.not_sent())
+        return self.retry.unanswered(1, timeout) if reply.sent else NOT_SENT
 
-    def _upload(self, parameter: Parameter) -> Generator[Ask, Reply, Reply | Failure]:
-        """Read an object of one to four bytes."""
-        reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
+    def _failure(self, reply: Reply) -> Failure | None:
+        """Return why what was read is no object of one to four bytes; None: it is."""
         if reply.abort is not None:
             return refused(reply.abort)
         if reply.data is None:
             return self.retry.unanswered()
         if not 1 <= len(reply.data) <= EXPEDITED_MAX:
-            return Failure(sentences.too_long(len(reply.data)))
-        return reply
+            return Failure(FailureKind.REFUSED, sentences.too_long(len(reply.data)))
+        return None
 
 
 def _own_width(parameter: Parameter) -> bool:

@@ -28,7 +28,8 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.process_image import ProcessImage
-from drive_can_bridge.core.requests import Outcomes, Request, WriteRequest
+from drive_can_bridge.core.reporter import AdviceKind
+from drive_can_bridge.core.requests import Failure, FailureKind, Outcomes, Request, WriteRequest
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
@@ -261,11 +262,12 @@ class Cia402Session(Session):
                 self._start_cycling(outcome.status, now)
                 return
             self.remedy = outcome.remedy
-            self.report.advice = text or self.request_refusal(now) or (
-                sentences.set_up_unanswered())
+            refusal = self.request_refusal(now)
+            self.report.guess(sentences.set_up_unanswered(),
+                              unless=text or (refusal.reason if refusal else NOTHING))
             again = now + LOOK_AGAIN
             if found is Found.DIFFERS:
-                self.report.advice = sentences.mapping_differs(text)
+                self.report.advise(sentences.mapping_differs(text), AdviceKind.MAPPING)
                 if text != told:
                     self.report.note(MappingDiffered(text))
             elif found is Found.RUNS and text != told:
@@ -291,7 +293,7 @@ class Cia402Session(Session):
         self.setpoints.changed = True   # what was written by SDO meanwhile was something else
         self._limits.begin()
         exchange.start(now)
-        self.report.advice = sentences.cycles_unanswered()
+        self.report.guess(sentences.cycles_unanswered())
 
     # -- online and offline -----------------------------------------------------------------------
 
@@ -340,7 +342,7 @@ class Cia402Session(Session):
         """
         self.lose(reason, now)
         self._begin(now, spacing)
-        self.report.advice = reason
+        self.report.advise(reason)
 
     # -- PDOs, sending ----------------------------------------------------------------------------
 
@@ -483,7 +485,8 @@ class Cia402Session(Session):
         if change is Change.RESTARTED:
             self.report.note(Noted(sentences.booted()))
             reason = sentences.device_restarted()
-            self.services.fail_all(sentences.no_answer_because(reason))
+            self.services.fail_all(Failure(
+                FailureKind.NO_ANSWER, sentences.no_answer_because(reason)))
             self._channel.clear()
             self._stop.forget()
             self.outbox.drop(self._of_the_conversation, now)
@@ -589,9 +592,9 @@ class Cia402Session(Session):
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
         return together((self._homing.not_back, self.unready, known, newest))
 
-    def request_refusal(self, now: float) -> Sentence:
-        return sentences.drive_offline_because(sentences.node_state(
-            NmtState.STOPPED.text)) if self._stopped_by_nmt(now) else NOTHING
+    def request_refusal(self, now: float) -> Failure | None:
+        return Failure(FailureKind.OFFLINE, sentences.drive_offline_because(sentences.node_state(
+            NmtState.STOPPED.text))) if self._stopped_by_nmt(now) else None
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:
         # also where the answer was lost: it may have been written
@@ -657,7 +660,8 @@ class Cia402Session(Session):
         if self._machine.word != self.exchange.word:
             timer.no_later(max(now, timer.began_at + EXPIRY_SPACING))
 
-    def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
+    def control_refusal(self, action: ControlAction, refusal: Sentence, *,
+                        offline: bool) -> Sentence:
         if refusal or action is not ControlAction.ENABLE:
             return refusal
         if self.error or not self._machine.fault:
@@ -780,7 +784,7 @@ class Cia402Session(Session):
     @property
     def state(self) -> DriveState:
         # also while it is looked at again
-        if self.report.advice.code == 'mapping_differs' and not self.defect:
+        if self.report.advice_kind is AdviceKind.MAPPING and not self.defect:
             return DriveState.MAPPING_DIFFERS
         return super().state
 

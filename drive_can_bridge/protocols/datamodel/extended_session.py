@@ -41,6 +41,7 @@ from drive_can_bridge.core.events import (
     DriveState, MappingDiffered, MappingWritten, ProcessDataReceived)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.reporter import AdviceKind
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
@@ -213,7 +214,7 @@ class ExtendedSession(Session):
                 setpoints.changed |= setpoint.measure(raw)
             if not setpoints.unknown:
                 break
-            self.report.advice = setpoints.untold_text
+            self.report.advise(setpoints.untold_text)
             if raws is None and self._verify:
                 return False
             now = self._channel.now     # without an answer, the time-out of the read is the pace
@@ -275,11 +276,10 @@ class ExtendedSession(Session):
         if self._rewritten_at > -math.inf:
             self._pause = min(2 * self._pause, REWRITE_PAUSE_MAX)
         request, response = self._wanted
-        failure = yield from procedures.write_maps(
+        failure, kept = yield from procedures.write_maps(
             *self._map_bases, request=request, response=response)
         self._rewritten_at = self._channel.now
-        self.remedy = (sentences.maps_not_kept if failure.code in ('', 'write_read_back')
-                       else sentences.drive_to_correct)
+        self.remedy = sentences.drive_to_correct if failure and kept else sentences.maps_not_kept
         if failure:
             self._tell(sentences.maps_not_written(failure))
         else:
@@ -289,13 +289,13 @@ class ExtendedSession(Session):
 
     def _tell(self, text: Sentence) -> None:
         """Report a difference, once."""
-        self.report.advice = sentences.mapping_differs(text)
+        self.report.advise(sentences.mapping_differs(text), AdviceKind.MAPPING)
         if text != self._told:
             self._told = text
             self.report.note(MappingDiffered(text))
 
     def _nobody_answers(self, now: float) -> None:
-        self.report.advice = sentences.maps_unread()
+        self.report.guess(sentences.maps_unread())
         if self._side.shows_up:     # and answers a part of what it is asked
             self._side.shows_up = False
             self._side.again.heard(now, answered=True)
@@ -305,7 +305,7 @@ class ExtendedSession(Session):
     def _start_cycling(self, now: float) -> None:
         self._answers.book.forget_asked()
         self._exchange.start(now, in_turn=True)
-        self.report.advice = sentences.cycles_unanswered()
+        self.report.guess(sentences.cycles_unanswered())
 
     def send_cycle(self, request: Frame, now: float) -> None:
         self._exchange.put(request)

@@ -16,7 +16,8 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
-from drive_can_bridge.core.requests import Failure, Outcome, Outcomes, RetryPolicy, Written
+from drive_can_bridge.core.requests import (
+    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, RetryPolicy, Written)
 from drive_can_bridge.protocols.access import Access, Found, Item, ParameterPlacement, read_back
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Read, Reply, Step, Words, Write)
@@ -122,7 +123,7 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
         never = write and self._numbers.number(parameter) == CYCLIC_PARAMETER
-        return Failure(NOT_WRITABLE) if never else None
+        return Failure(FailureKind.INVALID, NOT_WRITABLE) if never else None
 
     def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
         # one bad number makes the drive ignore the whole frame
@@ -158,7 +159,7 @@ class ParameterAccess(Access[Chunk, Step, Reply]):
         became = yield from put(write, look=look and write.eeprom and readable,
                                 verify=self._verify and readable)
         if not became.sent:
-            return (Failure(sentences.not_sent()),) * len(items)
+            return (NOT_SENT,) * len(items)
         if became.found is None:
             return (self.retry.unanswered(),) * len(items)
         if not became.found:
@@ -193,14 +194,14 @@ def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] 
 
 
 def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
-               response: Sequence[int]) -> Generator[Step, Reply, Sentence]:
+               response: Sequence[int]) -> Generator[Step, Reply, tuple[Sentence, bool]]:
     """
     Rewrite both maps in the safe order: request slot 0 off first and on last.
 
     With slot 0 at zero the drive ignores every request word, so no half-written map can ever
     route a setpoint into the wrong parameter. Each entry is read back before the next.
 
-    :return: '' on success, else what failed.
+    :return: '' on success, else what failed; False: the drive did not keep what was written.
     """
     wanted_request, wanted_response = padded(request), padded(response)
     sequence = [(request_base, 0)]
@@ -210,12 +211,13 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
     for number, word in sequence:
         became = yield from put(Write(number, (word,), eeprom=True), look=True)
         if not became.sent:
-            return sentences.write_refused(f'map parameter {number}:', sentences.not_sent())
+            return sentences.write_refused(f'map parameter {number}:', sentences.not_sent()), True
         if not became.found:
-            return sentences.no_answer_for_map(number)
+            return sentences.no_answer_for_map(number), True
         if became.found[0] != word:
-            return sentences.write_read_back(f'map parameter {number}', became.found[0], word)
-    return NOTHING
+            return sentences.write_read_back(
+                f'map parameter {number}', became.found[0], word), False
+    return NOTHING, True
 
 
 def _compare(parameter: Parameter, found: int, wanted: int) -> Outcome:

@@ -84,7 +84,7 @@ class StandardSession(Session):
             self._timer.start(now)
 
     def begin(self, now: float) -> None:
-        self.report.advice = sentences.reads_unanswered()
+        self.report.guess(sentences.reads_unanswered())
         self._round.gap = NOTHING
         self._tell_to_stop(now, self.duty.happened(Happened.STARTED))
         self._timer.start(now)
@@ -197,7 +197,7 @@ class StandardSession(Session):
     def exchange_missed(self, reason: Sentence, now: float) -> None:
         self._missed = True
         if not self.online:
-            self.report.advice = self._round.gap or sentences.reads_unanswered()
+            self.report.guess(sentences.reads_unanswered(), unless=self._round.gap)
         elif reason:
             gap = self._round.gap
             self.lose(sentences.lost_because(reason, gap) if gap else reason, now)

@@ -349,7 +349,7 @@ def test_stop() -> None:
     assert talk.until(11.0) == [(10.1, READY_FRAME)]
     assert talk.session.stopped
     assert talk.session.next_timer() == math.inf
-    assert talk.events(StationLost) == [StationLost('deactivated')]
+    assert talk.events(StationLost) == [StationLost('deactivated', ordered=True)]
     talk.hears(READY, 10.102)    # the answer to the last frame
     assert talk.events() == []
     talk.hears(READY, 10.11)

@@ -223,7 +223,7 @@ def test_emergency_is_shown_until_it_is_over() -> None:
     talk = online()
     assert talk.hears(TRIP, 10.06) == []
     text = ('2310h (current, output side), error register 02h, manufacturer 0A 00 00 00 00')
-    assert talk.events() == [Noted(says('emergency', text=text), warning=True)]
+    assert talk.events() == [Noted(says('emergency', text=text), warning=True, new=True)]
     assert talk.session.facts()['emergency'] == text
     assert talk.session.warning == says('emergency_lasts', text=text)
     assert talk.session.online

@@ -179,7 +179,7 @@ def test_stop_is_acknowledged_and_then_silent() -> None:
     assert talk.session.control is not None
     assert talk.session.control.off
     assert talk.session.next_timer() == math.inf
-    assert talk.events(StationLost) == [StationLost('deactivated')]
+    assert talk.events(StationLost) == [StationLost('deactivated', ordered=True)]
     assert talk.hears(BOOT_UP, 11.0) == []
     assert talk.at(20.0) == []
 
