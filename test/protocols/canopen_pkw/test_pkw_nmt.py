@@ -45,6 +45,19 @@ def test_nothing_but_nmt_before_the_node_is_operational() -> None:
     assert talk.session.facts()['nmt_state'] == 'operational'
 
 
+def test_what_a_silent_mailbox_sends_all_the_same_is_named() -> None:
+    talk = started(parameter_timeout=0.05)
+    for beat in range(40):
+        talk.until(10.02 + 0.1 * beat)
+        talk.hears('085#0010010000000000', 10.02 + 0.1 * beat)
+        talk.hears('705#', 10.03 + 0.1 * beat)
+    assert talk.session.offline_advice == (
+        'answers, but there is no complete round of reads: emergency 1000h, register 01h')
+    assert talk.session.statistics.rejected == 1    # a heartbeat without content, told once
+    talk.until(20.0)
+    assert talk.session.offline_advice == says('rounds_unanswered')
+
+
 def test_start_once_a_second_until_the_drive_is_found() -> None:
     talk = started(parameter_timeout=0.5)
     assert [at for at, text in talk.until(13.5) if text == START] == [11.0, 12.0, 13.0]
