@@ -170,9 +170,12 @@ class DriveRules(TableRules):
             self.may_run = False
 
     def forget(self) -> None:
-        self.state, self.status = None, 0
+        # it may be in its quick stop still
+        self._quick_stop_unseen = (
+            self._quick_stop_unseen or self._last == states.QUICK_STOP
+            or self.state is State.QUICK_STOP_ACTIVE)
+        self.state, self.status, self._answers = None, 0, 0
         self.halted = self._taken_on_trust = False
-        self._quick_stop_unseen, self._answers = self._last == states.QUICK_STOP, 0
         self.standing.forget()
 
     def known_disabled(self) -> None:

@@ -108,6 +108,21 @@ class TestDrivesThatStayInQuickStopWhatever605AhSays:
         assert drive.cut_short == 0
 
 
+def test_one_that_is_lost_right_behind_its_own_quick_stop_goes_on_braking() -> None:
+    """It was seen, and 0002h had not left yet: the stop by SDO is no 0000h."""
+    axis, drive = meet(TurningServo, disable_word='disable_voltage')
+    drive.brakes = 10_000
+    drive.becomes(drive.QUICK_STOP)
+    axis.take()
+    while axis.session.control.state != State.QUICK_STOP_ACTIVE.value:
+        axis.live(0.0005)
+    axis.deliver(axis.talk.bus_down(axis.now))
+    axis.deliver(axis.talk.bus_up(axis.now))
+    axis.live(0.5)
+    assert '605#2B40600002000000' in axis.take()
+    assert drive.cut_short == 0
+
+
 class TestWhatSaysThatItMoves:
     """605Ah = 6, so that nothing but the axis is waited for."""
 
