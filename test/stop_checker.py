@@ -152,6 +152,8 @@ class Servo(ServoDrive):
                 (0x1A00, 1, '10004160'))}})
 
     def takes(self, sent: Frame) -> list[Frame]:
+        if not self.stopped and str(sent).startswith(f'{0x600 + self.node:03X}#40416000'):
+            self.runs_down()    # while it is asked for its state, as while it is cycled
         answers = super().takes(sent)
         if self.operational and sent.identifier == 0x200 + self.node and (
                 by_event := self.responses(255)):   # as its event timer would
@@ -180,11 +182,6 @@ class StayingServo(Servo):
     def __init__(self, motor: Motor, node: int) -> None:
         super().__init__(motor, node)
         self.objects.update({(0x606C, 0): b'\x64\0\0\0', (0x6064, 0): bytes(4)})
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        if sent.identifier == 0x600 + self.node and sent.data[:4] == bytes.fromhex('40416000'):
-            self.runs_down()
-        return super().takes(sent)
 
     def becomes(self, state: int) -> None:
         if state == self.QUICK_STOP != self.state:
