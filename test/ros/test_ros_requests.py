@@ -162,6 +162,7 @@ def _read_back(rcl: RclServices, request: Any) -> Any:
     """Return what is read of a request that lies in C."""
     from drive_can_bridge.ros.rcl import services
     kind = type(request)
+    type(kind).__import_type_support__()    # as whoever makes a service does
     functions = rcl._functions_of(kind)
     raw = services._in_c(request, functions)
     try:
