@@ -6,7 +6,7 @@ A drive is built even when parts of it are wrong, with defaults in place of the 
 that everything else about it can be checked in the same run.
 """
 
-from collections.abc import Container, Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 import math
 import pathlib

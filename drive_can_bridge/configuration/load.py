@@ -24,7 +24,7 @@ from drive_can_bridge.configuration.checks import (
 )
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
-from drive_can_bridge.configuration.profiles import ProfileStore
+from drive_can_bridge.configuration.profiles import place_profiles, ProfileStore, Setter
 from drive_can_bridge.configuration.quality_check import check_qualities
 from drive_can_bridge.configuration.scalars import read_scalar, STRING_TAG
 from drive_can_bridge.configuration.schema import (
@@ -194,21 +194,26 @@ def configuration_from_file(path: str | FilePath, *, adapters: Adapters | None =
     tree, problems = read_parameter_file(FilePath(path))
     if tree is None:
         raise ConfigurationError(report(problems))
+    place_profiles(tree, lambda drive, profile: FilePath(path).parent)
     return _configuration(tree, adapters)
 
 
 def configuration_from_overrides(overrides: Mapping[str, object], *,
-                                 adapters: Adapters | None = None,
-                                 namespace: str = '') -> BridgeConfiguration:
+                                 adapters: Adapters | None = None, namespace: str = '',
+                                 setter: Setter = lambda drive, profile: None,
+                                 ) -> BridgeConfiguration:
     """
     Check the parameter overrides of a node.
 
     :param overrides: values by dotted name, as rclpy gives them; None is rcl's empty list.
     :param namespace: of the node, which no file tells; without a slash at its end.
+    :param setter: which file sets the profile of a drive.
     :raises ConfigurationError: with one line per problem, ``key.path: message``; what is wrong
         inside a profile still has its file and line.
     """
-    return _configuration(tree_from_overrides(overrides), adapters, namespace)
+    tree = tree_from_overrides(overrides)
+    place_profiles(tree, setter)
+    return _configuration(tree, adapters, namespace)
 
 
 def _configuration(tree: Tree, adapters: Adapters | None,

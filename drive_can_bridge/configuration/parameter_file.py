@@ -185,6 +185,27 @@ def unseen_problems(paths: Iterable[FilePath], node: str,
     return found, garbled
 
 
+def directory_that_sets(paths: Iterable[FilePath], node: str, key: Path,
+                        value: object) -> FilePath | None:
+    """
+    Return the directory of the last file that sets a key of a node to a value; None: none does.
+
+    :param node: full name of the node.
+    """
+    for path in reversed(list(paths)):
+        try:
+            sections = _FileReader(path).sections
+        except OSError:
+            continue
+        for section in sections:
+            found: Any = section.tree.data if _is_for(section.name, node) else None
+            for part in key:
+                found = found.get(part) if isinstance(found, dict) else None
+            if found == value:
+                return path.absolute().parent
+    return None
+
+
 def _is_for(section: str, node: str) -> bool:
     """Tell whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
     # several in a row are one: tried in all ways, they would take for ever

@@ -1,11 +1,17 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Find and read profiles: ``profile:`` is an absolute path, or a name looked up as NAME.yaml."""
+"""
+Find and read profiles.
 
-from collections.abc import Sequence
+``profile:`` is a name that is looked up as NAME.yaml, an absolute path, or a path that is relative
+to the parameter file that sets it.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 import hashlib
 import os
 from pathlib import Path as FilePath
+import stat
 
 from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.configuration.problems import Problem, Tree
@@ -19,6 +25,38 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.resources import profiles_directory
 
 SUFFIX = '.yaml'
+
+
+#: returns the directory of the file that sets the profile of a drive to a value; None: no file
+Setter = Callable[[str, str], FilePath | None]
+
+
+def place_profiles(tree: Tree, directory_of: Setter) -> None:
+    """Make the relative paths of profiles in a tree absolute, or note why that cannot be."""
+    drives = tree.data.get('drives')
+    for name, drive in drives.items() if isinstance(drives, dict) else ():
+        profile = drive.get('profile') if isinstance(drive, dict) else None
+        if not isinstance(profile, str) or '/' not in profile or os.path.isabs(profile):
+            continue
+        directory = directory_of(name, profile)
+        meant = os.path.abspath(os.path.join(directory or '', profile))
+        if directory is None:
+            tree.wrong(('drives', name, 'profile'), complaints.no_absolute_path(
+                name=profile, meant=meant))
+        elif _everybody_writes(directory):
+            tree.wrong(('drives', name, 'profile'), complaints.open_directory(
+                name=profile, meant=meant))
+        else:
+            drive['profile'] = meant
+            continue
+        tree.cut(('drives', name, 'profile'))
+
+
+def _everybody_writes(directory: FilePath) -> bool:
+    try:
+        return bool(os.stat(directory).st_mode & stat.S_IWOTH)
+    except OSError:
+        return False    # it has gone: nothing will be found there
 
 
 class ProfileStore:
@@ -62,8 +100,6 @@ class ProfileStore:
     def _find(self, name: str) -> FilePath | Sentence:
         if '/' in name:
             path = FilePath(name)
-            if not path.is_absolute():
-                return complaints.no_absolute_path(name=name)
             return path if _is_file(path) else complaints.no_file(name=name)
         for directory in self._directories:
             path = directory / f'{name}{SUFFIX}'

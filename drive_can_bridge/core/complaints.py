@@ -218,7 +218,11 @@ joint_of_other = Text(
 # -- profiles
 no_file = Text('no file {name}, allowed is an existing one')
 cannot_be_read = Text('{path} cannot be read ({why}), allowed is a readable file')
-no_absolute_path = Text('{name!r} is neither a name nor an absolute path, allowed is one of them')
+no_absolute_path = Text(
+    '{name!r} is relative, and no parameter file sets it: write an absolute path ({meant})')
+open_directory = Text(
+    '{name!r} is beside a parameter file in a directory that everybody may write to: write an '
+    'absolute path ({meant})')
 name_with_suffix = Text('{name!r} is unknown, allowed is a name without {suffix}')
 unknown_profile = Text('{name!r} is unknown, {hint} (searched: {places})')
 profile_for_others = Text('{name!r} is for {protocols}, allowed is a profile for {family}')

@@ -41,7 +41,7 @@ from rclpy.time_source import CLOCK_TOPIC
 from drive_can_bridge.clock import Clock, Lock
 from drive_can_bridge.configuration.load import (
     check_dynamic, configuration_from_file, configuration_from_overrides, declared_parameters)
-from drive_can_bridge.configuration.parameter_file import unseen_problems
+from drive_can_bridge.configuration.parameter_file import directory_that_sets, unseen_problems
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
@@ -409,7 +409,7 @@ class BridgeNode(LifecycleNode):
         try:
             configuration = configuration_from_overrides(
                 self._node_parameters.current, adapters=adapters,
-                namespace=self.get_namespace().rstrip('/'))
+                namespace=self.get_namespace().rstrip('/'), setter=self._directory_that_sets)
         except ConfigurationError as error:
             lines = [f'drive_can validate {shlex.quote(file)} names the lines'
                      for file in filter(_is_wrong, self._files)][:1]
@@ -417,6 +417,10 @@ class BridgeNode(LifecycleNode):
         if problems:
             raise ConfigurationError(problems)
         return configuration
+
+    def _directory_that_sets(self, drive: str, profile: str) -> Path | None:
+        return directory_that_sets(map(Path, self._files), self.get_fully_qualified_name(),
+                                   ('drives', drive, 'profile'), profile)
 
     def _configure(self) -> None:
         configuration = self._checked_configuration()

@@ -94,7 +94,6 @@ KEYS = [
      'cyclic_response', says('too_many_slots', count=5, most=4)),
     ('[actual, current, status]', '[actual, actual]', 'cyclic_response',
      says('twice', name='actual')),
-    ('profile: table', 'profile: a/b', 'profile', says('no_absolute_path', name='a/b')),
     ('profile: table', 'profile: table.yaml', 'profile',
      says('name_with_suffix', name='table.yaml', suffix='.yaml')),
 ]
