@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 import traceback
 from typing import Any
 
+import own_network
 import plots
 import report
 import scenarios
@@ -72,8 +73,9 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False, commands=20.0), duration),
         'stop': lambda: scenarios.stop(
             Load(8, 0.01, subscribed=False, control=True, stuck=True), pace.stops, 10000.0, 64),
-        'hand': lambda: scenarios.by_hand(
-            Load(8, 0.01, subscribed=False, control=True), pace.commands),
+        # a stop without a name would reach every bridge of this machine
+        'hand': lambda: own_network.run(lambda: scenarios.by_hand(
+            Load(8, 0.01, subscribed=False, control=True), pace.commands)),
         'backup': lambda: scenarios.backup(
             Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(

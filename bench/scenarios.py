@@ -452,6 +452,7 @@ def by_hand(load: Load, rounds: int) -> dict[str, Any]:
         sys.executable, str(HERE / 'bare_client.py')]
     found: dict[str, Any] = {name: {'ours': [], 'bare': []} for name in (
         'stop', 'stop done', 'read', 'write')}
+    found['floor'] = []
     with ExitStack() as stack:
         bus = Bus(stack, load)
         with bridge_under(load, bus), child('stopper.py') as stopper:
@@ -464,6 +465,10 @@ def by_hand(load: Load, rounds: int) -> dict[str, Any]:
                     if not stopper.ask('enable'):
                         raise SystemExit('the drive was not enabled')
                     bus.drives[0].ask('clear')
+                    if who == 'bare':   # as much Python as nobody does without
+                        begun = time.monotonic()
+                        subprocess.run([sys.executable, '-c', 'import socket'], check=True)
+                        found['floor'].append(time.monotonic() - begun)
                     for name, command in zip(('stop', 'read', 'write'), words):
                         begun = time.monotonic()
                         subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
