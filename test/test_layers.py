@@ -59,7 +59,7 @@ INTERNAL: dict[str, set[str]] = {
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.bridge', 'client.drive', 'client.local', 'client.ros_way'},
-    'backup': {'', 'core', 'configuration', 'client.drive'},
+    'backup': {'', 'core', 'configuration', 'protocols', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
         'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',

@@ -16,9 +16,10 @@ The file of a backup: what it is of, as comments, and the settings as ROS parame
       ros__parameters:
         ramp_time: 2.5  # s
 
-No settings are setpoints, the control word, what process data alone carry (no command writes
-them), and the bits that the profile's section ``restore`` sets and clears: they say in which mode
-a drive is. A parameter with such bits comes last, as its other bits are written with them.
+No settings are setpoints of any mode, the control word, the mode of operation, what process data
+alone carry (no command writes them), and the bits that the profile's section ``restore`` sets and
+clears: they say in which mode a drive is. A parameter with such bits comes last, as its other bits
+are written with them.
 
 Reading is strict: whatever is not plainly a backup is named with its line, and nothing is used.
 Output of ``ros2 param dump`` has no head, and ``null`` for what a drive did not give.
@@ -40,6 +41,7 @@ from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import describe_type, printable, show, TEXT_MAX
+from drive_can_bridge.protocols.families import FAMILIES
 
 
 def value_in_file(parameter: Parameter, raw: int) -> str:
@@ -145,8 +147,14 @@ def is_setting(drive: Drive, name: str) -> bool:
     if parameter.number is None and parameter.index is None:
         return False
     bits = mode_bits(drive.facts.restore).get(name)
-    return (drive.role(name) not in (Role.CONTROL, Role.CYCLIC)
+    return (not is_command(drive.facts.protocol, parameter)
+            and drive.role(name) not in (Role.CONTROL, Role.CYCLIC)
             and not (bits is not None and is_whole(bits, parameter)))
+
+
+def is_command(protocol: str, parameter: Parameter) -> bool:
+    """Tell whether a parameter is a setpoint or a control word in some mode of a drive."""
+    return protocol in FAMILIES and FAMILIES[protocol].is_command(parameter)
 
 
 def settings_of(drive: Drive) -> tuple[str, ...]:

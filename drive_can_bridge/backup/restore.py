@@ -22,7 +22,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from drive_can_bridge.backup.document import (
-    Backup, Head, in_order, is_setting, is_whole, mode_bits, ModeBits, modes_of, raw_in_file)
+    Backup, Head, in_order, is_command, is_setting, is_whole, mode_bits, ModeBits, modes_of,
+    raw_in_file)
 from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
@@ -51,6 +52,7 @@ class LeftAlone(Enum):
     CYCLIC = 'cyclic'
     CONTROL = 'control'
     MODE = 'mode'
+    COMMAND = 'command'
 
     @property
     def text(self) -> str:
@@ -63,6 +65,7 @@ _LEFT_ALONE = {
     LeftAlone.MAP: 'a map: restored with --params-file only',
     LeftAlone.CYCLIC: 'a setpoint: sent cyclically',
     LeftAlone.CONTROL: 'the control word',
+    LeftAlone.COMMAND: 'a setpoint or a control word, in some mode: no setting',
     LeftAlone.MODE: "a mode, which the section 'restore' of its profile sets: not restored",
 }
 _ENDED = "becomes {}: the mode that the section 'restore' of its profile sets is ended"
@@ -105,6 +108,21 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class NotAsInFile:
+    """
+    A setting that is not as in the file in the end.
+
+    :param found: what the drive has; None: it could not be read.
+    :param reason: what its last write, or reading it, failed with; '' where nobody complained.
+    """
+
+    name: str
+    wanted: Value
+    found: Value | None
+    reason: str = ''
+
+
+@dataclass(frozen=True, slots=True)
 class RestorePlan:
     """
     What restoring a file would do.
@@ -116,6 +134,7 @@ class RestorePlan:
     :param wanted: the same as values.
     :param found: what the drive has of all that was read.
     :param unread: what the drive did not give.
+    :param absent: settings that it says it does not have.
     """
 
     changes: tuple[Change, ...]
@@ -125,6 +144,7 @@ class RestorePlan:
     wanted: Mapping[str, Value]
     found: Mapping[str, int]
     unread: tuple[ReadOutcome, ...]
+    absent: tuple[NotAsInFile, ...] = ()
 
 
 def problems_in(backup: Backup, drive: Drive) -> list[str]:
@@ -193,7 +213,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     bits = mode_bits(drive.facts.restore)
     changes: list[Change] = []
     kept: list[Change] = []
-    same, unread = [], []
+    same, unread, absent = [], [], []
     words: dict[str, int] = {}
     there: dict[str, int] = {}
     wanted: dict[str, Value] = {}
@@ -201,7 +221,12 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     for name in names_to_read(backup, drive):
         parameter, outcome = drive.find(name), outcomes[name]
         if parameter is None or outcome.raw is None or outcome.value is None:
-            unread.append(outcome)
+            if outcome.absent and name in settings:
+                absent.append(NotAsInFile(
+                    name, backup.values[name], None,    # type: ignore[arg-type]
+                    outcome.reason))
+            else:
+                unread.append(outcome)
             continue
         found = in_file = there[name] = parameter.word_from_raw(outcome.raw)
         value, left_alone = None, None
@@ -221,7 +246,7 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
         elif name in settings:
             same.append(name)
     return RestorePlan(tuple(changes), tuple(kept), tuple(same), words, wanted,
-                       there, tuple(unread))
+                       there, tuple(unread), tuple(absent))
 
 
 def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
@@ -245,6 +270,8 @@ def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftA
     if role is Role.MAP and drive.facts.through:
         return LeftAlone.MAP
     parameter = drive.find(name)
+    if parameter is not None and is_command(drive.facts.protocol, parameter):
+        return LeftAlone.COMMAND
     if parameter is not None and not is_setting(drive, name):
         return LeftAlone.MODE
     if parameter is not None and parameter.protected and not include_protected:
@@ -264,21 +291,6 @@ def _difference(wanted: str, found: str) -> str:
     only_here = [part for part in here if part not in there]
     return (f'{printable(" ".join(only_there)) or "a drive with less identity"}, the drive is '
             f'{" ".join(only_here) or "known by less"}')
-
-
-@dataclass(frozen=True, slots=True)
-class NotAsInFile:
-    """
-    A setting that is not as in the file in the end.
-
-    :param found: what the drive has; None: it could not be read.
-    :param reason: what its last write, or reading it, failed with; '' where nobody complained.
-    """
-
-    name: str
-    wanted: Value
-    found: Value | None
-    reason: str = ''
 
 
 class StepKind(Enum):
@@ -654,6 +666,7 @@ class Restorer:
                             self._reasons.get(change.name, 'the drive answers no more'))
                 for change in self._plan.changes if change.name not in self._result.written]
             return
+        self._result.wrong += self._plan.absent
         outcomes = self._drive.read(*names) if names else {}
         changed = {change.name for change in self._plan.changes}
         for name in names:

@@ -16,9 +16,11 @@ from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.client.drive import Drive
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.text import counted
+from drive_can_bridge.core.text import counted, printable
 
 SUFFIX = '.yaml'
+#: names of what a drive does not have that are shown
+NAMED_MAX = 5
 
 
 def define(parser: ArgumentParser) -> None:
@@ -103,9 +105,13 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
     outcomes = read_all(drive, names, args.clock)
     settings: list[tuple[Parameter, int]] = []
     missing: list[tuple[str, str]] = []
+    absent: list[str] = []
     useless: list[tuple[str, str]] = []
     for name, outcome in outcomes.items():
         parameter, raw = outcome.parameter, outcome.raw
+        if outcome.absent:
+            absent.append(name)
+            continue
         if parameter is None or raw is None:
             missing.append((name, outcome.reason))
             continue
@@ -117,8 +123,17 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
                                   f'{parameter.range_text}'))
     for name, reason in useless:
         complain(f'warning: {drive.name}: {name} is left out: {reason}')
-    for line in unread(drive, outcomes.values()):
+    for line in unread(drive, [each for each in outcomes.values() if not each.absent]):
         complain(line)
+    if absent:
+        named = ', '.join(absent[:NAMED_MAX]) + ', …' * (len(absent) > NAMED_MAX)
+        in_profile = counted(len(names), 'setting')
+        have_not = (f'{drive.name}: does not have {len(absent)} of the {in_profile} of '
+                    f'{printable(drive.facts.profile)} ({named})')
+        if 2 * len(absent) > len(names):
+            complain(f'{have_not}: is this its profile? No file was written')
+            return None
+        complain(f'{have_not}: left out')
     if missing and not args.partial:
         advice = ('' if not settings else '; --partial writes one without '
                   f'{"it" if len(missing) == 1 else "them"}')
@@ -132,7 +147,9 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
     head = head_of(drive.facts, time=made_at.strftime('%Y-%m-%dT%H:%M:%SZ'),
                    identity=drive.identity())
     return written(drive.facts, head, settings, remarks=[
-        f'left out: {name}: {reason}' for name, reason in left_out]), {
+        *(f'left out: {name}: {reason}' for name, reason in left_out),
+        *([f'left out, the drive does not have them: {", ".join(absent)}'] if absent else ())]), {
             'drive': drive.name, 'file': str(file), 'settings': len(settings),
             'identity': head.identity,
-            'left_out': [{'parameter': name, 'reason': reason} for name, reason in left_out]}
+            'left_out': [{'parameter': name, 'reason': reason} for name, reason in (
+                *left_out, *((name, outcomes[name].reason) for name in absent))]}

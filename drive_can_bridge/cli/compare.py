@@ -10,7 +10,8 @@ from pathlib import Path
 import re
 
 from drive_can_bridge.backup.document import (
-    Backup, in_order, is_setting, mode_bits, modes_of, raw_in_file, read_backup, settings_of)
+    Backup, in_order, is_command, is_setting, mode_bits, modes_of, raw_in_file, read_backup,
+    settings_of)
 from drive_can_bridge.cli.command import complain, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
     add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
@@ -210,13 +211,13 @@ def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives,
 
 def _drive(drive: Drive, files: Sequence[Backup], clock: Clock) -> Side:
     """
-    Read a drive.
+    Read a drive; what it does not have is on its side not there.
 
     :raises DriveCanError: something cannot be read: nobody knows whether it differs.
     """
     names = names_to_read(drive, *files)
     outcomes = read_all(drive, names, clock)
-    problems = unread(drive, outcomes.values())
+    problems = unread(drive, [each for each in outcomes.values() if not each.absent])
     if problems:
         raise DriveCanError('\n'.join(problems))
     return side_of_drive(drive, outcomes)
@@ -237,7 +238,8 @@ def _file_alone(backup: Backup, profile: Profile | None) -> Side:
     parameters = profile.parameters
     return side_of_file(
         backup, find=parameters.get,
-        counts=lambda name: parameters[name].readable and parameters[name].writable)
+        counts=lambda name: parameters[name].readable and parameters[name].writable
+        and not is_command(backup.head.protocol, parameters[name]))
 
 
 def _tell_profile(backup: Backup, drive: Drive) -> None:

@@ -101,7 +101,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
         return FAILED
     _show(args, backup, drive, plan)
     if args.dry_run or not plan.changes:
-        return 0
+        return FAILED if plan.absent and not args.dry_run else 0
     if drive.enabled() is Enabled.UNKNOWN:
         complain(f'{drive.name}: whether it is enabled is not known; it should stand still')
     count = counted(len(plan.changes), 'setting')
@@ -188,13 +188,19 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
                       'unit': change.parameter.unit, 'found': change.found,
                       'wanted': change.wanted,
                       'left_alone': change.left_alone.value if change.left_alone else None}
-                     for change in differing))
-    elif differing:
+                     for change in differing), *(
+            {'drive': drive.name, 'parameter': each.name, 'unit': _unit(drive, each.name),
+             'found': None, 'wanted': each.wanted, 'left_alone': 'absent'}
+            for each in plan.absent))
+    elif differing or plan.absent:
         print_table(_HEADINGS, [
             (change.name, value_text(change.found),
              _NONE if change.wanted is None else value_text(change.wanted),
              change.parameter.unit, change.note)
-            for change in differing], numbers=('drive', 'file'))
+            for change in differing] + [
+            (each.name, _NONE, value_text(each.wanted), _unit(drive, each.name),
+             'not there: the drive does not have it')
+            for each in plan.absent], numbers=('drive', 'file'))
     for name in backup.values:
         why = why_left_alone(drive, name, include_protected=True)
         if why is not None and not is_setting(drive, name):
@@ -246,10 +252,11 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         confirmed = [name for name in result.written if name not in wrong]
         complain(f'{drive.name}: confirmed: {_list(confirmed)}; not as in the file:')
         for each in result.wrong:
-            found = 'unknown' if each.found is None else _with_unit(plan, each.name, each.found)
+            found = ('not there' if each in plan.absent else 'unknown' if each.found is None
+                     else _with_unit(drive, each.name, each.found))
             reason = _reason(each, result)
             complain(f'  {each.name}: {found} instead of '
-                     f'{_with_unit(plan, each.name, each.wanted)}{reason and f": {reason}"}')
+                     f'{_with_unit(drive, each.name, each.wanted)}{reason and f": {reason}"}')
     elif result.trouble is not None:
         complain(f'{drive.name}: written before: {_list(result.written)}')
     if not result.complete:
@@ -280,9 +287,13 @@ def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wante
                 'wanted': wanted, 'reason': reason})
 
 
-def _with_unit(plan: RestorePlan, name: str, value: Value) -> str:
-    units = {change.name: change.parameter.unit for change in plan.changes}
-    return f'{value_text(value)} {units.get(name, "")}'.rstrip()
+def _with_unit(drive: Drive, name: str, value: Value) -> str:
+    return f'{value_text(value)} {_unit(drive, name)}'.rstrip()
+
+
+def _unit(drive: Drive, name: str) -> str:
+    parameter = drive.find(name)
+    return parameter.unit if parameter is not None else ''
 
 
 def _list(names: Sequence[str]) -> str:

@@ -84,6 +84,11 @@ class ReadOutcome:
         """It failed, and no frame of the drive came."""
         return self.kind is not None and self.kind.unheard
 
+    @property
+    def absent(self) -> bool:
+        """The drive says that it has no such parameter."""
+        return self.kind is FailureKind.ABSENT
+
 
 @dataclass(frozen=True, slots=True)
 class WriteOutcome:

@@ -24,13 +24,14 @@ class FailureKind(Enum):
     OFFLINE = 'the drive is not there, or takes no requests'
     NOT_SENT = 'the bus takes no frames'
     REFUSED = 'the drive refused, or has something else than was written'
+    ABSENT = 'the drive says that it has no such parameter'
     INVALID = 'the drive cannot be asked for that'
     UNAVAILABLE = 'the bridge does not serve it now, whatever the drive'
 
     @property
     def unheard(self) -> bool:
         """No frame of the drive came: it may have done it all the same, or not be there."""
-        return self not in (FailureKind.REFUSED, FailureKind.INVALID)
+        return self not in (FailureKind.REFUSED, FailureKind.ABSENT, FailureKind.INVALID)
 
     @property
     def of_bridge(self) -> bool:
@@ -64,6 +65,8 @@ class Written:
     note: str = ''
 
 
+#: refusals of CANopen that say that there is nothing: no such object, no such sub-index
+ABSENT_CODES = frozenset((0x06020000, 0x06090011))
 NOT_SENT = Failure(FailureKind.NOT_SENT, sentences.not_sent())
 
 Outcome = Union[Failure, ReadValue, Written]
@@ -79,7 +82,14 @@ _TEXTS: dict[str, FailureKind] = {
     sentences.bus_down(): FailureKind.UNAVAILABLE,
     sentences.bridge_inactive(): FailureKind.UNAVAILABLE,
     sentences.busy(): FailureKind.UNAVAILABLE,
+    **{sentences.refused_by_drive(code, f'{code:08X}h'): FailureKind.ABSENT
+       for code in ABSENT_CODES},
 }
+
+
+def refused(code: int, reason: Sentence) -> Failure:
+    """Return what became of a request that a CANopen node refused with an abort code."""
+    return Failure(FailureKind.ABSENT if code in ABSENT_CODES else FailureKind.REFUSED, reason)
 
 
 def is_answer(outcome: Outcome) -> bool:

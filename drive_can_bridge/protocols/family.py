@@ -248,6 +248,14 @@ class Family(ABC):
             is not a raw name of this family.
         """
 
+    def is_command(self, parameter: Parameter) -> bool:
+        """
+        Tell whether a parameter is a command whatever the mode of the drive, and no setting.
+
+        A setpoint of another mode moves the drive as soon as it is in that mode.
+        """
+        return False
+
     def supervision(self, drive: DriveConfiguration) -> Parameter | None:
         """
         Return what is not 0 in a drive that faults when telegrams end.

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
+from drive_can_bridge.core.requests import ABSENT_CODES
 from drive_can_bridge.protocols.canopen.network import check_node
 from drive_can_bridge.protocols.telegrams import Direction, TelegramType
 
@@ -31,7 +32,7 @@ WRITE_OF_READ_ONLY = 0x06010002
 NO_SUCH_OBJECT = 0x06020000
 NO_SUCH_SUBINDEX = 0x06090011
 #: the refusals that say that there is nothing to be read
-ABSENT = frozenset((NO_SUCH_OBJECT, NO_SUCH_SUBINDEX))
+ABSENT = ABSENT_CODES
 VALUE_OUT_OF_RANGE = 0x06090030
 DEVICE_STATE = 0x08000022
 

@@ -52,7 +52,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.requests import RetryPolicy
+from drive_can_bridge.core.requests import Failure, refused, RetryPolicy
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
@@ -131,6 +131,11 @@ class Refused(NamedTuple):
     def text(self) -> Sentence:
         """The refusal in words."""
         return sentences.refused_by_drive(self.code, pkw.describe(self.code))
+
+    @property
+    def failure(self) -> Failure:
+        """What became of the request."""
+        return refused(self.code, self.text)
 
 
 class Silence(NamedTuple):

@@ -9,8 +9,7 @@ from collections.abc import Generator, Hashable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.requests import (
-    Failure, FailureKind, NOT_SENT, Outcome, Outcomes, Written)
+from drive_can_bridge.core.requests import NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Access, Found, Item
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
@@ -35,7 +34,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
         if isinstance(reply, Answered):
             return reply.words[:span.count]
         return (self.retry.unanswered() if isinstance(reply, Silence) else
-                Failure(FailureKind.REFUSED, reply.text))
+                reply.failure)
 
     def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
         return self._write(items, blind=False)
@@ -70,7 +69,7 @@ class RegisterAccess(Access[Span, Step, Reply]):
             if isinstance(reply, Answered):
                 return Written()
             if isinstance(reply, Refused):
-                return Failure(FailureKind.REFUSED, reply.text)
+                return reply.failure
             if reply.refused:
                 return NOT_SENT
             if reply.sent:

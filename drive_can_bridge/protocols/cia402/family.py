@@ -29,6 +29,8 @@ JITTERS_BELOW = 0.005
 #: s: longest event timer, and longest time of a heartbeat consumer (16 bits of ms)
 TIMER_MAX = 65.535
 _SETPOINTS = {(mode.index, mode.subindex) for mode in MODES.values()}
+#: control word, mode, setpoints of all modes, offsets of setpoints (60B0h to 60B2h)
+_COMMANDS = {CONTROL_WORD, MODE, 0x60B0, 0x60B1, 0x60B2, *(index for index, _ in _SETPOINTS)}
 _LISTS = (('request_pdos', 'cyclic_request', CONTROL_PARAMETER),
           ('response_pdos', 'cyclic_response', STATUS_PARAMETER))
 _HEARTBEAT = worst_bits(1, extended=False)
@@ -167,6 +169,9 @@ class Cia402(Family):
         """Return the load of each drive; SYNC and the bridge's heartbeat are there once."""
         share = self._shared_load(drives) / len(drives) if drives else 0.0
         return [self._own_load(drive) + share for drive in drives]
+
+    def is_command(self, parameter: Parameter) -> bool:
+        return parameter.index in _COMMANDS
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
         """Resolve ``x<index>.<sub-index>``; the drive tells the width."""

@@ -9,7 +9,7 @@ takes segments; an object that is longer, which a raw name may find, is refused 
 
 from collections.abc import Generator, Sequence
 
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import requests, sentences
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import (
@@ -43,7 +43,7 @@ def cells(parameter: Parameter) -> Cells:
 
 def refused(code: int) -> Failure:
     """Say that a drive refused a transfer."""
-    return Failure(FailureKind.REFUSED, sentences.refused_by_drive(code, sdo.describe(code)))
+    return requests.refused(code, sentences.refused_by_drive(code, sdo.describe(code)))
 
 
 class SdoAccess(Access[Parameter, Ask, Reply]):
