@@ -293,15 +293,51 @@ def _open_text(path: Path, packed: bool) -> TextIO:
 def _candump_records(stream: TextIO, complain: Complain) -> Iterator[Record]:
     parse = parse_line
     number = 0
-    for line in stream:
+    record: Record | None = None
+    for line in _from_differences(iter(stream), complain):
         number += 1
         try:
             record = parse(line)
         except ValueError as error:
-            complain(f'line {number}: {error}')
+            # `candump -e` explains an error frame on the lines behind it
+            if record is None or record.kind is not RecordKind.ERROR or line[0] != '\t':
+                complain(f'line {number}: {error}')
             continue
         if record is not None:
             yield record
+
+
+#: the time of a line of ``candump -t d`` or ``-t z``
+_SHORT_TIME = re.compile(r' \((\d{3}\.\d{6})\) ')
+#: lines by which times since the start (they rise) are told from those since the line before
+_LOOKED_AT = 32
+#: of so many steps one falls or stays, at least, where times are differences
+_FALLS = 8
+
+
+def _from_differences(lines: Iterator[str], complain: Complain) -> Iterator[str]:
+    """Give times from the beginning, where ``candump -t d`` wrote those since the last line."""
+    head = list(itertools.islice(lines, 1))
+    if not head or _SHORT_TIME.match(head[0]) is None:
+        return itertools.chain(head, lines)
+    head += itertools.islice(lines, _LOOKED_AT)
+    times = [float(found[1]) for found in map(_SHORT_TIME.match, head) if found is not None]
+    falls = sum(later <= earlier for earlier, later in itertools.pairwise(times))
+    lines = itertools.chain(head, lines)
+    if not falls or falls * _FALLS < len(times) - 1:
+        return lines
+    complain('times are those since the line before (candump -t d): added up')
+    return _added_up(lines)
+
+
+def _added_up(lines: Iterator[str]) -> Iterator[str]:
+    elapsed = 0.0
+    for line in lines:
+        timed = _SHORT_TIME.match(line)
+        if timed is not None:
+            elapsed += float(timed[1])
+            line = f' ({elapsed:.6f}) {line[timed.end():]}'
+        yield line
 
 
 class _Lines:
@@ -352,29 +388,60 @@ class _Heard(logging.Handler):
 
 #: of a header by Vector: each time is told from the line before; and a line with its time
 _FROM_THE_LAST = re.compile(r'\s*base\s+(?:hex|dec)\s+timestamps\s+relative', re.IGNORECASE)
+_DECIMAL = re.compile(r'\s*base\s+dec', re.IGNORECASE)
 _TIMED = re.compile(r'\s*([0-9]+\.[0-9]+)(?=\s)')
 
 
 def _from_vector(stream: Iterable[str]) -> Iterator[str]:
-    """Give python-can's reader what it needs: times from the beginning, an end of the header."""
+    """
+    Give python-can's reader what it needs: times from the beginning, an end of the header.
+
+    It takes all ``CANFD`` lines for CAN FD, and requests to send (``TxRq``) for frames.
+    """
     lines = iter(stream)
-    relative, elapsed = False, 0.0
+    relative, elapsed, base = False, 0.0, 16
     for line in lines:
         relative = relative or _FROM_THE_LAST.match(line) is not None
+        base = 10 if _DECIMAL.match(line) else base
         timed = _TIMED.match(line)
         if timed is not None:
             yield 'no internal events logged\n'     # takes the next line for that, whatever it is
             lines = itertools.chain((line,), lines)
             break
         yield line
-    if not relative:
-        yield from lines
     for line in lines:
-        timed = _TIMED.match(line)
-        if timed is not None:
+        if relative and (timed := _TIMED.match(line)) is not None:
             elapsed += float(timed[1])
             line = f'{elapsed:.6f}{line[timed.end():]}'
-        yield line
+        if 'CANFD' in line:
+            line = _classical(line, base)
+        if ' TxRq ' not in line:
+            yield line
+
+
+#: bits of the flags of a ``CANFD`` line: remote frame, and EDL, without which it is classical
+_REMOTE_FLAG, _EDL = 0x10, 0x1000
+
+
+def _classical(line: str, base: int) -> str:
+    """Return a ``CANFD`` line of a classical frame as a line of such frames."""
+    words = line.split()
+    if len(words) < 6 or words[4].lower() == 'errorframe':
+        return line
+    # time CANFD channel direction identifier [name] BRS ESI DLC length data… duration bits flags
+    place = 5 if words[5].isdigit() else 6
+    try:
+        size = int(words[place + 3])
+        after = place + 4 + size
+        flags = int(words[after + 2], 16)
+        if flags & _EDL or int(words[place + 2], base) > 15:
+            return line
+    except (IndexError, ValueError):
+        return line
+    time, _, channel, direction, identifier = words[:5]
+    content = f'r {size}' if flags & _REMOTE_FLAG else ' '.join(
+        ('d', f'{size}', *words[place + 4:after]))
+    return f'{time} {channel} {identifier} {direction} {content}\n'
 
 
 def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
@@ -520,6 +587,9 @@ Parsed = TypeVar('Parsed')
 _ERROR_FLAG = 0x20000000
 _CLASSICAL_MAX = 8
 _LENGTH_MAX = 64
+#: DLCs of classical frames that mean eight bytes, too, as ``candump -8`` writes them
+_LONG_DLC = '9ABCDEF'
+_LONG_LENGTHS = tuple(f'{{{digit}}}' for digit in _LONG_DLC)
 #: the highest identifiers as they are written; lower ones come before them in the alphabet, too
 _EXTENDED_DIGITS, _STANDARD_DIGITS = '1FFFFFFF', '7FF'
 #: s since 1970: the end of the year 9999. Beyond, a float soon tells no two frames apart
@@ -585,6 +655,8 @@ def _logged(words: list[str], identifier: str, data: str) -> Record:
     extended = len(identifier) == 8
     sent = _DIRECTIONS.get(words[3]) if len(words) == 4 else None
     kind = DATA
+    if data[-2:-1] == '_' and data[-1] in _LONG_DLC and len(data) == 2 * _CLASSICAL_MAX + 2:
+        data = data[:-2]        # `candump -8`: eight bytes whose DLC is higher
     if data[:1] in ('#', 'R', 'r'):
         kind = RecordKind.FD if data[0] == '#' else RecordKind.REMOTE
         data = data[2:] if data[0] == '#' else ''
@@ -597,7 +669,8 @@ def _logged(words: list[str], identifier: str, data: str) -> Record:
 def _shown(words: list[str]) -> Record:
     """Read a line of the screen."""
     place = next((index for index, word in enumerate(words)
-                  if word[:1] == '[' and word[-1:] == ']' and word[1:-1].isdecimal()), None)
+                  if word[:1] == '[' and word[-1:] == ']' and word[1:-1].isdecimal()
+                  or word in _LONG_LENGTHS), None)
     if place is None or place < 2:
         raise ValueError('neither a line of a candump log nor of its screen')
     before, length, after = words[:place], words[place], words[place + 1:]
@@ -612,7 +685,7 @@ def _shown(words: list[str]) -> Record:
     number, extended = _number(identifier), len(identifier) == 8
     # "[8]" is a classical frame, "[08]" one of CAN FD
     kind = RecordKind.FD if len(length) == 4 else DATA
-    size = int(length[1:-1])
+    size = _CLASSICAL_MAX if length in _LONG_LENGTHS else int(length[1:-1])
     if after[:1] == ['remote']:
         kind, size = RecordKind.REMOTE, 0
     elif extended and number & _ERROR_FLAG:

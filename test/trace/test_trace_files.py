@@ -51,6 +51,12 @@ DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
      Record(datetime(2026, 11, 21, 23, 4, 38, 250_000).timestamp(), 'can0', 0x123, b'', False)),
     ('  can0  123   [4]  remote request', Record(0.0, 'can0', 0x123, b'', False,
                                                  RecordKind.REMOTE)),
+    # candump -8
+    ('(1.5) can0 5A1#0011223344556677_9 R', Record(1.5, 'can0', 0x5A1, bytes.fromhex(
+        '0011223344556677'), False, DATA, False)),
+    ('  can0  5A1   {F}  00 11 22 33 44 55 66 77',
+     Record(0.0, 'can0', 0x5A1, bytes.fromhex('0011223344556677'), False)),
+    ('(1.5) can0 5A1#R8_B', Record(1.5, 'can0', 0x5A1, b'', False, RecordKind.REMOTE)),
     ('  can0  20000040   [8]  00 00 00 00 00 00 00 00   ERRORFRAME',
      Record(0.0, 'can0', 0x40, bytes(8), True, ERROR)),
 ])
@@ -79,7 +85,10 @@ def test_nothing(line: str) -> None:
     '(253402300800) can0 123#00', ' (1e30)  can0  RX - -  123   [1]  41',
     '(1.0) can0 123456789#00', '(1.0) can0 123', 'can0 123 [2] 00',
     'can0 123 [x] 00', '(1.0) can0 0-1#00', '(2026-11-31 23:04:38.250000)  can0  123   [0]',
-    '(2026-11-21 23:04:38.250000)  123  [0]', '(2026-11-21  can0  123   [0]',
+    '(2026-11-21 23:04:38.250000)  123  [0]',
+    '(1.0) can0 123#0102_C', 'can0 123 {C} 00',
+    '(1.0) can0 123#0102030405060708_8', 'can0 123 {8} 01 02 03 04 05 06 07 08',
+    '(2026-11-21  can0  123   [0]',
 ])
 def test_what_is_no_line_of_candump(line: str) -> None:
     with pytest.raises(ValueError):
@@ -252,6 +261,72 @@ def test_the_first_frame_of_vector_may_follow_the_base(tmp_path: Path) -> None:
     path.write_text('base dec  timestamps absolute\n   0.5 1  2033  Rx   d 2 10 20\n')
     record, = read_records(path, print)
     assert (record.identifier, record.data) == (0x7F1, bytes([10, 20]))
+
+
+def test_the_details_of_candump_behind_an_error_frame_are_no_damage(tmp_path: Path) -> None:
+    """As candump -e of can-utils 2023.03 writes them."""
+    path = tmp_path / 'screen.txt'
+    path.write_text(' (0.5)  can0  20000008   [8]  00 00 04 19 00 00 00 00   ERRORFRAME\n'
+                    '\tprotocol-violation{{bit-stuffing-error}{acknowledge-slot}}\n'
+                    '\tbus-error\n'
+                    ' (0.6)  can0  123   [1]  05\n'
+                    '\tbus-error\n')
+    complaints: list[str] = []
+    assert [each.kind for each in read_records(path, complaints.append)] == [ERROR, DATA]
+    assert complaints == ['line 5: neither a line of a candump log nor of its screen']
+
+
+def screen(*times: float) -> str:
+    return ''.join(f' ({time:010.6f})  vcan0  7F1   [1]  0A\n' for time in times)
+
+
+@pytest.mark.parametrize(('written', 'meant', 'told'), [
+    ([0.0, 0.25, 0.25, 0.001, 0.25], [0.0, 0.25, 0.5, 0.501, 0.751], 1),
+    ([0.0] + 100 * [0.5], [0.5 * number for number in range(101)], 1),
+    # -t z: of two buses one entry may come a little late
+    ([0.0, 0.25, 0.5, 0.75], [0.0, 0.25, 0.5, 0.75], 0),
+    ([0.01 * number for number in range(20)] + [0.189], [0.01 * number for number in range(20)]
+     + [0.189], 0),
+    ([0.0], [0.0], 0),
+])
+def test_times_of_candump_since_the_line_before(
+        written: list[float], meant: list[float], told: int, tmp_path: Path) -> None:
+    path = tmp_path / 'screen.txt'
+    path.write_text(screen(*written))
+    complaints: list[str] = []
+    assert [each.time for each in read_records(path, complaints.append)] == pytest.approx(meant)
+    assert complaints == told * [
+        'times are those since the line before (candump -t d): added up']
+
+
+def vector(path: Path, *lines: str, base: str = 'hex') -> Path:
+    path.write_text(f'date Tue May 7 08:00:00.000 am 2024\nbase {base}  timestamps absolute\n'
+                    'no internal events logged\n' + ''.join(f'{line}\n' for line in lines))
+    return path
+
+
+@pytest.mark.parametrize(('line', 'record'), [
+    ('   0.5 CANFD   1 Rx   1F3x                 0 0 2  2 AA BB   9000  80   200000 0 0 0 0 0',
+     (0x1F3, b'\xAA\xBB', True, DATA)),
+    ('   0.5 CANFD   1 Tx    1F3   Some_Name     0 0 0  0   9000  80   200040 0 0 0 0 0',
+     (0x1F3, b'', False, DATA)),
+    ('   0.5 CANFD   1 Rx    1F3                 0 0 4  0   9000  80   200010 0 0 0 0 0',
+     (0x1F3, b'', False, RecordKind.REMOTE)),
+    ('   0.5 CANFD   1 Rx    1F3                 1 0 9 12 0 1 2 3 4 5 6 7 8 9 A B  9000  80   '
+     '303000 0 0 0 0 0', (0x1F3, bytes(range(12)), False, RecordKind.FD)),
+])
+def test_canfd_lines_of_vector(line: str, record: tuple[object, ...], tmp_path: Path) -> None:
+    """Without EDL in the flags (CANoe's .asc), a frame is a classical one."""
+    complaints: list[str] = []
+    found, = read_records(vector(tmp_path / 'trace.asc', line), complaints.append)
+    assert (found.identifier, found.data, found.extended, found.kind) == record
+    assert complaints == []
+
+
+def test_what_is_to_be_sent_is_no_frame_yet(tmp_path: Path) -> None:
+    path = vector(tmp_path / 'trace.asc',
+                  '   0.5 1  7F1             TxRq d 1 05', '   0.6 1  7F1             Tx   d 1 05')
+    assert [(each.time, each.sent) for each in read_records(path, lambda _: None)] == [(0.6, True)]
 
 
 def test_a_byte_order_mark_costs_nothing(tmp_path: Path) -> None:
