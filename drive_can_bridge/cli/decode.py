@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, closing, ExitStack, nullcontext
 from itertools import chain
 import json
 from pathlib import Path
+import re
 import sys
 
 from drive_can_bridge.cli.command import add_params_file, add_seconds, complain, FAILED, WrongUsage
@@ -23,7 +24,9 @@ from drive_can_bridge.trace.files import (
 from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 
-#: complaints about a file that are shown one by one
+#: where in a file something is that is complained about
+_PLACE = re.compile(r'(?:line|entry) \d+: ')
+#: different complaints about a file that are shown
 _COMPLAINTS_MAX = 5
 #: s that a frame may take from the bus to its adapter's queue before it counts as missing
 _DELIVERY_TIME = 0.05
@@ -220,21 +223,25 @@ def _summarise(tracer: Tracer, wanted: Callable[[str], bool], *, as_json: bool) 
 
 
 class _Complaints:
-    """The first few lines about a damaged file, and the number of the others."""
+    """The first few different lines about a damaged file, and the number of the others."""
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._count = 0
+        self._shown: set[str] = set()
+        self._more = 0
 
     def __call__(self, text: str) -> None:
-        self._count += 1
-        if self._count <= _COMPLAINTS_MAX:
-            complain(f'{self._name}: {printable(text)}')
+        what = _PLACE.sub('', text)
+        if what in self._shown or len(self._shown) == _COMPLAINTS_MAX:
+            self._more += 1
+            return
+        self._shown.add(what)
+        complain(f'{self._name}: {printable(text)}')
 
     def conclude(self) -> None:
         """Tell how many more there were."""
-        if self._count > _COMPLAINTS_MAX:
-            complain(f'{self._name}: {self._count - _COMPLAINTS_MAX} more like that')
+        if self._more:
+            complain(f'{self._name}: {self._more} more like that')
 
 
 def _only(text: str) -> set[Only]:

@@ -17,6 +17,7 @@ its own, and does not know the screen.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from datetime import datetime
 from errno import EIO
 import gzip
@@ -25,8 +26,9 @@ import itertools
 import logging
 from pathlib import Path
 import re
+import sqlite3
 import sys
-from typing import Any, TextIO, TypeVar
+from typing import Any, NamedTuple, TextIO, TypeVar
 import zlib
 
 import can
@@ -224,6 +226,30 @@ LOSSES = {
 ONE_BUS = ('.csv', '.db')
 WRITABLE = tuple(sorted(('.log', *_WRITERS)))
 READABLE = tuple(sorted((*_CANDUMP, *_TEXT_READERS, *_BINARY_READERS)))
+
+
+class _Head(NamedTuple):
+    """How a format begins, and what a file is called that begins otherwise."""
+
+    pattern: re.Pattern[bytes]
+    otherwise: str
+
+
+#: bytes that a pattern of a binary format looks at, at most
+_MAGIC = 16
+_HEADS = {
+    '.asc': _Head(re.compile(rb'\s*(?:date|base|begin|no|internal|//|\d+\.\d+\s)', re.IGNORECASE),
+                  'this is no .asc trace of Vector: it begins with neither "date" nor "base"'),
+    '.csv': _Head(re.compile(rb'timestamp,arbitration_id,'),
+                  'this is no .csv trace of python-can: its first line is not '
+                  '"timestamp,arbitration_id,…"'),
+    '.trc': _Head(re.compile(rb'\s*(?:;|\d+\)?\s)'),
+                  'this is no .trc trace of PEAK: its first line is neither a comment (;) nor a '
+                  'numbered entry'),
+    '.blf': _Head(re.compile(b'LOGG'), 'this is no .blf trace of Vector'),
+    '.db': _Head(re.compile(b'SQLite format 3'), 'this is no .db trace of python-can'),
+    '.mf4': _Head(re.compile(b'MDF '), 'this is no .mf4 trace (ASAM MDF 4)'),
+}
 #: lines before the first frame that are kept, to go on reading behind a damaged line
 _HEADER_MAX = 200
 
@@ -253,17 +279,36 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
         return
     suffix, packed = check_readable(path)
     if suffix in _BINARY_READERS and not packed:
-        yield from _binary_records(path, complain)
+        if _begins_as(_HEADS[suffix], path, complain):
+            read = _database_records if suffix == '.db' else _binary_records
+            yield from read(path, complain)
         return
     with _open_text(path, packed) as stream:
         try:
             if suffix in _CANDUMP:
                 yield from _candump_records(stream, complain)
             else:
-                lines = _from_vector(stream) if suffix == '.asc' else stream
-                yield from _text_records(_TEXT_READERS[suffix], lines, complain)
+                head = _HEADS[suffix]
+                begin = list(itertools.islice(stream, 1))
+                while begin and not begin[-1].strip() and len(begin) < _HEADER_MAX:
+                    begin += itertools.islice(stream, 1)
+                if not begin or not begin[-1].strip():
+                    return
+                if not head.pattern.match(begin[-1].encode()):
+                    complain(head.otherwise)
+                    return
+                yield from _text_records(suffix, itertools.chain(begin, stream), complain)
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
             complain(f'the rest cannot be unpacked: {error}')
+
+
+def _begins_as(head: _Head, path: Path, complain: Complain) -> bool:
+    """Tell whether a file begins as those of its suffix; an empty one does not."""
+    with path.open('rb') as file:
+        begin = file.read(_MAGIC)
+    if begin and not head.pattern.match(begin):
+        complain(head.otherwise)
+    return head.pattern.match(begin) is not None
 
 
 def check_readable(path: Path) -> tuple[str, bool]:
@@ -375,15 +420,38 @@ class _Lines:
         """Leave the file open: its opener closes it."""
 
 
+class _Numbered:
+    """
+    Lines whose number is known.
+
+    :ivar lines: them; to count costs no step of Python for a line.
+    """
+
+    def __init__(self, lines: Iterable[str]) -> None:
+        self._count = itertools.count(1)
+        self._asked = 0     # so often the count went on without a line
+        self.lines = itertools.compress(lines, self._count)
+
+    def number(self) -> int:
+        """Return how many were taken."""
+        self._asked += 1
+        return next(self._count) - self._asked
+
+
 class _Heard(logging.Handler):
-    """Hears what the readers of python-can only log."""
+    """
+    Hears what the readers of python-can only log.
+
+    :param complain: takes it, without the name of the reader.
+    """
 
     def __init__(self, complain: Complain) -> None:
         super().__init__(logging.WARNING)
         self._complain = complain
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._complain(record.getMessage())
+        text = record.getMessage()
+        self._complain('' if 'Failed to parse' in text else text.partition('Reader: ')[2] or text)
 
 
 #: of a header by Vector: each time is told from the line before; and a line with its time
@@ -444,7 +512,7 @@ def _classical(line: str, base: int) -> str:
     return f'{time} {channel} {identifier} {direction} {content}\n'
 
 
-def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
+def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
     """
     Read by a reader of python-can, which ends at the first line that it does not understand.
 
@@ -452,8 +520,14 @@ def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Ite
     """
     header: list[str] = []
     known = False
+    reader = _TEXT_READERS[suffix]
+    numbered = _Numbered(stream)
+    stream = _from_vector(numbered.lines) if suffix == '.asc' else numbered.lines
+
+    def wrong(text: str) -> None:
+        complain(f'line {numbered.number()}: {text or f"no entry of a {suffix} trace"}')
     logger = logging.getLogger('can')
-    heard = _Heard(complain)
+    heard = _Heard(wrong)
     logger.addHandler(heard)
     logger.propagate = False    # told once
     try:
@@ -463,16 +537,20 @@ def _text_records(reader: Any, stream: Iterable[str], complain: Complain) -> Ite
                 for message in reader(lines):
                     if not known:
                         header, known = lines.taken[:-1], True
-                    record = _record(message)
+                    try:
+                        record = _record(message)
+                    except ValueError as error:
+                        wrong(str(error))
+                        continue
                     if reader is can.TRCReader and isinstance(record.channel, int):
                         # counts buses from 1, also where it names none
                         record = record._replace(channel=record.channel - 1)
                     yield record
                 return
-            except Exception as error:  # noqa: BLE001  readers raise whatever a line makes them
+            except Exception:  # noqa: BLE001  readers raise whatever a line makes them
                 if lines.failure is not None:
                     raise lines.failure from None
-                complain(f'{type(error).__name__}: {error}')
+                wrong('')
                 if lines.exhausted:
                     return
                 if not known:
@@ -486,18 +564,53 @@ def _binary_records(path: Path, complain: Complain) -> Iterator[Record]:
     """Read a binary format: behind something damaged there is nothing to hold on to."""
     try:
         with can.LogReader(str(path)) as reader:
-            for message in reader:
-                yield _record(message)
+            for number, message in enumerate(reader, 1):
+                try:
+                    record = _record(message)
+                except ValueError as error:
+                    complain(f'entry {number}: {error}')
+                    continue
+                yield record
     except NotImplementedError:     # of .mf4 only
         raise DriveCanError(
             f'{path}: .mf4 needs the Python module asammdf (pip install asammdf)') from None
-    except Exception as error:  # noqa: BLE001  readers raise whatever a file makes them
-        complain(f'the rest cannot be read: {type(error).__name__}: {error}')
+    except Exception:  # noqa: BLE001  readers raise whatever a file makes them
+        complain('the rest cannot be read: it is damaged, or cut')
+
+
+def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
+    """Read what python-can's writer has put into a database."""
+    with closing(sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro', uri=True)) as database:
+        try:
+            rows = database.execute('SELECT ts, arbitration_id, extended, remote, error, data '
+                                    'FROM messages')
+            for number, (time, identifier, extended, remote, error, data) in enumerate(rows, 1):
+                try:
+                    kind = (RecordKind.ERROR if error else RecordKind.REMOTE if remote
+                            else _kind_by_length(data or b''))
+                    record = checked(Record(float(time), '', int(identifier), bytes(data or b''),
+                                            bool(extended), kind))
+                except TypeError:       # a column is empty, or of another type
+                    complain(f'entry {number}: no entry of a .db trace')
+                except ValueError as failure:
+                    complain(f'entry {number}: {failure}')
+                else:
+                    yield record
+        except sqlite3.Error as failure:
+            complain(f'the rest cannot be read: {failure}')
+
+
+def _kind_by_length(data: bytes) -> RecordKind:
+    """Return what must have been written by a format that does not keep it."""
+    return RecordKind.FD if len(data) in _FD_LENGTHS else DATA
 
 
 def _record(message: can.Message) -> Record:
     channel = message.channel
-    return checked(record_of(message, channel if isinstance(channel, (str, int)) else ''))
+    record = record_of(message, channel if isinstance(channel, (str, int)) else '')
+    if len(record.data) > _CLASSICAL_MAX and record.kind is DATA:
+        record = record._replace(kind=_kind_by_length(record.data))
+    return checked(record)
 
 
 # -- writing --------------------------------------------------------------------------------------
@@ -587,6 +700,8 @@ Parsed = TypeVar('Parsed')
 _ERROR_FLAG = 0x20000000
 _CLASSICAL_MAX = 8
 _LENGTH_MAX = 64
+#: bytes of a frame that no classical one has
+_FD_LENGTHS = (12, 16, 20, 24, 32, 48, 64)
 #: DLCs of classical frames that mean eight bytes, too, as ``candump -8`` writes them
 _LONG_DLC = '9ABCDEF'
 _LONG_LENGTHS = tuple(f'{{{digit}}}' for digit in _LONG_DLC)

@@ -127,7 +127,8 @@ def test_a_format_whose_module_is_not_there(file: Path, trace: Path,
                                              monkeypatch: pytest.MonkeyPatch,
                                              capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr('can.io.mf4.asammdf', None)
-    wrong = trace.rename(trace.with_suffix('.mf4'))
+    wrong = trace.with_suffix('.mf4')
+    wrong.write_bytes(b'MDF     4.10    ')
     assert drive_can('decode', wrong, '--params-file', file) == 1
     assert capsys.readouterr() == (
         '', f'drive_can decode: {wrong}: .mf4 needs the Python module asammdf '

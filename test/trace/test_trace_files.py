@@ -2,14 +2,17 @@
 """Reading and writing traces: candump's texts, python-can's formats, what is damaged."""
 
 from collections.abc import Callable
+from contextlib import closing
 from datetime import datetime
 from errno import EIO, ENOSPC
 import gzip
 import io
 from pathlib import Path
+import sqlite3
 import subprocess
 import sys
 
+import can
 from hypothesis import given, strategies as st
 import pytest
 
@@ -327,6 +330,80 @@ def test_what_is_to_be_sent_is_no_frame_yet(tmp_path: Path) -> None:
     path = vector(tmp_path / 'trace.asc',
                   '   0.5 1  7F1             TxRq d 1 05', '   0.6 1  7F1             Tx   d 1 05')
     assert [(each.time, each.sent) for each in read_records(path, lambda _: None)] == [(0.6, True)]
+
+
+@pytest.mark.parametrize(('name', 'content', 'told'), [
+    ('a.trc', 'Time;ID;Data\n0.5;1F3;05\n', 'of PEAK: its first line is neither a comment'),
+    ('a.trc', '\n\nsome text\n', 'of PEAK: its first line is neither a comment'),
+    ('a.asc', '<xml/>\n', 'of Vector: it begins with neither "date" nor "base"'),
+    ('a.csv', 'Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n166064000,0000021A,false,Rx,0,1,FE,\n',
+     'of python-can: its first line is not "timestamp,arbitration_id,…"'),
+    ('a.blf', 'a text', 'of Vector'), ('a.db', 'a text', 'of python-can'),
+    ('a.mf4', 'a text', '(ASAM MDF 4)')])
+def test_a_file_of_another_kind_is_refused_in_words(
+        name: str, content: str, told: str, tmp_path: Path) -> None:
+    """One of them is SavvyCAN's (GVRET .csv)."""
+    (tmp_path / name).write_text(content)
+    complaints: list[str] = []
+    assert list(read_records(tmp_path / name, complaints.append)) == []
+    suffix = Path(name).suffix
+    assert [each.startswith(f'this is no {suffix} trace {told}') for each in complaints] == [True]
+
+
+@pytest.mark.parametrize('suffix', ['.asc', '.blf', '.csv', '.db', '.mf4', '.trc', '.log'])
+def test_an_empty_file_has_no_frame(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f'trace{suffix}'
+    path.touch()
+    complaints: list[str] = []
+    assert list(read_records(path, complaints.append)) == []
+    assert complaints == []
+
+
+def test_what_is_wrong_in_a_text_has_its_line(tmp_path: Path) -> None:
+    path = vector(tmp_path / 'trace.asc', '   0.5 1  7F1             Rx   d 1 05',
+                  '   0.6 1  7F1             Rx   d 1 xy',
+                  '   0.7 1  7F1             Rx   d 1 06',
+                  '   0.8 1  8F1             Rx   d 1 06', '   0.9 1  7F1             Rx   d 1 07')
+    complaints: list[str] = []
+    assert [each.data[0] for each in read_records(path, complaints.append)] == [5, 6, 7]
+    assert complaints == ['line 5: no entry of a .asc trace', 'line 7: identifier 8F1h']
+    path = tmp_path / 'trace.trc'
+    path.write_text(';$FILEVERSION=1.1\n;$STARTTIME=45000.5\n;\n'
+                    '     1)         1.0  Rx         01F3  1  05\n'
+                    '     2)         2.0  Rx\n'
+                    '     3)         3.0  Rx         01F3  1  zz\n'
+                    '     4)         4.0  Rx         01F3  1  06\n')
+    complaints.clear()
+    assert [each.data[0] for each in read_records(path, complaints.append)] == [5, 6]
+    assert complaints == ['line 5: no entry of a .trc trace', 'line 6: no entry of a .trc trace']
+
+
+def test_an_impossible_entry_does_not_end_a_database(tmp_path: Path) -> None:
+    """Twelve bytes are of CAN FD, which python-can 4.6 does not write into a database."""
+    path = tmp_path / 'trace.db'
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute('CREATE TABLE messages (ts REAL, arbitration_id INTEGER, extended '
+                         'INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB)')
+        database.executemany('INSERT INTO messages VALUES (?, ?, ?, 0, 0, 0, ?)', [
+            (0.5, 0x1F3, 0, b'\5'), (0.6, 0x1F3, 0, bytes(12)), (0.7, 0x9F3, 0, b''),
+            (0.8, 0x1F3, 0, bytes(9)), (None, 0x1F3, 0, b''), (0.9, 0x9F3, 1, None)])
+    complaints: list[str] = []
+    assert [(each.identifier, len(each.data), each.extended, each.kind)
+            for each in read_records(path, complaints.append)] == [
+        (0x1F3, 1, False, DATA), (0x1F3, 12, False, RecordKind.FD), (0x9F3, 0, True, DATA)]
+    assert complaints[:2] == ['entry 3: identifier 9F3h', 'entry 4: 9 data bytes']
+    assert len(complaints) == 3 and complaints[2].startswith('entry 5: ')
+
+
+def test_an_impossible_entry_does_not_end_a_binary_file(tmp_path: Path) -> None:
+    path = tmp_path / 'trace.blf'
+    writer = can.BLFWriter(path)
+    for identifier in (0x1F3, 0x9F3, 0x1F4):
+        writer.on_message_received(can.Message(arbitration_id=identifier, is_extended_id=False))
+    writer.stop()
+    complaints: list[str] = []
+    assert [each.identifier for each in read_records(path, complaints.append)] == [0x1F3, 0x1F4]
+    assert complaints == ['entry 2: identifier 9F3h']
 
 
 def test_a_byte_order_mark_costs_nothing(tmp_path: Path) -> None:
