@@ -88,9 +88,10 @@ setup(
         # pictures of drive_can decode --plot; rosdep brings it
         'plot': ['matplotlib'],
         'test': [
-            # No rosdep keys for these two: the tests run without them, only fewer, or slower.
+            # No rosdep keys for some of them: the tests run without them, only fewer, or slower.
             'argcomplete',
             'canopen>=2.3',
+            'durand==0.5.0',
             'hypothesis',
             'matplotlib',
             'mypy',

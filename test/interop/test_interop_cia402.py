@@ -13,27 +13,25 @@ import os
 from pathlib import Path
 from typing import Any
 
-from builders import drive, read, write
+from builders import read, write
 import can
-from interop_bridge import Bridge, DEADLINE, dictionary_of, objectdictionary
+from interop_bridge import DEADLINE, dictionary_of, objectdictionary
+from interop_servo import (
+    bridge_on, bus_of, command, names, NODE, PERIOD, servo_configuration,
+)
 import pytest
 from waiting import clock, wait_for
 from world import World
 
-from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.simulation import PlayedDrive, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 
 canopen = pytest.importorskip('canopen')
 p402 = pytest.importorskip('canopen.profiles.p402')
 
-NODE = 5
-PERIOD = 0.02
-SERVO = read_profile(profiles_directory() / 'cia402_servo.yaml').profile
 _U8, _I8, _U16, _I16, _U32, _I32 = (
     objectdictionary.UNSIGNED8, objectdictionary.INTEGER8, objectdictionary.UNSIGNED16,
     objectdictionary.INTEGER16, objectdictionary.UNSIGNED32, objectdictionary.INTEGER32)
@@ -62,25 +60,14 @@ def dictionary() -> Any:
     return dictionary_of(VARIABLES, records)
 
 
-def bus_of(channel: str) -> BusConfiguration:
-    return BusConfiguration('main', 'virtual', channel, bitrate=1_000_000, reconnect_period=0.05)
-
-
-def names(*wanted: str) -> tuple[Any, ...]:
-    return tuple(SERVO.parameters[name] for name in wanted)
-
-
 # -- the other stack as master --------------------------------------------------------------------
 
 
 @pytest.fixture
 def servo(channel: str) -> Iterator[PlayedDrive]:
     """Return a simulated drive on the bus, as it leaves the factory."""
-    configuration = drive(
-        'cia402', name='axis', station=NODE, table=SERVO.parameters.values(), period=PERIOD,
-        request=names('target_velocity'), response=names('actual_velocity'), mode='csv')
     with Simulation(BridgeConfiguration(
-            buses={'main': bus_of(channel)}, drives={'axis': configuration}),
+            buses={'main': bus_of(channel)}, drives={'axis': servo_configuration()}),
             clock()) as simulation:
         yield simulation.drives['axis']
     assert not simulation.failure
@@ -303,19 +290,6 @@ class Device:
             self.state = 0x23
         elif word & 0x08 and self.state == 0x23:
             self.state = 0x27
-
-
-def bridge_on(bus: BusConfiguration) -> Bridge:
-    return Bridge(bus, drive(
-        'cia402', name='axis', station=NODE, table=SERVO.parameters.values(),
-        request=names('target_velocity'), response=names('actual_velocity'), mode='csv',
-        period=PERIOD, parameter_timeout=0.5, control_timeout=DEADLINE, missed_limit=10,
-        command_timeout=DEADLINE, heartbeat_timeout=5.0))
-
-
-def command(bridge: Bridge, value: float) -> None:
-    with bridge.exchange.lock:
-        bridge.session.services.command(0, value, clock().now())
 
 
 def test_bridge_drives_a_device_of_the_other_stack(place: tuple[BusConfiguration, Any]) -> None:

@@ -1,0 +1,42 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""What tests of CiA 402 beside another stack share: our bridge of a servo in csv."""
+
+from typing import Any
+
+from builders import drive
+from interop_bridge import Bridge, DEADLINE
+from waiting import clock
+
+from drive_can_bridge.configuration.profiles import read_profile
+from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
+from drive_can_bridge.resources import profiles_directory
+
+NODE = 5
+PERIOD = 0.02
+SERVO = read_profile(profiles_directory() / 'cia402_servo.yaml').profile
+
+
+def bus_of(channel: str) -> BusConfiguration:
+    return BusConfiguration('main', 'virtual', channel, bitrate=1_000_000, reconnect_period=0.05)
+
+
+def names(*wanted: str) -> tuple[Any, ...]:
+    return tuple(SERVO.parameters[name] for name in wanted)
+
+
+def servo_configuration(**options: Any) -> DriveConfiguration:
+    return drive(
+        'cia402', name='axis', station=NODE, table=SERVO.parameters.values(),
+        request=names('target_velocity'), response=names('actual_velocity'),
+        **{'mode': 'csv', 'period': PERIOD, **options})
+
+
+def bridge_on(bus: BusConfiguration, **options: Any) -> Bridge:
+    return Bridge(bus, servo_configuration(**{
+        'parameter_timeout': 0.5, 'control_timeout': DEADLINE, 'missed_limit': 10,
+        'command_timeout': DEADLINE, 'heartbeat_timeout': 5.0, **options}))
+
+
+def command(bridge: Bridge, value: float) -> None:
+    with bridge.exchange.lock:
+        bridge.session.services.command(0, value, clock().now())
