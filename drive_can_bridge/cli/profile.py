@@ -78,6 +78,13 @@ _OPTIONS: dict[tuple[str, ...], tuple[dict[str, Any], Any, tuple[str, ...]]] = {
     ('--format',): (
         {'choices': ('eds', 'csv'),
          'help': 'what the file is, where name and contents do not tell'}, None, ('import',)),
+    ('--axis',): (
+        {'metavar': 'N', 'type': int,
+         'help': 'whose objects an EDS file of several axes gives, counted from 1 (default: the '
+                 'first)'}, None, ('import',)),
+    ('--force',): (
+        {'action': 'store_true', 'help': 'import an EDS file of a device that is no drive'},
+        False, ('import',)),
     ('--yes',): (
         {'action': 'store_true',
          'help': 'overwrite an output file that holds something else, without asking'},
@@ -257,7 +264,8 @@ def _import(args: Namespace) -> int:
         built = import_file(
             args.file, columns=columns_from_option(args.columns),
             sign=_SIGNS.get(args.decimal, ''), protocols=_protocols(args.protocols),
-            description=args.description, file_format=args.format)
+            description=args.description, file_format=args.format, axis=args.axis,
+            force=args.force)
     except WrongColumns as error:
         raise WrongUsage(str(error)) from None
     if args.json and args.output is None:
@@ -308,13 +316,16 @@ def _counted(built: Built) -> str:
 
 def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
                 protocols: Sequence[str] = (), description: str = '',
-                file_format: str = '') -> Built:
+                file_format: str = '', axis: int | None = None, force: bool = False) -> Built:
     """
     Make a profile of a file.
 
     :param columns: of a CSV table, by heading or place; the others are guessed.
     :param sign: what separates the fraction in its numbers; '': they tell.
     :param file_format: ``eds`` or ``csv``; '': what its name and contents say.
+    :param axis: of an EDS file, counted from 1; None: the first.
+    :param force: import an EDS file of a device that is no drive.
+    :raises WrongUsage: an option of EDS files, and it is none.
     :raises ImportFailed: it cannot be imported; the text begins with the name of the file.
     :raises OSError: it cannot be read, is no regular file, or is too large.
     """
@@ -323,7 +334,10 @@ def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
         kind = {'.dcf': 'eds', '.tsv': 'csv'}.get(path.suffix.lower(), path.suffix.lower()[1:])
         kind = file_format or kind
         if kind == 'eds' or kind != 'csv' and _EDS_HEAD.search(text):
-            found = read_eds(text, protocols)
+            found = read_eds(text, protocols, axis=axis, force=force)
+        elif axis is not None or force:
+            raise WrongUsage(f'{"--force" if axis is None else "--axis"} is for EDS and DCF '
+                             f'files, and {path} is none')
         else:
             found = read_table(text, columns, sign, protocols)
         return build_profile(found, path.name, description=description, protocols=protocols)

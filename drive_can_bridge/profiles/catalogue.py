@@ -6,11 +6,13 @@ Every entry of a file that is imported goes through the very checks that a bridg
 not pass is left out, with the sentence that a bridge would say.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
@@ -149,18 +151,35 @@ def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
     return min(found, key=len)
 
 
-def _complaints(profile: Profile, family: Family, options: object) -> Iterator[Complaint]:
+def _complaints(profile: Profile, family: Family, options: object,
+                setpoint: Parameter | None = None) -> Iterator[Complaint]:
+    """
+    Yield what a family says of a profile.
+
+    :param setpoint: sent each cycle; what is said of that counts, too.
+    """
     if family.control_built_in:
         profile = replace(profile, control=None)
-    drive = DriveConfiguration(name='drive', bus='bus', protocol=family.name, station=1,
-                               profile=profile, options=options)
+    drive = DriveConfiguration(
+        name='drive', bus='bus', protocol=family.name, station=1, profile=profile,
+        options=options, cyclic_request=() if setpoint is None else (setpoint,))
     for complaint in (*family.check_widths(drive), *family.check(drive)):
         if complaint.key.startswith(_OURS):
             yield complaint._replace(key=complaint.key.removeprefix(_OURS))
+        elif setpoint is not None:
+            yield complaint
 
 
 #: identity object of CiA 301: vendor, product, revision, serial number
 _IDENTITY = 0x1018
+#: what an entry cannot do without; and what goes with other keys
+_NEEDED = ('index', 'subindex', 'number', 'type', 'access')
+_TOGETHER = {'neutral_from': ('arming_tolerance',), 'arming_tolerance': ('neutral_from',)}
+#: characters of an entry without its description, at least
+_SHORTEST = 60
+#: names of the standard's setpoints
+_SETPOINTS = ('target_position', 'interpolation_target', 'target_velocity', 'target_torque',
+              'vl_target_velocity')
 
 
 class ImportFailed(DriveCanError):
@@ -178,6 +197,9 @@ class Draft:
     :param entry: keys and values as the schema of profiles knows them.
     :param remarks: what was not said and had to be decided, or could not be taken over.
     :param name: of a standard object; '': made from the title.
+    :param parent: name of the record that an element is in; it stands in front of the title where
+        that alone is no name.
+    :param step: scale and unit that the title ends with.
     """
 
     line: int
@@ -186,6 +208,8 @@ class Draft:
     entry: dict[str, Any]
     remarks: list[str] = field(default_factory=list)
     name: str = ''
+    parent: str = ''
+    step: tuple[float, str] = (1.0, '')
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +236,9 @@ class Found:
     :param left_out: entries that are not in the profile.
     :param notes: about the file: what its columns were taken for, and what is odd.
     :param sections: of the profile, beside its parameters; they name standard objects.
+    :param foreign: indices that belong to other axes.
+    :param mended: an entry does without a key that is refused, as long as type and address are
+        right; else it is taken whole or not at all.
     """
 
     description: str = ''
@@ -220,6 +247,8 @@ class Found:
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     sections: dict[str, Any] = field(default_factory=dict)
+    foreign: tuple[range, ...] = ()
+    mended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,24 +291,40 @@ def build_profile(found: Found, source: str, *, description: str = '',
         return {name: draft for name, draft in named.items() if name not in reasons}
     named = _named(sorted(found.drafts, key=_address), taken)
     named = left(named, _doubles(named))
-    text = _text(named, found, source, description, said)
-    if len(text.encode('utf-8')) > SIZE_MAX << 20:      # before the checks, which take long
-        raise ImportFailed(f'the profile of its {len(named)} entries would be larger than '
-                           f'{SIZE_MAX} MiB, which no bridge reads')
-    named = left(named, _first_reasons(_loaded(named, said or tuple(FAMILIES)).problems))
-    _narrow(named, _loaded(named, said or tuple(FAMILIES)))
-    spoken, reasons = _carriers(named, said)
-    named = left(named, reasons)
+    too_large = ImportFailed(f'the profile of its {len(named)} entries would be larger than '
+                             f'{SIZE_MAX} MiB, which no bridge reads')
+    # before the checks, which take long
+    if sum(len(draft.entry.get('description', '')) + _SHORTEST
+           for draft in named.values()) > SIZE_MAX << 20:
+        raise too_large
+    spoken, reasons = said, dict[str, str]()
+    while named:
+        loaded = _loaded(named, said or tuple(FAMILIES))
+        _narrow(named, loaded)
+        wrong = list(loaded.problems)
+        if found.mended:
+            wrong = _unmended(named, wrong)
+            if loaded.problems and not wrong:
+                continue
+        reasons = _first_reasons(wrong)
+        if not reasons:
+            spoken, reasons = _carriers(named, loaded.profile, said)
+        if not reasons:
+            break
+        named = left(named, reasons)
     lost.sort(key=lambda each: each.line)
     if not named:
         raise ImportFailed('no entry can be used' + (
             f'; the first reason, in line {lost[0]}' if lost else ': there is none'))
-    # names once more: of what was left out none is taken
-    named = _named(list(named.values()), taken)
-    return Built(_text(named, found, source, description, spoken, guessed=not said), tuple(named),
-                 spoken, len(found.drafts) + len(found.left_out),
+    if len(named) < len(found.drafts):  # names once more: of what was left out none is taken
+        named = _named(list(named.values()), taken)
+    sections, notes = _sections(named, found, spoken)
+    text = _text(named, found, sections, source, description, spoken, guessed=not said)
+    if len(text.encode('utf-8')) > SIZE_MAX << 20:
+        raise too_large
+    return Built(text, tuple(named), spoken, len(found.drafts) + len(found.left_out),
                  sum(bool(draft.remarks) for draft in named.values()), tuple(lost),
-                 tuple(found.notes))
+                 (*found.notes, *notes))
 
 
 def _address(draft: Draft) -> tuple[int, int, int]:
@@ -292,11 +337,18 @@ def _named(drafts: Sequence[Draft], taken: frozenset[str]) -> dict[str, Draft]:
     standard = {draft.name: draft for draft in drafts if draft.name}
     wanted = [(name, '') for name in standard]
     others = [draft for draft in drafts if standard.get(draft.name) is not draft]
-    for draft in others:
+    plain = [name_of(draft.title, '', taken) for draft in others]
+    often = Counter([*standard, *plain])
+    for draft, own in zip(others, plain, strict=True):
         entry = draft.entry
         number = str(entry['number']) if 'number' in entry else f'{entry["index"]:04x}'
         address = f'{number}_{entry["subindex"]}' if entry.get('subindex') else number
-        wanted.append((name_of(draft.title, address, taken), address))
+        if draft.parent and draft.parent not in draft.title and (
+                often[own] > 1 or not any(map(str.isalpha, draft.title))):
+            own = name_of(f'{draft.parent} {draft.title}', address, taken)
+        elif not draft.title.isascii() or own == 'parameter':
+            own = name_of(draft.title, address, taken)
+        wanted.append((own, address))
     made = dict(zip(unique(wanted), [*standard.values(), *others], strict=True))
     return dict(sorted(made.items(), key=lambda item: _address(item[1])))
 
@@ -325,10 +377,78 @@ def _first_reasons(problems: Iterable[Any]) -> dict[str, str]:
     return reasons
 
 
-def _loaded(named: dict[str, Draft], protocols: Sequence[str]) -> LoadedProfile:
+def _loaded(named: dict[str, Draft], protocols: Sequence[str],
+            sections: dict[str, Any] | None = None) -> LoadedProfile:
     return profile_from_tree(Tree({
         'protocols': list(protocols),
-        'parameters': {name: draft.entry.copy() for name, draft in named.items()}}))
+        'parameters': {name: draft.entry.copy() for name, draft in named.items()},
+        **deepcopy(sections or {})}))
+
+
+def _unmended(named: dict[str, Draft], problems: Iterable[Problem]) -> list[Problem]:
+    """Take refused keys out of entries, and return the problems that this does not mend."""
+    left = []
+    for problem in problems:
+        _, name, *rest = problem.key.split('.')
+        if not rest or rest[0] in _NEEDED or rest[0] not in named[name].entry:
+            if not rest or rest[0] in _NEEDED:
+                left.append(problem)
+            continue
+        for key in (rest[0], *_TOGETHER.get(rest[0], ())):
+            named[name].entry.pop(key, None)
+        named[name].remarks.append(f'{rest[0]} left out: {problem.message}')
+    return left
+
+
+def _sections(named: dict[str, Draft], found: Found, protocols: Sequence[str],
+              ) -> tuple[dict[str, Any], list[str]]:
+    """
+    Return the sections that the profile can have, and say what else there is to say of it.
+
+    What is written has to pass ``profile check``, and a person wants to know before the evening
+    in which modes ``validate`` will take it.
+    """
+    identity = [name for name, draft in named.items()
+                if draft.entry.get('index') == _IDENTITY and draft.entry['access'] != 'wo']
+    sections = {**({'identity': identity} if identity else {}), **found.sections}
+    notes = []
+    loaded = _loaded({name: draft for name, draft in named.items()
+                      if draft.name or name in identity}, protocols, sections)
+    for problem in loaded.problems:
+        section = problem.key.partition('.')[0]
+        if sections.pop(section, None) is not None:
+            notes.append(f'section {section} left out: {problem.key}: {problem.message}')
+    if tuple(protocols) == ('cia402',):
+        notes += _modes(loaded.profile)
+    return sections, notes
+
+
+def _modes(profile: Profile) -> Iterator[str]:
+    """Say in which modes ``validate`` takes the profile, and why not in the others."""
+    family = FAMILIES['cia402']
+    setpoints = [parameter for parameter in profile.parameters.values()
+                 if parameter.name in _SETPOINTS]
+    if not setpoints:
+        yield 'validate takes it in no mode: it has no setpoint of any'
+        return
+    good, missing, reasons = [], [], []
+    for mode in get_args(get_type_hints(family.options_type)['mode']):
+        tried = [list(_complaints(profile, family, family.make_options(1, {'mode': mode}),
+                                  setpoint)) for setpoint in setpoints]
+        best = min(tried, key=len)
+        if not best:
+            good.append(mode)
+        elif any(each.key == 'cyclic_request' for each in best):
+            wrong = [each for some in tried for each in some if each.key != 'cyclic_request']
+            missing += [mode] * (not wrong)
+            reasons += [f'{mode}: {each.key}: {each.message}' for each in wrong]
+        else:
+            reasons += [f'{mode}: {each.key}: {each.message}' for each in best]
+    yield f'validate takes it in the modes {", ".join(good)}' if good else (
+        'validate takes it in no mode')
+    if missing:
+        yield f'no setpoint in the file for the modes {", ".join(missing)}'
+    yield from (f'validate refuses it in the mode {reason}' for reason in reasons)
 
 
 def _narrow(named: dict[str, Draft], loaded: LoadedProfile) -> None:
@@ -339,10 +459,9 @@ def _narrow(named: dict[str, Draft], loaded: LoadedProfile) -> None:
         named[name].remarks.append(f'{key} left out: {warning.message}')
 
 
-def _carriers(named: dict[str, Draft], said: tuple[str, ...],
+def _carriers(named: dict[str, Draft], profile: Profile, said: tuple[str, ...],
               ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return the families that are to carry the table, and why which entries they cannot."""
-    profile = _loaded(named, said or tuple(FAMILIES)).profile
     reasons = {protocol: _first_reasons(family_complaints(profile, protocol))
                for protocol in said or FAMILIES}
     missed = {protocol: len(each) for protocol, each in reasons.items()}
@@ -360,8 +479,8 @@ def _carriers(named: dict[str, Draft], said: tuple[str, ...],
 # -- the text -------------------------------------------------------------------------------------
 
 
-def _text(named: dict[str, Draft], found: Found, source: str, description: str,
-          protocols: Sequence[str], *, guessed: bool = False) -> str:
+def _text(named: dict[str, Draft], found: Found, sections: dict[str, Any], source: str,
+          description: str, protocols: Sequence[str], *, guessed: bool = False) -> str:
     lines = comment(f'Made from {source} by "drive_can profile import": {len(named)} of '
                     f'{len(found.drafts) + len(found.left_out)} entries, sorted by address. '
                     'Compare what you use with the manual: the file may be wrong, and so may '
@@ -376,11 +495,11 @@ def _text(named: dict[str, Draft], found: Found, source: str, description: str,
                          'table. Delete the others.')
     lines += [f'protocols: [{", ".join(protocols)}]', '', 'sources:',
               f'  file: {scalar(source)}', '']
-    identity = [name for name, draft in named.items() if draft.entry.get('index') == _IDENTITY]
-    if identity:
+    if 'identity' in sections:
         lines += [*comment('Object 1018h tells one device from another.'),
-                  f'identity: [{", ".join(identity)}]', '']
-    lines += [each for key, value in found.sections.items() for each in block(key, value)]
+                  f'identity: [{", ".join(sections["identity"])}]', '']
+    lines += [each for key, value in sections.items() if key != 'identity'
+              for each in block(key, value)]
     lines += ['parameters:', '']
     for name, draft in named.items():
         where = ', '.join(filter(None, (f'file, line {draft.line}', draft.section)))

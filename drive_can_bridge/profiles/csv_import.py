@@ -9,6 +9,7 @@ taken for is a note; ``--columns`` and ``--decimal`` say it better.
 
 from collections.abc import Mapping, Sequence
 import csv
+from functools import cache
 import re
 from typing import Any, NamedTuple
 
@@ -125,6 +126,7 @@ def word_of(what: str, table: Mapping[str, str], text: str) -> str:
     raise Unusable(f"{what} '{text}' is none of those that are known here")
 
 
+@cache
 def access_of(text: str) -> str:
     """
     Return ``ro``, ``rw`` or ``wo``.

@@ -70,6 +70,9 @@ _NO_UNIT = frozenset('- -- – — / 1 n/a na none ohne keine nessuna [-] (-)'.s
 _ENDS = (re.compile(r'\s*[\[(]([^\[\]()]{1,20})[\])]\s*$'),
          re.compile(r'(?:,|\s/|\bin)\s*([^\s,]{1,12})\s*$', re.IGNORECASE),
          re.compile(r'\s*(°\s?C|℃|°|%)\s*$'))
+#: scale and unit in brackets; and units that are something else as well
+_STEP = re.compile(r'(?:\s*(?=\[)|\s+(?=\())([\[(])\s*([^\[\]()]{1,20})[\])]\s*$')
+_OTHER_WORDS = ('min', 'rev', 'inc', 'sec')
 _LETTERS = str.maketrans({
     'ä': 'ae', 'ö': 'oe', 'ü': 'ue', 'Ä': 'Ae', 'Ö': 'Oe', 'Ü': 'Ue', 'ß': 'ss', 'ẞ': 'SS',
     'æ': 'ae', 'Æ': 'Ae', 'ø': 'oe', 'Ø': 'Oe', 'å': 'aa', 'Å': 'Aa', 'œ': 'oe', 'Œ': 'Oe',
@@ -133,6 +136,8 @@ def _packed(parts: list[str]) -> list[str]:
     for part in parts:
         if lines and len(lines[-1]) + 1 + len(part) <= _ROOM:
             lines[-1] += f' {part}'
+        elif len(part) <= _ROOM:
+            lines.append(part)
         else:  # what YAML folds back into a space
             pairs = part.replace(': ', _TIED) if '{' in part else part
             lines += [line.replace(_TIED, ': ') for line in textwrap.wrap(
@@ -185,6 +190,33 @@ def split_unit(text: str) -> tuple[str, str]:
     return text.strip(), ''
 
 
+def split_step(text: str) -> tuple[str, float, str]:
+    """
+    Separate a text from what a step is worth in brackets at its end: ``[0.1 Hz]``, ``(ms)``.
+
+    Round brackets hold other things, too (``Phase (W)``, ``Speed (min)``, ``Overload (60 s)``):
+    what may be one of them is none.
+
+    :return: the text, scale, unit; 1 and '' where there is none.
+
+    >>> split_step('Ramp [0.1 s]'), split_step('Phase (W)')
+    (('Ramp', 0.1, 's'), ('Phase (W)', 1.0, ''))
+    """
+    match = _STEP.search(text)
+    if match is None or not text[:match.start()].strip():
+        return text, 1.0, ''
+    try:
+        number, behind = factor(match[2], '.')
+    except Unusable:
+        return text, 1.0, ''
+    found = known_unit(behind) or ''
+    whole = number <= 1.0 or f'{number:e}'.startswith('1.000000e')
+    plain = match[1] == '[' or number < 1.0 or number == 1.0 and (
+        len(behind) > 1 or behind in 's%\N{DEGREE SIGN}') and behind.lower() not in _OTHER_WORDS
+    return (text[:match.start()].strip(), number, found) if (
+        found and number > 0.0 and whole and plain) else (text, 1.0, '')
+
+
 def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -> str:
     """
     Return the name for a text.
@@ -195,7 +227,7 @@ def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -
     >>> name_of('Beschleunigungszeit (Rampe 1) [s]')
     'beschleunigungszeit_rampe_1'
     """
-    name = '_'.join(plain_words(split_unit(text)[0]))
+    name = '_'.join(plain_words(split_unit(split_step(text)[0])[0]))
     if len(name) > LENGTH_MAX:
         cut = name[:LENGTH_MAX + 1]
         name = cut.rpartition('_')[0] or cut[:LENGTH_MAX]

@@ -36,12 +36,13 @@ def told(made: Outcome) -> str:
 
 
 def bring_in(folder: Path, content: str | bytes, name: str = 'table.csv', *, columns: str = '',
-             protocols: Sequence[str] = (), sign: str = '') -> Outcome:
+             protocols: Sequence[str] = (), sign: str = '', axis: int | None = None,
+             force: bool = False) -> Outcome:
     """Import a file; what comes out has to pass ``profile check``."""
     source = folder / name
     source.write_bytes(content.encode('utf-8') if isinstance(content, str) else content)
     built = import_file(source, columns=columns_from_option(columns), sign=sign,
-                        protocols=protocols)
+                        protocols=protocols, axis=axis, force=force)
     made = folder / 'made.yaml'
     made.write_text(built.text, encoding='utf-8')
     checked = check(made)

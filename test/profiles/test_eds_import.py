@@ -119,10 +119,10 @@ def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     made = bring(tmp_path)
     assert made.profile.description == DRIVE
     assert made.profile.protocols == ('canopen_pkw',)
-    assert made.profile.identity == ('identity_object_vendor_id',)
+    assert made.profile.identity == ('vendor_id',)
     assert list(made.parameters) == [
-        'device_type', 'producer_heartbeat_time', 'identity_object_vendor_id', 'ramp_time',
-        'speed_setpoint', 'flag', 'temperatures_motor', 'temperatures_2', 'mode']
+        'device_type', 'producer_heartbeat_time', 'vendor_id', 'ramp_time',
+        'speed_setpoint', 'flag', 'motor', 'temperatures_2', 'mode']
     assert made.parameters['ramp_time'] == RAMP_TIME
     assert made.parameters['speed_setpoint'] == Parameter(
         'speed_setpoint', ParameterType.INT16, index=0x2001, subindex=0, scale=0.1, unit='rpm',
@@ -147,31 +147,21 @@ def test_dcf_and_other_names(tmp_path: Path) -> None:
     # bad numbers
     ('DataType=0x0007', 'DataType=0xZZ', 'device_type', '[1000]', "DataType '0xZZ' is no number"),
     ('DataType=0x0003', 'DataType=', 'speed_setpoint', '[2001]', 'DataType is empty'),
-    ('ObjectType=0x7', 'ObjectType=seven', 'producer_heartbeat_time', '[1017]',
-     "ObjectType 'seven' is no number"),
-    ('Factor=0.01', 'Factor=a lot', 'ramp_time', '[2000]', "Factor 'a lot' is no number"),
-    ('CompactSubObj=2', 'CompactSubObj=x', 'temperatures_motor', '[2010]',
-     "CompactSubObj 'x' is no number"),
-    ('CompactSubObj=2', 'CompactSubObj=999', 'temperatures_motor', '[2010]',
+    ('DataType=0x0007', 'DataType=010', 'device_type', '[1000]',
+     "DataType '010' may be 10 or, octal, 8"),
+    ('DataType=0x0003', 'DataType=0x0100', 'speed_setpoint', '[2001]',
+     'data type 0100h is none of the types of 16 or 32 bits'),
+    ('CompactSubObj=2', 'CompactSubObj=x', 'motor', '[2010]', "CompactSubObj 'x' is no number"),
+    ('CompactSubObj=2', 'CompactSubObj=999', 'motor', '[2010]',
      'CompactSubObj 999 is out of range'),
-    ('AccessType=rww', 'AccessType=sometimes', 'ramp_time', '[2000]',
-     "access 'sometimes' is none of those that are known here"),
-    # bad limits
-    ('LowLimit=1\n', 'LowLimit=abc\n', 'ramp_time', '[2000]', "LowLimit 'abc' is no number"),
-    ('LowLimit=1\n', 'LowLimit=9000\n', 'ramp_time', '[2000]',
-     'LowLimit 9000 is above HighLimit 6000'),
-    ('HighLimit=0x1770', f'HighLimit={10**400}', 'ramp_time', '[2000]',
-     'is no object that can be understood'),
-    ('HighLimit=0x1770', f'HighLimit={10**40}', 'ramp_time', '[2000]', '1e+38 is too large'),
+    ('CompactSubObj=2', '', 'motor', '[2010]', 'has no sub-indices in the file'),
     # missing keys and sections
     ('DataType=0x0006            ; UNSIGNED16\n', '', 'ramp_time', '[2000]',
      'DataType is missing'),
-    ('ParameterName=Ramp time\n', '', 'ramp_time', '[2000]', 'ParameterName is missing'),
     ('[1000]', '[10000]', 'device_type', '[MandatoryObjects]', 'section [1000] is missing'),
-    ('[1018]', '[Identity]', 'identity_object_vendor_id', '[1018Sub1]',
-     'section [1018] is missing'),
-    ('ObjectType=0x9', 'ObjectType=nine', 'identity_object_vendor_id', '[1018Sub1]',
-     'cannot be understood'),
+    ('[1000]', '[0002]', 'device_type', '[0002]',
+     'describes a type of data, and is no object'),
+    ('[1000]', '[1000subject]', 'device_type', '[1000subject]', 'is no section of an object'),
 ])
 def test_a_broken_section_costs_that_entry_only(tmp_path: Path, old: str, new: str, lost: str,
                                                 place: str, reason: str) -> None:
@@ -183,9 +173,47 @@ def test_a_broken_section_costs_that_entry_only(tmp_path: Path, old: str, new: s
     assert all(int(line.split(':')[0]) <= EDS.count('\n') for line in made.left_out)
 
 
-def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
-    made = bring(tmp_path, 'LowLimit=1\n', 'LowLimit=abc\n')
-    assert told(made) == TOLD['limit']
+@pytest.mark.parametrize(('old', 'new', 'remark'), [
+    ('ObjectType=0x7', 'ObjectType=seven', ''),
+    ('ObjectType=0x9', 'ObjectType=nine', ''),
+    ('DefaultValue=nonsense', 'PDOMapping=', ''),
+    ('DefaultValue=nonsense', 'PDOMapping=0;', ''),
+    ('DataType=0x0007', 'DataType=0x0007 # UNSIGNED32', ''),
+    ('Factor=0.01', 'Factor=a lot', "Factor left out: 'a lot' is no number"),
+    ('Factor=0.01', 'Factor=', 'Factor left out: it is empty'),
+    ('Factor=0.01', 'Factor=0', "Factor left out: '0' is no scale"),
+    ('Factor=0.01', 'Factor=nan', "Factor left out: 'nan' is no scale"),
+    ('AccessType=rww', 'AccessType=sometimes',
+     "ro: AccessType 'sometimes' is none of those that are known here"),
+    ('AccessType=rww\n', '', 'ro: AccessType is missing'),
+    ('LowLimit=1\n', 'LowLimit=abc\n', "LowLimit left out: 'abc' is no number"),
+    ('LowLimit=1\n', 'LowLimit=-\n', "LowLimit left out: '-' is no number"),
+    ('LowLimit=1\n', 'LowLimit=0x\n', "LowLimit left out: '0x' is no number"),
+    ('LowLimit=1\n', 'LowLimit=$NODEID+1\n', "LowLimit left out: '$NODEID+1' is no number"),
+    ('LowLimit=1\n', 'LowLimit=9000\n',
+     'LowLimit 9000 and HighLimit 0x1770 left out: the first is above the second'),
+    ('HighLimit=0x1770', f'HighLimit={10**400}', 'HighLimit left out: '),
+    ('HighLimit=0x1770', f'HighLimit={10**40}', 'is beyond uint16, which ends at 65535'),
+    ('ParameterName=Ramp time\n', '', 'ParameterName is missing'),
+])
+def test_a_key_that_is_odd_costs_no_entry(tmp_path: Path, old: str, new: str,
+                                          remark: str) -> None:
+    made = bring(tmp_path, old, new)
+    assert len(made.parameters) == 9
+    assert [each.section for each in made.built.left_out] == ['[2003]']
+    assert remark in ' '.join(made.built.text.replace('\n  # ', ' ').split())
+
+
+def test_what_no_key_says_is_read_only(tmp_path: Path) -> None:
+    made = bring(tmp_path, 'AccessType=rww\n', '')
+    assert made.parameters['ramp_time'].access is Access.READ_ONLY
+
+
+def test_a_record_without_a_head(tmp_path: Path) -> None:
+    made = bring(tmp_path, '[1018]', '[Identity]')
+    assert made.parameters['vendor_id'].index == 0x1018
+    assert 'section [1018] is missing; what is imported are its sub-indices' in made.notes
+    assert any('[Identity]' in line for line in made.left_out)
 
 
 @pytest.mark.parametrize(('old', 'new', 'note'), [
@@ -201,16 +229,16 @@ def test_what_is_odd_costs_nothing(tmp_path: Path, old: str, new: str, note: str
 
 
 @pytest.mark.parametrize(('entries', 'names'), [
-    ('NrOfEntries=1\n2=Winding', ['temperatures', 'temperatures_winding']),
-    ('NrOfEntries=2\n1=Motor\n2=Winding', ['temperatures_motor', 'temperatures_winding']),
-    ('1=Motor', ['temperatures_motor', 'temperatures_2']),
+    ('NrOfEntries=1\n2=Winding', ['temperatures', 'winding']),
+    ('NrOfEntries=2\n1=Motor\n2=Winding', ['motor', 'winding']),
+    ('1=Motor', ['motor', 'temperatures_2']),
     ('NrOfEntries=0', ['temperatures', 'temperatures_2']),
 ])
 def test_elements_of_which_some_have_names(tmp_path: Path, entries: str,
                                            names: list[str]) -> None:
     # the numbers are those of the elements; NrOfEntries counts the names
     made = bring(tmp_path, 'NrOfEntries=1\n1=Motor', entries)
-    assert [name for name in made.parameters if name.startswith('temperatures')] == names
+    assert [name for name, each in made.parameters.items() if each.index == 0x2010] == names
     assert len(made.parameters) == 9
 
 
