@@ -580,10 +580,16 @@ def _rescale(draft: Draft, factor: float, name: str) -> None:
         entry['unit'] = name
     if factor == 1.0:
         return
-    limits = {key: rounded(entry.pop(key) * factor) for key in _ENDS if key in entry}
+    limits = {key: _scaled(entry.pop(key), factor) for key in _ENDS if key in entry}
     if factor < 0:
         limits = {other: limits[key] for key, other in _ENDS.items() if key in limits}
     entry.update(limits, scale=rounded(entry.get('scale', 1.0) * factor))
+
+
+def _scaled(limit: float, factor: float) -> float:
+    """Return a limit in its unit, without binary noise unless that were a part of a step."""
+    exact = limit * factor
+    return exact if abs(rounded(exact) - exact) > abs(factor) * 1e-6 else rounded(exact)
 
 
 def _take_step(draft: Draft) -> bool:

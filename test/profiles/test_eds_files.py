@@ -70,6 +70,14 @@ def test_limits_count_in_the_unit_of_the_entry(tmp_path: Path) -> None:
     assert (lowering.scale, lowering.minimum, lowering.maximum) == (-0.5, -16383.5, 5.0)
 
 
+def test_the_end_of_a_wide_type_is_no_limit_beyond_it(tmp_path: Path) -> None:
+    """4294967295 steps of 1/256: 16777215.9961 with 12 digits is more than the type holds."""
+    made = bring(tmp_path, *DRIVE, (
+        '3301', 'Way', 7, 'rw', 'LowLimit=0\nHighLimit=0xFFFFFFFF\nFactor=0.00390625\nUnit=km\n'))
+    assert made.parameters['way'].maximum == 16777215.99609375
+    assert 'left out' not in made.built.text
+
+
 # -- names ----------------------------------------------------------------------------------------
 
 
