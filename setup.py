@@ -91,6 +91,7 @@ setup(
             # No rosdep keys for some of them: the tests run without them, only fewer, or slower.
             'argcomplete',
             'canopen>=2.3',
+            'canopen-asyncio==2.4.1',
             'durand==0.5.0',
             'hypothesis',
             'matplotlib',
@@ -98,6 +99,7 @@ setup(
             'pytest',
             'pytest-timeout',
             'setuptools',
+            'uc2canopen==0.2.3',
         ],
     },
     entry_points={

@@ -22,12 +22,14 @@ DEADLINE = 30.0
 
 
 def dictionary_of(variables: Mapping[int, tuple[str, int]],
-                  records: Mapping[int, Mapping[int, int]]) -> Any:
+                  records: Mapping[int, Mapping[int, int]],
+                  objectdictionary: Any = objectdictionary) -> Any:
     """
     Return an object dictionary of the other stack.
 
     :param variables: index -> (name, type).
     :param records: index -> sub-index -> type.
+    :param objectdictionary: the module of that stack.
     """
     od = objectdictionary.ObjectDictionary()
 

@@ -26,9 +26,9 @@ def names(*wanted: str) -> tuple[Any, ...]:
 
 def servo_configuration(**options: Any) -> DriveConfiguration:
     return drive(
-        'cia402', name='axis', station=NODE, table=SERVO.parameters.values(),
-        request=names('target_velocity'), response=names('actual_velocity'),
-        **{'mode': 'csv', 'period': PERIOD, **options})
+        'cia402', table=SERVO.parameters.values(), request=names('target_velocity'),
+        response=names('actual_velocity'),
+        **{'name': 'axis', 'station': NODE, 'mode': 'csv', 'period': PERIOD, **options})
 
 
 def bridge_on(bus: BusConfiguration, **options: Any) -> Bridge:
