@@ -122,6 +122,7 @@ class DriveObserver:
     :param extended: its identifiers have 29 bits.
     :ivar emit: takes every telegram.
     :ivar handlers: what takes frames, by their identifier.
+    :ivar remote_handlers: what takes remote frames, of 11 bits.
     :ivar watches: what waits for answers; the first are given up first.
     :ivar deadline: when :meth:`expire` has something to do; infinity: never.
     """
@@ -129,6 +130,7 @@ class DriveObserver:
     def __init__(self, name: str, emit: Emit, *, extended: bool = False) -> None:
         self.name = name
         self.handlers: dict[int, Handler] = {}
+        self.remote_handlers: dict[int, Handler] = {}
         self.observed = Observed()
         self.watches: list[Watch] = []
         self.deadline = math.inf

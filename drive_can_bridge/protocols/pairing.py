@@ -104,6 +104,43 @@ class CyclicWatch:
         self._observed.missed += 1
 
 
+class AnswerWatch:
+    """
+    Waits for one answer at a time; nothing is counted.
+
+    :param timeout: s that it may take.
+    :param lose: takes the time when none came.
+    """
+
+    def __init__(self, observer: DriveObserver, timeout: float,
+                 lose: Callable[[float], None]) -> None:
+        self._observer = observer
+        self._timeout = timeout
+        self._lose = lose
+        self._asked = math.nan
+        observer.watches.append(self)
+
+    def ask(self, now: float) -> None:
+        """Take a request; the one before is lost if it was not answered."""
+        if self._asked == self._asked:      # not NaN
+            self._lose(now)
+        self._asked = now
+        self._observer.due(now + self._timeout)
+
+    def answer(self, now: float) -> float:
+        """Take an answer; return s since the request (NaN: there was none)."""
+        latency, self._asked = now - self._asked, math.nan
+        return latency
+
+    def expire(self, now: float) -> float:
+        """Give up a request that was not answered until ``now``; return when to look again."""
+        due = self._asked + self._timeout
+        if due <= now:
+            self._asked = math.nan
+            self._lose(due)
+        return due if due > now else math.inf   # NaN: nothing is under way
+
+
 class Asked(NamedTuple):
     """
     What a request is about.

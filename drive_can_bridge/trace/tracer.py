@@ -246,7 +246,16 @@ class Tracer:
                        decode_error_frame(record.identifier, record.data).text)
             return
         bus.count(bits_on_bus(len(record.data), record.extended), record.time)
-        title = 'remote frame' if record.kind is RecordKind.REMOTE else 'CAN FD frame'
+        title = 'CAN FD frame'
+        if record.kind is RecordKind.REMOTE:
+            title = 'remote frame'
+            for observer in bus.observers:
+                handler = observer.remote_handlers.get(record.identifier)
+                if handler is not None and not record.extended:
+                    self._sent = record.sent
+                    handler(record.data, record.time)
+                    bus.deadline = min(bus.deadline, observer.deadline)
+                    return
         self._tell(bus, record.time, title, _hex(record))
 
     def _tell(self, bus: BusTrace, time: float, title: str, remark: str,

@@ -190,3 +190,26 @@ def test_anything(drives: tuple[DriveConfiguration, ...], identifiers: tuple[int
     if WITH_POSITION in drives:     # SDO segments bring none
         assert len(witness.telegrams) >= sum(
             identifier not in (0x584, 0x604) for identifier, *_ in frames)
+
+
+@pytest.mark.parametrize(('watched', 'name', 'node'), [('axis', 'axis', 4), ('pump', 'pump', 5)])
+def test_node_guarding_is_a_conversation_of_its_node(watched: str, name: str, node: int) -> None:
+    witness = Witness(DRIVES[watched])
+    timeout = DRIVES[watched].parameter_timeout
+
+    def asks(time: float, of: int = node, *, extended: bool = False) -> list[str]:
+        witness.tracer.take(Record(time, 'can0', 0x700 + of, b'', extended, RecordKind.REMOTE))
+        return witness.lines()
+    assert asks(0.0) == [f'0.000000 +0.000 main {name} > node guarding: request']
+    assert witness.hears(f'70{node}#85', 0.002) == [
+        f'0.002000 +0.000 main {name} < node guarding: operational [2.0 ms]']
+    assert witness.hears(f'70{node}#05', 0.5) == [
+        f'0.500000 +0.000 main {name} < heartbeat: operational']
+    assert asks(1.0) == [f'1.000000 +1.000 main {name} > node guarding: request']
+    lost = f'+{0.998 + timeout:.3f} main {name} < node guarding: LOST: no answer'
+    assert witness.waits(1.9) == [f'{1.0 + timeout:.6f} {lost}']
+    # of nobody
+    assert asks(2.0, 6) == ['2.000000 +0.000 main remote frame: SUSPICIOUS: 706#']
+    assert asks(2.1, extended=True) == [
+        f'2.100000 +0.100 main remote frame: SUSPICIOUS: 0000070{node}#']
+    assert witness.observed(name).requests == witness.observed(name).unanswered == 0

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.observer import DriveObserver, Emit, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.pairing import AnswerWatch
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE, _NETWORK = Direction.REQUEST, Direction.RESPONSE, Kind.NETWORK
@@ -13,25 +14,39 @@ _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
              for command in network.NmtCommand}
 
 
-def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None]) -> None:
+def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None],
+              timeout: float) -> None:
     """
-    Have heartbeats and emergency messages of a node told.
+    Have heartbeats, answers to node guarding and emergency messages of a node told.
 
     :param booted: called when the node has started.
+    :param timeout: s that an answer to node guarding may take.
     """
+    def lose(now: float) -> None:
+        observer.tell(now, _RESPONSE, _NETWORK, 'node guarding', verdict=Verdict.LOST,
+                      remark='no answer')
+    guarding = AnswerWatch(observer, timeout, lose)
+
+    def take_guarding(_: bytes, now: float) -> None:
+        observer.tell(now, _REQUEST, _NETWORK, 'node guarding', remark='request')
+        guarding.ask(now)
+
     def take_heartbeat(state: NmtState, now: float) -> None:
         if state is NmtState.BOOT_UP:
             booted()
             observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
                           remark='the device has started')
         else:
-            observer.tell(now, _RESPONSE, _NETWORK, 'heartbeat', remark=state.text)
+            latency = guarding.answer(now)
+            title = 'node guarding' if latency == latency else 'heartbeat'  # NaN: of itself
+            observer.tell(now, _RESPONSE, _NETWORK, title, remark=state.text, latency=latency)
 
     def take_emergency(emergency: Emergency, now: float) -> None:
         over = emergency.code == network.NO_ERROR
         observer.tell(now, _RESPONSE, _NETWORK, 'emergency', remark=emergency.text,
                       verdict=Verdict.NORMAL if over else Verdict.SUSPICIOUS)
 
+    observer.remote_handlers[network.HEARTBEAT_BASE + node] = take_guarding
     observer.hear(network.HEARTBEAT_BASE + node, _RESPONSE, _NETWORK, 'heartbeat',
                   network.decode_heartbeat, take_heartbeat)
     observer.hear(network.EMERGENCY_BASE + node, _RESPONSE, _NETWORK, 'emergency',

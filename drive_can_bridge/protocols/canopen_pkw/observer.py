@@ -32,7 +32,7 @@ class PkwObserver(DriveObserver):
         super().__init__(drive.name, emit)
         options = drive.options
         self._abort_order: str = options.abort_code_order
-        hear_node(self, drive.station, self._booted)
+        hear_node(self, drive.station, self._booted, drive.parameter_timeout)
         decode = partial(pkw.decode, layout=Layout(options.layout))
         for identifier, direction, title, take in (
                 (options.request_cob_id, _REQUEST, 'PKW request', self._take_request),

@@ -22,7 +22,8 @@ from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pd
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict)
-from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
+from drive_can_bridge.protocols.pairing import (
+    AnswerWatch, Asked, CYCLES_WAITED, CyclicWatch, Requests)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -73,7 +74,7 @@ class Cia402Observer(DriveObserver):
         self._arrived: set[int] = set()
         self._told = False              # something since the last SYNC
         node = drive.station
-        hear_node(self, node, self._booted)
+        hear_node(self, node, self._booted, drive.parameter_timeout)
         self.hear(sdo.REQUEST_BASE + node, _REQUEST, _PARAMETER, 'SDO request',
                   partial(sdo.decode, _REQUEST), self._take_sdo_request)
         self.hear(sdo.RESPONSE_BASE + node, _RESPONSE, _PARAMETER, 'SDO response',
@@ -92,7 +93,11 @@ class Cia402Observer(DriveObserver):
             self._events = EventWatch(drive.period, self.observed)
             self.watches.append(self._events)
         self._requests: Requests[Place] = Requests(self, drive.parameter_timeout, self._content)
+        self._segments = AnswerWatch(self, drive.parameter_timeout, self._lose_segment)
         self._transfer: Place | None = None     # by segments, under way
+        self._begun: Place | None = None        # a write by segments, asked for
+        self._writes = False                    # the transfer under way does
+        self._last = False                      # its last segment was sent
         self._text = b''
 
     # -- process data -----------------------------------------------------------------------------
@@ -126,46 +131,81 @@ class Cia402Observer(DriveObserver):
                   verdict=verdict, remark=remark, latency=latency)
 
     def _booted(self) -> None:
-        self._transfer = None
+        self._end_transfer(math.nan)
         self._arrived.clear()
 
     # -- parameters -------------------------------------------------------------------------------
 
     def _take_sdo_request(self, request: Message, now: float) -> None:
         if request.object is None:
-            return      # the next segment: the transfer was told
+            self._take_segment_request(request, now)
+            return
         place, written = request.object, request.data
-        self._transfer = None
+        self._end_transfer(now)
+        self._begun = place if request.kind is Said.DOWNLOAD_BEGUN else None
         if request.kind is Said.ABORT:
             self.tell(now, _REQUEST, _PARAMETER, 'abort', self._content(place, None)[0],
                       remark=sdo.describe(request.number))
             return
         self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
-            int.from_bytes(written, 'little'), len(written)])
+            int.from_bytes(written, 'little'), len(written)] if written else [])
 
     def _take_sdo_response(self, answer: Message, now: float) -> None:
         place = answer.object
         if place is None:
             self._take_segment(answer, now)
             return
-        self._transfer = None
+        self._end_transfer(now)
         asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.DOWNLOADED)
-        if answer.kind is Said.UPLOAD_BEGUN:
+        self._writes = answer.kind is Said.DOWNLOADED
+        if answer.kind is Said.UPLOAD_BEGUN or self._writes and self._begun == place:
             self._transfer, self._text = place, b''
         self._requests.answer(
             place, asked, now, [] if not answer.data else [
                 int.from_bytes(answer.data, 'little'), len(answer.data)],
             refusal=sdo.describe(answer.number) if answer.kind is Said.ABORT else '')
 
+    def _take_segment_request(self, request: Message, now: float) -> None:
+        """Take the next segment, or the wish for it: the transfer was told."""
+        if self._transfer is None:
+            return
+        self._segments.ask(now)
+        if request.kind is Said.SEGMENT_SENT and self._add(request):
+            self._tell_text(_REQUEST, now)
+
     def _take_segment(self, answer: Message, now: float) -> None:
+        latency = self._segments.answer(now)
+        last = self._last if answer.kind is Said.SEGMENT_TAKEN else self._add(answer)
+        if last and self._transfer is not None:
+            if self._writes:
+                self._text = b''
+            self._tell_text(_RESPONSE, now, latency if self._writes else math.nan)
+            self._end_transfer(now)
+
+    def _add(self, segment: Message) -> bool:
+        """Keep what a segment holds; tell whether it is the last one."""
         # a domain may have megabytes, and no more of it is shown
-        self._text = (self._text + answer.data)[:TEXT_MAX]
-        if answer.kind is Said.SEGMENT and answer.last and self._transfer is not None:
-            parameters, _ = self._content(self._transfer, None)
-            self._transfer = None
-            self.tell(now, _RESPONSE, _PARAMETER, 'read', parameters,
-                      remark=printable(repr(
-                          self._text.rstrip(b'\0').decode('ascii', 'replace'))))
+        self._text = (self._text + segment.data)[:TEXT_MAX]
+        self._last = segment.last
+        return segment.last
+
+    def _tell_text(self, direction: Direction, now: float, latency: float = math.nan) -> None:
+        if self._transfer is not None:
+            self.tell(now, direction, _PARAMETER, 'write' if self._writes else 'read',
+                      self._content(self._transfer, None)[0], latency=latency,
+                      remark=printable(repr(self._text.rstrip(b'\0').decode(
+                          'ascii', 'replace'))) if self._text else '')
+
+    def _lose_segment(self, now: float) -> None:
+        if self._transfer is not None:
+            self.observed.unanswered += 1
+            self.tell(now, _RESPONSE, _PARAMETER, 'write' if self._writes else 'read',
+                      self._content(self._transfer, None)[0], verdict=Verdict.LOST,
+                      remark='no answer to a segment')
+
+    def _end_transfer(self, now: float) -> None:
+        self._segments.answer(now)
+        self._transfer, self._last = None, False
 
     def _content(self, place: Place, words: Sequence[int] | None,
                  ) -> tuple[list[Parameter], list[int]]:
