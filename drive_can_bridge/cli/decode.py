@@ -47,6 +47,9 @@ def define(parser: ArgumentParser) -> None:
                         help='listen to the buses of the parameter file instead; sends nothing')
     add_params_file(parser, 'parameter file of the bridge: names buses and drives')
     add_seconds(parser)
+    parser.add_argument('--bus', metavar='NAME=CHANNEL', action='append', default=[],
+                        help='the channel of the trace that is this bus, as it is shown; '
+                             'repeatable')
     parser.add_argument('--drive', metavar='NAME', action='append', default=[],
                         help='only this drive; a shell pattern, repeatable')
     parser.add_argument('--only', metavar='WHAT', type=_only, default=set(),
@@ -86,6 +89,7 @@ def run(args: Namespace) -> int:
     if unknown:
         raise WrongUsage(f'--drive {unknown[0]}: no such drive; drives: '
                          f'{", ".join(configuration.drives) or "none"}')
+    meant = _meant(args, configuration)
     taken = _written_over(args)
     if taken is not None:
         raise WrongUsage(f'{taken}: is read, and would be written over, choose another name')
@@ -105,7 +109,7 @@ def run(args: Namespace) -> int:
         complaints.conclude()
         complain(f'{args.file}: there is no frame in it')
         return FAILED
-    channels = Channels(list(configuration.buses.values()))
+    channels = Channels(list(configuration.buses.values()), meant, complain)
     if args.file is not None and Path(args.file).is_file():     # a pipe is read only once
         channels.look_ahead(record.channel for record in read_records(Path(args.file), _ignore))
     selection = Selection(args.drive, args.only)
@@ -123,10 +127,35 @@ def run(args: Namespace) -> int:
                 for record in chain((first,), records):
                     take(record)
             complaints.conclude()
+            for each in channels.missing():
+                complain(f'--bus {each}: the trace has no such channel')
         tracer.finish()
         for ending in endings:
             ending()
     return code
+
+
+def _meant(args: Namespace, configuration: BridgeConfiguration) -> dict[str, str]:
+    """
+    Return the channels that are given for buses.
+
+    :raises WrongUsage: of no bus, of one twice, one for two, or of no trace.
+    """
+    if args.bus and args.live:
+        raise WrongUsage('--bus: of a trace only')
+    found: dict[str, str] = {}
+    for given in args.bus:
+        name, sign, channel = given.partition('=')
+        if not (sign and channel):
+            raise WrongUsage(f'--bus {given}: give NAME=CHANNEL')
+        if name not in configuration.buses:
+            raise WrongUsage(f'--bus {given}: no such bus; buses: '
+                             f'{", ".join(configuration.buses)}')
+        if name in found or channel in found.values():
+            raise WrongUsage(f'--bus {given}: this {"bus" if name in found else "channel"} is '
+                             'given twice')
+        found[name] = channel
+    return found
 
 
 def _ignore(_: str) -> None:

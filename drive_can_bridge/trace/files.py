@@ -16,7 +16,7 @@ python-can's reader takes most error frames for data frames, ends at the first l
 its own, and does not know the screen.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from datetime import datetime
 from errno import EIO
@@ -61,15 +61,24 @@ class Channels:
     """
     Finds buses by the channels of a trace.
 
-    A word is the name of a bus; if none has it, its channel. A number is its place in the file.
-    The one bus of a file that has only one is meant by a trace without channels, too, and by a
-    channel of another name, if there is no other in the trace.
+    What the user says comes first. Else a word is the name of a bus; if none has it, its channel.
+    Of several buses a number is the place, from 1. The one bus of a file that has only one is
+    meant by a trace without channels, too, and by a channel of another name, if there is no other
+    in the trace.
+
+    :param meant: by their names, the channels of buses as the user gives them.
+    :param tell: takes a line where a number was taken for a place, or is of no bus.
     """
 
-    def __init__(self, buses: Sequence[BusConfiguration]) -> None:
+    def __init__(self, buses: Sequence[BusConfiguration],
+                 meant: Mapping[str, str] | None = None,
+                 tell: Callable[[str], None] = lambda _: None) -> None:
         self._buses = list(buses)
+        self._meant = meant or {}
+        self._tell = tell
         self._found: dict[str | int, BusConfiguration | None] = {}
-        self._known = len(buses) != 1       # what has another name is of no bus of the file
+        # what has another name is of no bus of the file
+        self._known = len(buses) != 1 or bool(self._meant)
         self._adopted: str | int | None = None
 
     def look_ahead(self, channels: Iterable[str | int]) -> None:
@@ -100,7 +109,7 @@ class Channels:
         return self._found[channel]
 
     def _look(self, channel: str | int) -> BusConfiguration | None:
-        if channel == '' and len(self._buses) == 1:
+        if channel == '' and len(self._buses) == 1 and not self._meant:
             return self._buses[0]
         named = self._named(channel)
         if self._adopted is not None:
@@ -108,24 +117,49 @@ class Channels:
         if named is None and not self._known:
             self._adopted, named = channel, self._buses[0]
         self._known |= self._adopted is None
-        return named
+        return named or self._at(channel)
+
+    def missing(self) -> list[str]:
+        """Return what the user meant that is not in the trace, as it was given."""
+        found = {str(channel) for channel in self._found}
+        return [f'{name}={channel}' for name, channel in self._meant.items()
+                if channel not in found]
 
     def _named(self, channel: str | int) -> BusConfiguration | None:
-        """Return the bus that the file itself calls so."""
-        for meant in ('name', 'channel'):
-            for bus in self._buses:
-                if channel == str(getattr(bus, meant)):
-                    return bus
-        if isinstance(channel, int) and 0 <= channel < len(self._buses):
-            return self._buses[channel]
+        """Return the bus that the user or the file itself calls so."""
+        word = str(channel)
+        for bus in self._buses:
+            if self._meant.get(bus.name) == word:
+                return bus
+        others = [bus for bus in self._buses if bus.name not in self._meant]
+        for bus in others:
+            if bus.name == word:
+                return bus
+        # a number is never compared: adapters count from 0, files from 1
+        return next((bus for bus in others if str(bus.channel) == channel), None)
+
+    def _at(self, channel: str | int) -> BusConfiguration | None:
+        """Return the bus in this place of the file."""
+        if not isinstance(channel, int) or self._adopted is not None:
+            return None
+        others = [bus for bus in self._buses if bus.name not in self._meant]
+        if len(self._buses) > 1 and 1 <= channel <= len(self._buses):
+            bus = self._buses[channel - 1]
+            if bus in others:
+                self._tell(f'channel {channel}: bus {bus.name}')
+                return bus
+        if others:
+            self._tell(f'channel {channel}: no bus of the parameter file; if it is one, give '
+                       + ' or '.join(f'--bus {bus.name}={channel}' for bus in others))
         return None
 
     def _ambiguous(self, channels: Iterable[str | int]) -> DriveCanError:
         bus = self._buses[0]
-        names = ', '.join(printable(str(channel)) for channel in channels)
+        names = [printable(str(channel)) for channel in channels]
         return DriveCanError(
-            f'the trace has the channels {names}; which of them is bus {bus.name} of the '
-            f'parameter file? Name it there: buses.{bus.name}.channel (now {bus.channel})')
+            f'the trace has the channels {", ".join(names)}; which of them is bus {bus.name} of '
+            'the parameter file? Give '
+            + ' or '.join(f'--bus {bus.name}={name}' for name in names))
 
 
 #: s between two looks whether a database is written
@@ -207,6 +241,8 @@ class Database(can.SqliteWriter):
 _CANDUMP = ('.log', '.txt', '.candump')
 _TEXT_READERS: dict[str, Any] = {
     '.asc': can.ASCReader, '.csv': can.CSVReader, '.trc': can.TRCReader}
+#: by which number the tools of a format call what python-can calls 0; else they agree
+_FIRST = {'.asc': 1, '.blf': 1}
 _BINARY_READERS = ('.blf', '.db', '.mf4')
 _WRITERS: dict[str, Callable[[Path], Any]] = {
     '.asc': lambda path: can.ASCWriter(open_text(path)),
@@ -520,7 +556,7 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     """
     header: list[str] = []
     known = False
-    reader = _TEXT_READERS[suffix]
+    reader, first = _TEXT_READERS[suffix], _FIRST.get(suffix, 0)
     numbered = _Numbered(stream)
     stream = _from_vector(numbered.lines) if suffix == '.asc' else numbered.lines
 
@@ -538,13 +574,10 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
                     if not known:
                         header, known = lines.taken[:-1], True
                     try:
-                        record = _record(message)
+                        record = _record(message, first)
                     except ValueError as error:
                         wrong(str(error))
                         continue
-                    if reader is can.TRCReader and isinstance(record.channel, int):
-                        # counts buses from 1, also where it names none
-                        record = record._replace(channel=record.channel - 1)
                     yield record
                 return
             except Exception:  # noqa: BLE001  readers raise whatever a line makes them
@@ -562,11 +595,12 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
 
 def _binary_records(path: Path, complain: Complain) -> Iterator[Record]:
     """Read a binary format: behind something damaged there is nothing to hold on to."""
+    first = _FIRST.get(path.suffix.lower(), 0)
     try:
         with can.LogReader(str(path)) as reader:
             for number, message in enumerate(reader, 1):
                 try:
-                    record = _record(message)
+                    record = _record(message, first)
                 except ValueError as error:
                     complain(f'entry {number}: {error}')
                     continue
@@ -605,9 +639,11 @@ def _kind_by_length(data: bytes) -> RecordKind:
     return RecordKind.FD if len(data) in _FD_LENGTHS else DATA
 
 
-def _record(message: can.Message) -> Record:
+def _record(message: can.Message, first: int) -> Record:
+    """Return an entry; the tool of this format calls ``first`` what python-can calls 0."""
     channel = message.channel
-    record = record_of(message, channel if isinstance(channel, (str, int)) else '')
+    record = record_of(message, channel + first if isinstance(channel, int)
+                       else channel if isinstance(channel, str) else '')
     if len(record.data) > _CLASSICAL_MAX and record.kind is DATA:
         record = record._replace(kind=_kind_by_length(record.data))
     return checked(record)

@@ -152,7 +152,7 @@ def test_every_format_keeps_the_frames(suffix: str, tmp_path: Path) -> None:
     if not one_bus:     # the others say that they lose this
         assert [r.sent for r in found] == [True, False, True, False]
         assert [r.channel for r in found] == (
-            ['can0', 'can0', 'can1', 'can1'] if suffix == '.log' else [0, 0, 1, 1])
+            ['can0', 'can0', 'can1', 'can1'] if suffix == '.log' else [1, 1, 2, 2])
 
 
 def test_formats_that_are_refused() -> None:
@@ -406,6 +406,16 @@ def test_an_impossible_entry_does_not_end_a_binary_file(tmp_path: Path) -> None:
     assert complaints == ['entry 2: identifier 9F3h']
 
 
+@pytest.mark.parametrize(('name', 'lines'), [
+    ('a.asc', 'base hex  timestamps absolute\n   0.5 3  1F3  Rx   d 1 05\n'),
+    ('a.trc', ';$FILEVERSION=1.3\n;$STARTTIME=45000.5\n;\n'
+              '     1)         1.0 3  Rx         01F3  -  1  05\n')])
+def test_channels_are_those_of_the_tool_of_the_format(
+        name: str, lines: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(lines)
+    assert [each.channel for each in read_records(tmp_path / name, print)] == [3]
+
+
 def test_a_byte_order_mark_costs_nothing(tmp_path: Path) -> None:
     path = tmp_path / 'trace.log'
     path.write_text(''.join(map(format_record, TRACE)), encoding='utf-8-sig')
@@ -478,13 +488,17 @@ def bus(name: str, channel: str, interface: str = 'socketcan') -> BusConfigurati
 
 @pytest.mark.parametrize(('buses', 'said', 'found'), [
     ([bus('main', 'can0'), bus('aux', 'can1')], ['can0', 'can1'],
-     {'main': 'main', 'can0': 'main', 'can1': 'aux', 'can2': None, 1: 'aux'}),
+     {'main': 'main', 'can0': 'main', 'can1': 'aux', 'can2': None, 1: 'main', 2: 'aux',
+      3: None, 0: None}),
     ([bus('can1', 'can0'), bus('can0', 'can1')], ['can1', 'can0'],
      {'can0': 'can0', 'can1': 'can1'}),
     ([bus('main', 'can0'), bus('can0', 'can2')], ['main', 'can2'],
      {'main': 'main', 'can0': 'can0', 'can2': 'can0'}),
     ([bus('a', 'b'), bus('b', '/dev/ttyACM0', 'slcan')], ['a', 'b'],
      {'a': 'a', 'b': 'b', '/dev/ttyACM0': 'b'}),
+    # of kvaser: the number of an adapter is no place
+    ([bus('a', '0', 'kvaser'), bus('b', '1', 'kvaser')], ['a', 'b'],
+     {1: 'a', 2: 'b', '1': 'b'}),
     ([bus('a', 'can0'), bus('b', 'can0')], ['a', 'b'], {'a': 'a', 'b': 'b', 'can0': 'a'}),
 ])
 def test_which_bus_a_trace_means(buses: list[BusConfiguration], said: list[str],
@@ -507,8 +521,8 @@ MAIN = bus('main', 'can0')
     (['can0', 'can7'], ['can0']),
     (['can7', 'can0'], ['can0']),
     (['can7', 'can8', 'main', ''], ['main', '']),
-    ([5, 0], [0]),
     ([5], [5]),
+    ([0], [0]),
 ])
 def test_one_bus_is_one_channel(trace: list[str | int], meant: list[str | int]) -> None:
     channels = Channels([MAIN])
@@ -518,13 +532,47 @@ def test_one_bus_is_one_channel(trace: list[str | int], meant: list[str | int]) 
 
 #: what is said of two channels
 WHICH = ('the trace has the channels can7, can8; which of them is bus main of the parameter '
-         'file? Name it there: buses.main.channel (now can0)')
+         'file? Give --bus main=can7 or --bus main=can8')
 
 
 def test_of_two_foreign_channels_none_is_taken() -> None:
     with pytest.raises(DriveCanError) as refused:
         Channels([MAIN]).look_ahead(['can7', '', 'can8', 'can7'])
     assert str(refused.value) == WHICH
+
+
+def test_of_two_numbers_none_is_taken() -> None:
+    with pytest.raises(DriveCanError, match='Give --bus main=1 or --bus main=2'):
+        Channels([MAIN]).look_ahead([1, 2])
+
+
+@pytest.mark.parametrize(('meant', 'found', 'told', 'missing'), [
+    ({}, {1: 'main', 3: None, 'aux': 'aux'},
+     ['channel 1: bus main', 'channel 3: no bus of the parameter file; if it is one, give '
+      '--bus main=3 or --bus aux=3'], []),
+    ({'main': '3'}, {3: 'main', 2: 'aux', 1: None, 'can0': None},
+     ['channel 2: bus aux', 'channel 1: no bus of the parameter file; if it is one, give '
+      '--bus aux=1'], []),
+    ({'main': 'can1', 'aux': '7'}, {'can1': 'main', 7: 'aux', 1: None, 'aux': None}, [], []),
+    ({'aux': 'x'}, {'can1': None}, [], ['aux=x']),
+])
+def test_what_the_user_says_of_channels(
+        meant: dict[str, str], found: dict[str | int, str | None], told: list[str],
+        missing: list[str]) -> None:
+    lines: list[str] = []
+    channels = Channels([MAIN, bus('aux', 'can1')], meant, lines.append)
+    for _ in range(2):
+        assert {word: each and each.name for word in found
+                for each in [channels.find(word)]} == found
+    assert lines == told
+    assert channels.missing() == missing
+
+
+def test_what_the_user_says_of_the_one_bus() -> None:
+    channels = Channels([MAIN], {'main': '3'})
+    channels.look_ahead([1, 2, 3])
+    assert [channels.find(each) for each in (1, 2, 3, '', 'can0')] == [
+        None, None, MAIN, None, None]
 
 
 @pytest.mark.parametrize('second', ['can8', 'can0'])
