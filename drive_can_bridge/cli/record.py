@@ -100,6 +100,8 @@ def define(parser: ArgumentParser) -> None:
     add_seconds(parser)
     parser.add_argument('--rotate', metavar='MB', type=above_zero,
                         help='begin a new file when one has that size: FILE_000, FILE_001, …')
+    parser.add_argument('--wireshark', action='store_true',
+                        help='write a .log that Wireshark opens: without directions')
     parser.add_argument('--json', action='store_true',
                         help='at the end, a JSON document for each bus: bus, file (the last), '
                              'files (how many), frames, sent, error_frames, load_percent, seconds')
@@ -120,6 +122,10 @@ def run(args: Namespace) -> int:
         check_writable(args.output, len(buses))
     except UnknownFormat as error:
         raise WrongUsage(str(error)) from None
+    if args.wireshark and args.output.suffix.lower() != '.log':
+        raise WrongUsage(f'--wireshark: for .log, not {args.output.suffix}')
+    if args.wireshark:
+        complain('warning: --wireshark does not keep directions')
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
         complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
     status = _Status(sys.stderr)
@@ -127,7 +133,8 @@ def run(args: Namespace) -> int:
         channels = labels(buses)
         counters = {channels[bus.name]: _Counter(bus.name, bus.bitrate, args.clock.now)
                     for bus in buses}
-        output = _Rotating(args.output, list(counters), args.rotate)
+        output = _Rotating(args.output, list(counters), args.rotate,
+                           directions=not args.wireshark)
         try:
             _record(taps.records(args.seconds), args.clock, output, counters, status)
         except KeyboardInterrupt:
@@ -218,7 +225,9 @@ class _Rotating:
     :ivar count: how many there are.
     """
 
-    def __init__(self, path: Path, channels: list[str], megabytes: float | None) -> None:
+    def __init__(self, path: Path, channels: list[str], megabytes: float | None, *,
+                 directions: bool) -> None:
+        self._directions = directions
         self._path = path
         self._channels = channels
         self._limit = None if megabytes is None else megabytes * _MEGABYTE
@@ -230,7 +239,7 @@ class _Rotating:
 
     def _open(self) -> TraceWriter:
         path = self._path if self._limit is None else self._part(self.count - 1)
-        return TraceWriter(path, self._channels)
+        return TraceWriter(path, self._channels, directions=self._directions)
 
     def _part(self, number: int) -> Path:
         return self._path.with_name(f'{self._path.stem}_{number:03d}{self._path.suffix}')

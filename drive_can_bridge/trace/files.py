@@ -252,9 +252,9 @@ _WRITERS: dict[str, Callable[[Path], Any]] = {
     '.trc': lambda path: can.TRCWriter(open_text(path))}
 #: what the formats cannot hold
 LOSSES = {
-    '.csv': ('which bus a frame was on', 'its direction'),
-    '.db': ('which bus a frame was on', 'its direction'),
-    '.trc': ('error frames', 'the names of buses'),
+    '.csv': ('which bus a frame was on', 'its direction', 'that a frame is one of CAN FD'),
+    '.db': ('which bus a frame was on', 'its direction', 'that a frame is one of CAN FD'),
+    '.trc': ('error frames', 'remote frames', 'CAN FD frames', 'the names of buses'),
     '.asc': ('the details of error frames', 'the names of buses'),
     '.blf': ('the names of buses',),
 }
@@ -658,16 +658,20 @@ class TraceWriter:
 
     :param channels: the buses, in the order of the parameter file: formats without names number
         them.
+    :param directions: in a .log; without them, Wireshark reads it.
     :raises UnknownFormat: no format has this suffix, or it cannot hold several buses.
     :raises OSError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, channels: Sequence[str]) -> None:
+    def __init__(self, path: Path, channels: Sequence[str], *, directions: bool = True) -> None:
         check_writable(path, len(channels))
         self.path = path
         self._numbers = {channel: number for number, channel in enumerate(channels)}
         self._writer: Any = None
         self._file: TextIO | None = None
+        self._directions = directions
+        # python-can logs a line for each of the others
+        self._only_data = path.suffix.lower() == '.trc'
         if path.suffix.lower() == '.log':
             self._file = open_text(path)
         else:
@@ -676,7 +680,10 @@ class TraceWriter:
     def write(self, record: Record) -> None:
         """Write an entry."""
         if self._file is not None:
-            self._file.write(format_record(record))
+            self._file.write(format_record(
+                record if self._directions else record._replace(sent=None)))
+            return
+        if self._only_data and record.kind is not DATA:
             return
         self._writer.on_message_received(message_of(
             record, self._numbers.get(str(record.channel), 0)))

@@ -155,6 +155,28 @@ def test_every_format_keeps_the_frames(suffix: str, tmp_path: Path) -> None:
             ['can0', 'can0', 'can1', 'can1'] if suffix == '.log' else [1, 1, 2, 2])
 
 
+def test_a_log_for_wireshark_has_no_directions(tmp_path: Path) -> None:
+    """Tshark 4.0 refuses candump's lines that end in R or T."""
+    path = tmp_path / 'trace.log'
+    writer = TraceWriter(path, ['can0', 'can1'], directions=False)
+    for record in TRACE[:2]:
+        writer.write(record)
+    writer.close()
+    assert path.read_text() == ('(1700000000.000000) can0 003FFFF0#05DC000000000000\n'
+                                '(1700000000.001000) can0 103FFFF0#1122\n')
+
+
+def test_what_a_trc_cannot_hold_costs_no_line_each(
+        tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / 'trace.trc'
+    writer = TraceWriter(path, ['can0', 'can1'])
+    for kind in (DATA, ERROR, RecordKind.REMOTE, RecordKind.FD):
+        writer.write(TRACE[0]._replace(kind=kind))
+    writer.close()
+    assert caplog.messages == []
+    assert len(list(read_records(path, print))) == 1
+
+
 def test_formats_that_are_refused() -> None:
     with pytest.raises(UnknownFormat, match='no trace is written with the suffix .pcap'):
         check_writable(Path('a.pcap'), 1)
