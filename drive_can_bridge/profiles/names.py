@@ -214,7 +214,7 @@ def split_step(text: str) -> tuple[str, float, str]:
     plain = match[1] == '[' or number < 1.0 or number == 1.0 and (
         len(behind) > 1 or behind in 's%\N{DEGREE SIGN}') and behind.lower() not in _OTHER_WORDS
     return (text[:match.start()].strip(), number, found) if (
-        found and number > 0.0 and whole and plain) else (text, 1.0, '')
+        found and 1e-9 <= number <= 1e4 and whole and plain) else (text, 1.0, '')
 
 
 def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -> str:

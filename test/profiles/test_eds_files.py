@@ -253,9 +253,9 @@ def test_a_control_word_makes_it_a_drive(tmp_path: Path) -> None:
     ('Winding [%]', 1.0, '%'), ('Winding (0.1 A)', 0.1, 'A'),
     ('Winding (W)', 1.0, ''), ('Winding (min)', 1.0, ''), ('Winding (60 s)', 1.0, ''),
     ('Winding [5 s]', 1.0, ''), ('Winding [0..100 %]', 1.0, ''), ('Winding(s)', 1.0, ''),
-    ('Winding [set 2]', 1.0, '')])
+    ('Winding [set 2]', 1.0, ''), ('Winding [1e-30 V]', 1.0, ''), ('Winding [1e9 Hz]', 1.0, '')])
 def test_units_at_the_end_of_names(tmp_path: Path, name: str, scale: float, unit: str) -> None:
-    made = bring(tmp_path, *DRIVE, ('3301', name, 6, 'rw', 'HighLimit=40'))
+    made = bring(tmp_path, *DRIVE, ('3301', name, 7, 'rw', 'HighLimit=40'))
     [winding] = made.parameters.values()
     assert (winding.scale, winding.unit, winding.maximum) == (scale, unit, 40 * scale)
     assert ('at the end of the name' in made.built.text) is bool(unit)
