@@ -21,10 +21,11 @@ from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
     JointConfiguration, Quantity, si_factor)
+from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.core.text import nearest, seems_limit, show
+from drive_can_bridge.core.text import duration_text, nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 
@@ -289,6 +290,10 @@ def check_joint_names(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
                            name=drive.joint.name, owner=owners[drive.joint.name]))
 
 
+#: s within which a counter that wraps is warned about
+_DAY = 86400.0
+
+
 class _JointChecker:
     """
     Check one ``joint`` section.
@@ -334,7 +339,47 @@ class _JointChecker:
             self._tree.suspicious(
                 (*self._path, 'pole_pairs'),
                 complaints.no_effect(unit=ELECTRICAL_FREQUENCY))
+        self._check_counter(named, factors, values['continuous'])
         return JointConfiguration(factors=factors, **values)
+
+    def _check_counter(self, named: dict[str, str], factors: dict[str, float],
+                       continuous: bool | int) -> None:
+        """Check what becomes of the position where its counter wraps."""
+        position, command = named.get('position'), named.get(f'position{_COMMAND}')
+        if continuous is not False and position is None:
+            self._wrong('continuous', complaints.continuous_without_position())
+        if continuous is not False and command is not None:
+            self._wrong('continuous', complaints.continuous_commanded(name=command))
+        if position is None or command is not None:
+            return
+        counter = next(each for each in self._drive.cyclic_response if each.name == position)
+        steps, most = steps_of(counter, continuous), 1 << counter.type.bits
+        if steps > most:
+            self._wrong('continuous', complaints.continuous_too_wide(
+                steps=steps, bits=counter.type.bits, name=position, most=most))
+            return
+        setpoint = next((each for each in self._drive.cyclic_request
+                         if each.name == named.get(f'velocity{_COMMAND}')), None)
+        limits = [] if setpoint is None else [
+            abs(limit) for limit in (setpoint.minimum, setpoint.maximum) if limit is not None]
+        if setpoint is None or not any(limits):
+            return
+        speed = max(limits)
+        # s that a raw step takes
+        step = abs((counter.scale if counter.scaled else 1.0) * factors[position]
+                   / (speed * factors[setpoint.name]))
+        facts = {'speed': speed, 'unit': setpoint.unit, 'name': position}
+        gap = (self._drive.missed_limit + 1) * self._drive.period
+        if continuous is False:
+            # from the drive's own zero
+            after = step * (most // 2 if counter.type.signed else most)
+            if after < _DAY:
+                self._tree.suspicious((*self._path, 'position'), complaints.position_wraps(
+                    after=duration_text(after), **facts))
+        elif step * steps / 2 <= gap:
+            self._wrong('continuous', complaints.continuous_too_fast(
+                steps=steps, passed=duration_text(step * steps / 2), gap=duration_text(gap),
+                **facts))
 
     def _wrong(self, key: str, message: Sentence) -> None:
         self._tree.wrong((*self._path, key), message)

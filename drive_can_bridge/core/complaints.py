@@ -212,6 +212,19 @@ no_neutral_from = Text(
     '{name!r} has no neutral_from: without a command the axis goes to {neutral!r} {unit}, '
     'wherever it stands')
 no_effect = Text('has no effect: no parameter of the joint has the unit {unit}')
+continuous_without_position = Text('goes on with a position, allowed with position only')
+continuous_commanded = Text(
+    'is for axes that turn on and on, and {name!r} is a position that is commanded, allowed is '
+    'false with position_command')
+continuous_too_wide = Text(
+    '{steps} steps are more than the {bits} bits of {name!r} have, allowed is 2 to {most}')
+continuous_too_fast = Text(
+    'at {speed:g} {unit} half of the {steps} steps of {name!r} passes in {passed}, samples may '
+    'be {gap} apart (missed_limit + 1 periods): which way it turned is not known; allowed is a '
+    'shorter period, a smaller missed_limit, a lower maximum or a wider counter')
+position_wraps = Text(
+    'at {speed:g} {unit} the counter of {name!r} wraps after {after}, the joint jumps; an axis '
+    'that turns on and on has continuous: true')
 joint_of_other = Text(
     '{name!r} is the joint of drives.{owner} already, allowed is a name of its own')
 

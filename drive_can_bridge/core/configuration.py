@@ -59,6 +59,9 @@ class JointConfiguration:
 
     The ``…_factor`` fields convert a physical value in the profile's unit into the joint's SI
     value: ``si = value * factor`` (gear ratio, pole pairs and unit are in it).
+
+    :param continuous: the axis turns on and on, and its position counter wraps: true: at the width
+        of its type; a number: after so many raw steps.
     """
 
     name: str
@@ -70,6 +73,7 @@ class JointConfiguration:
     effort_command: str | None = None
     gear_ratio: float = 1.0
     pole_pairs: int = 1
+    continuous: bool | int = False
     #: parameter name -> factor, for every parameter named above
     factors: dict[str, float] = field(default_factory=dict)
 

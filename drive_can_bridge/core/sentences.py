@@ -249,6 +249,9 @@ still_braking = Text(
     'still braking: the word stays',
     do='wait until it stands; see what diagnostics say of stops_by')
 word_sent_last = Text('told {word:04X}h', do='see what keeps the drive in its state')
+position_began_again = Text(
+    'the position of {joint} begins again at {position:.6g} rad, as the drive has it',
+    do='nothing, or tell what adds up its way (odometry) where the axis is')
 no_homing = Text('this drive has no homing', do='look at its own ways to find a reference')
 homing = Text('homing', do='wait until it has ended, or stop the drive')
 homing_under_way = Text('homing is under way', do='wait until it has ended, or stop the drive')

@@ -136,6 +136,19 @@ def is_ros_name(name: str) -> bool:
     return len(name) <= TEXT_MAX and _ROS_NAME.fullmatch(name) is not None
 
 
+def duration_text(seconds: float) -> str:
+    """
+    Write how long something takes, as people do.
+
+    >>> duration_text(0.0182), duration_text(4295)
+    ('0.018 s', '1.2 h')
+    """
+    for unit, name in ((3600.0, 'h'), (60.0, 'min')):
+        if seconds >= unit:
+            return f'{seconds / unit:.2g} {name}'
+    return f'{seconds:.2g} s'
+
+
 def counted(number: int, one: str, many: str = '') -> str:
     """Return a number of things; without ``many`` an s makes it the plural."""
     return f'{number} {one if number == 1 else many or one + "s"}'

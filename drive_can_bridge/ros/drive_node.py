@@ -124,7 +124,8 @@ class DriveNode(DriveListener):
                   parameter_thread: ServiceThread) -> None:
         """Make the topics and services."""
         drive, session = self.drive, self.session
-        self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at)
+        self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at,
+                                       self._log.info)
         self._request = RequestTopic(self.node, session.sent, stamps)
         self._online = publisher(self.node, Bool, '~/online', latched_quality())
         self._tell_online(False)
@@ -230,6 +231,9 @@ class DriveNode(DriveListener):
 
     def _handle_event(self, event: Event) -> None:
         if isinstance(event, (RequestCompleted, ControlCompleted)):
+            if (isinstance(event, ControlCompleted) and event.success
+                    and event.request.action is ControlAction.HOME):
+                self.samples.begin_again()
             completed = self._asked.pop(event.request, None)
             # else asked for at another member of a group, or answered for a defect
             if completed is not None:

@@ -18,8 +18,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from drive_can_bridge.core.configuration import DriveConfiguration, JointConfiguration
+from drive_can_bridge.core.continuous import ContinuousPosition
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.process_image import LastSent
+from drive_can_bridge.core.sentences import position_began_again
 from drive_can_bridge.ros.middleware import (
     Audience, COUNT_PERIOD, latched_quality, publisher, state_quality)
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
@@ -188,20 +190,26 @@ class SamplePublisher:
         ``cyclic_response``.
     :param stamp: (receive time of the steady clock) -> seconds and nanoseconds; asked once for
         each sample, when it arrives: the clock may be set before somebody else wants to know.
-    :ivar last: the raw integers of the last sample, its receive time and its stamp, in one,
+    :param inform: takes what people should know.
+    :ivar last: the raw integers of the last sample (the position of a ``continuous`` joint without
+        wraps), its receive time and its stamp, in one,
         because other threads look at them; None: the drive is gone.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, parameters: tuple[Parameter, ...],
-                 stamp: Callable[[float], Stamp]) -> None:
+                 stamp: Callable[[float], Stamp],
+                 inform: Callable[[str], None] = lambda text: None) -> None:
         self._stamp = stamp
+        self._inform = inform
         self._converters = [parameter.value_from_raw for parameter in parameters]
         self._values = [ValueTopic(node, parameter, slot)
                         for slot, parameter in enumerate(parameters)]
         mapped = drive.cyclic_response
         self._samples: list[EventTopic | JointTopic] = [
             EventTopic(node, '~/response', mapped, len(parameters) - len(mapped))]
-        joint = drive.joint
+        joint = self._joint = drive.joint
+        self._continuous = (ContinuousPosition(joint, parameters)
+                            if joint is not None and joint.continuous is not False else None)
         if joint is not None and (joint.position or joint.velocity or joint.effort):
             self._samples.append(JointTopic(node, joint, parameters))
         self._bits = [BitTopics(node, parameter, slot)
@@ -216,12 +224,17 @@ class SamplePublisher:
         if received_at >= self._count_at:
             self._look_who_subscribes(received_at)
         stamp = self._stamp(received_at)
-        self.last = raws, received_at, stamp
+        turned = raws if self._continuous is None else self._without_wraps(raws)
+        self.last = turned, received_at, stamp
         if self._wanted_values or self._wanted_samples:
             values = [convert(raw) for convert, raw in zip(self._converters, raws)]
             present = len(values)
             for sample in self._wanted_samples:     # first: these are the stamped ones
-                sample.publish(values, stamp)
+                if turned is not raws and isinstance(sample, JointTopic):
+                    sample.publish([convert(raw) for convert, raw in zip(
+                        self._converters, turned)], stamp)
+                else:
+                    sample.publish(values, stamp)
             for topic in self._wanted_values:
                 if topic.slot < present:
                     topic.publish(values[topic.slot])
@@ -232,8 +245,27 @@ class SamplePublisher:
     def forget(self) -> None:
         """Record that the drive is gone: nothing known of it is current."""
         self.last = None
+        self.begin_again()
         for bits in self._bits:
             bits.forget()
+
+    def begin_again(self) -> None:
+        """Take the position of a joint from the drive anew: it was homed, or away."""
+        if self._continuous is not None:
+            self._continuous.begin_again()
+
+    def _without_wraps(self, raws: tuple[int, ...]) -> tuple[int, ...]:
+        """Return a sample in which the position of the joint has no wraps."""
+        continuous, joint = self._continuous, self._joint
+        if continuous is None or joint is None or continuous.slot >= len(raws):
+            return raws
+        slot = continuous.slot
+        raw = continuous.take(raws[slot])
+        if continuous.begun_again and joint.position is not None:
+            self._inform(position_began_again(
+                joint=joint.name, position=self._converters[slot](raw)
+                * joint.factors[joint.position]))
+        return (*raws[:slot], raw, *raws[slot + 1:])
 
     def _look_who_subscribes(self, now: float) -> None:
         self._count_at = now + COUNT_PERIOD

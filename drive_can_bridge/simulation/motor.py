@@ -24,6 +24,7 @@ import math
 import random
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.control import ENDS, machine_of, Operation, Report, StatusWord
@@ -52,6 +53,8 @@ COAST_TIME = 4.0
 SINKING_SPEED = 0.1
 
 WARNING_TEMPERATURE = 80.0
+#: raw steps before its end at which a counter that wraps begins, at most
+_BEFORE_END = 1000
 #: what a fault code shows while there is a fault
 FAULT_CODE = 7
 
@@ -177,6 +180,7 @@ class MotorPlant:
                  movable: Mapping[str, Parameter] | None = None) -> None:
         self.registers = registers
         self.control = control = configuration.profile.control
+        self._joint = configuration.joint
         self.operation = operation or Operation(machine_of(control))
         self._mechanics = mechanics
         self._noise = random.Random(configuration.name)
@@ -261,12 +265,24 @@ class MotorPlant:
         if quantity is Quantity.POSITION:
             where = actual or (lambda: quantities.position_value(
                 parameter, self.motor.shaft.position * self._turns))
+            if self._joint is not None and parameter.name == self._joint.position and (
+                    self._joint.continuous is not False):
+                return partial(self._counter, parameter, self._joint.continuous, where)
             return lambda: quantities.clamp(nearest(parameter, where(), ends) + self._jitter, ends)
         word = StatusWord(parameter, self.control)
         if actual is None and word:
             return lambda: word.compose(self._report(), self.registers.plain(parameter.name))
         measure = actual or (quantity and self._measure(parameter, quantity))
         return (lambda: nearest(parameter, measure(), ends)) if measure else None
+
+    def _counter(self, parameter: Parameter, continuous: bool | int,
+                 where: Callable[[], float]) -> int:
+        """Return what a counter shows that wraps; it begins near its end."""
+        steps = steps_of(parameter, continuous)
+        low = -(steps // 2) if parameter.type.signed else 0
+        first = low + steps - min(steps // 8, _BEFORE_END)
+        moved = math.floor(parameter.steps(where()) - parameter.steps(0.0) + 0.5) + self._jitter
+        return (first + moved - low) % steps + low
 
     def _measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
         """Return what a quantity of the motor amounts to in the parameter's unit."""

@@ -64,6 +64,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('drives.conveyor.joint.velocity', 'actual'),
         ('drives.conveyor.joint.gear_ratio', 1.0),
         ('drives.conveyor.joint.pole_pairs', 1),
+        ('drives.conveyor.joint.continuous', False),
     ]
     assert all(parameter.description for parameter in declared)
     assert [parameter.name for parameter in declared if parameter.dynamic] == [

@@ -135,3 +135,41 @@ def test_pole_pairs_without_a_frequency(tmp_path: Path) -> None:
 
 def test_no_joint(tmp_path: Path) -> None:
     assert load(tmp_path).drives['conveyor'].joint is None
+
+
+TURNING = 'joint: {name: a, position: position, velocity_command: speed'
+
+
+@pytest.mark.parametrize(('keys', 'key', 'found'), [
+    # 2 of 4 revolutions in 40 ms; samples may be 4 periods of 20 ms apart
+    (f'{TURNING}, continuous: 4}}', 'continuous', says(
+        'continuous_too_fast', speed=3000.0, unit='rpm', steps=4, name='position',
+        passed='0.04 s', gap='0.08 s')),
+    (f'{TURNING}, continuous: 70000}}', 'continuous', says(
+        'continuous_too_wide', steps=70000, bits=16, name='position', most=65536)),
+    (f'{TURNING}, continuous: 1}}', 'continuous', says(
+        'out_of_range', value=1, allowed='true or false or an integer of 2 to 4294967296')),
+    ('joint: {name: a, velocity_command: speed, continuous: true}', 'continuous',
+     says('continuous_without_position')),
+    ('joint: {name: a, position: position, position_command: angle, continuous: true}',
+     'continuous', says('continuous_commanded', name='angle')),
+])
+def test_problem_of_a_counter(tmp_path: Path, keys: str, key: str, found: says) -> None:
+    text = changed(FILE, '[speed, limit]', '[speed, angle]')
+    text = changed(text, '[actual, current, status]', '[actual, position, status]')
+    assert problems(tmp_path, changed(text, 'rearm: neutral', keys)) == [
+        at(f'f.yaml:18: drives.conveyor.joint.{key}', found.code, **found.fields)]
+
+
+@pytest.mark.parametrize(('keys', 'wraps'), [
+    (f'{TURNING}, gear_ratio: 20.0}}', True), (f'{TURNING}, continuous: true}}', False),
+    (f'{TURNING}, continuous: 9}}', False),
+    ('joint: {name: a, position: position}', False)])
+def test_a_counter_that_wraps_within_a_day_is_a_warning(tmp_path: Path, keys: str,
+                                                        wraps: bool) -> None:
+    text = changed(FILE, '[actual, current, status]', '[actual, position, status]')
+    text = changed(text, 'rearm: neutral', keys)
+    # 32768 revolutions at 50 a second
+    found = [at('f.yaml:18: drives.conveyor.joint.position', 'position_wraps', speed=3000.0,
+                unit='rpm', name='position', after='11 min')]
+    assert warnings(tmp_path, text) == (found if wraps else [])

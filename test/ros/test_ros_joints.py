@@ -9,8 +9,10 @@ from clients import Client, wait_until
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from waiting import clock, pause
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.exchange.member import Member
 
 STATES, COMMANDS = '/drive_can_bridge/joint_states', '/drive_can_bridge/joint_commands'
@@ -374,3 +376,32 @@ def test_cleaned_up_and_configured_anew(bridge: StartBridge, client: Client) -> 
     topic.wait(lambda m: len(m.name) == 3)
     client.publish(COMMANDS, JointState(name=['wj'], velocity=[0.0]))
     wait_until(lambda: one.node.drives['west'].session.setpoints.items[0].armed)
+
+
+def test_a_joint_that_turns_on_and_on_goes_on_where_its_counter_wraps(
+        bridge: StartBridge, client: Client) -> None:
+    """int16 at 0.1 deg: from 3276.7 deg on to -3276.8 deg."""
+    one = bridge(parameters(west=wheel(1, {
+        'name': 'wj', 'position': 'actual_position', 'continuous': True})))
+    both = [client.topic(STATES, JointState), client.topic('/west/joint_state', JointState)]
+    one.online()
+    client.listen()
+    west = one.played['west']
+    def lost_and_found(degrees: float) -> None:
+        west.fault('silent')
+        both[0].wait(unknown)
+        both[1].messages.clear()
+        west.set_value('actual_position', degrees)
+        west.fault('ok')
+        for topic in both:
+            topic.wait(lambda m: same(m.position, [math.radians(degrees)]))
+        client.wait_logged(sentences.position_began_again(
+            joint='wj', position=math.radians(degrees)))
+    lost_and_found(3000.0)
+    for degrees, joint in ((-3000.0, 3553.6), (0.0, 6553.6), (3000.0, 9553.6)):
+        west.set_value('actual_position', degrees)
+        for topic in both:
+            topic.wait(lambda m, joint=joint: same(m.position, [math.radians(joint)]))
+    # what everybody else reads is what the drive has
+    client.topic('/west/actual_position', Float64).wait(lambda m: abs(m.data - 3000.0) < 1e-6)
+    lost_and_found(20.0)
