@@ -61,7 +61,7 @@ def test_a_directory_with_the_name_of_the_package_does_not_matter(
 @pytest.mark.usefixtures('programs')
 def test_a_signal_to_a_child_that_has_hardly_begun(tmp_path: Path) -> None:
     """Until a program takes signals they wait, from its first moment on."""
-    child = Child('the child', 'drive_can', '--version', log=tmp_path / 'log')
+    child = Child('the child', 'drive_can', 'profile', 'list', log=tmp_path / 'log')
     child.ask_to_end(signal.SIGINT)
     assert child.wait(20.0)
     assert (child.code, child.errors()) == (130, 'drive_can: interrupted\n')
