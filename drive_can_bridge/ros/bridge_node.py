@@ -512,6 +512,7 @@ class BridgeNode(LifecycleNode):
     def destroy_node(self) -> None:
         """Take the node out of the graph, when everything is written that it had to say."""
         self.log.close()
+        self._ended = True      # rclpy goes on until no service is left
         super().destroy_node()
 
     @property

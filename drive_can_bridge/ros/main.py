@@ -161,6 +161,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str]) -> int:
     LibraryLogs(partial(libraries.warn, few=FEW), clock.now).install()
     if bridge.is_empty:
         bridge.log.fatal(_nothing_configured(bridge, arguments))
+        bridge.close()
         bridge.destroy_node()
         return 1
     spinner.start()

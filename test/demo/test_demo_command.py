@@ -64,7 +64,7 @@ def test_a_signal_to_a_child_that_has_hardly_begun(tmp_path: Path) -> None:
     child = Child('the child', 'drive_can', 'profile', 'list', log=tmp_path / 'log')
     child.ask_to_end(signal.SIGINT)
     assert child.wait(20.0)
-    assert (child.code, child.errors()) == (130, 'drive_can: interrupted\n')
+    assert (child.code, child.errors()) == (130, 'drive_can profile: interrupted\n')
 
 
 def test_a_terminal_that_has_gone_is_not_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
