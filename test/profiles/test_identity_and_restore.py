@@ -65,7 +65,8 @@ def test_without_the_sections(tmp_path: Path) -> None:
     ('[firmware, serial]', '[firmware, firmware]',
      ["t.yaml:2: identity: 'firmware' stands twice, allowed is once"]),
     ('[firmware, serial]', 'firmware',
-     ["t.yaml:2: identity: 'firmware' is a string, allowed is a list of strings"]),
+     ["t.yaml:2: identity: 'firmware' is a string, allowed is a list of strings: write "
+      '[firmware]']),
     ('before:', 'befor:',
      ["t.yaml:4: restore.befor: unknown key, did you mean 'before'?"]),
     ('ramp: 0.5', 'firmware: 1',

@@ -31,8 +31,8 @@ from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
     ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
-from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
+from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
 from drive_can_bridge.ros.recognition import bridges_among, drives_among
