@@ -200,7 +200,7 @@ def test_terminals_that_lack_characters(encoding: str, subcommand: str) -> None:
 ])
 def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
                            error: BaseException, code: int, line: str) -> None:
-    def fail(*_: object) -> int:
+    def fail(*_: object, **more: object) -> int:
         raise error
 
     monkeypatch.setattr(front_end, '_run', fail)
@@ -209,7 +209,7 @@ def test_never_a_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
 
 
 def test_an_interrupt_is_how_the_endless_ones_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(*_: object) -> int:
+    def stop(*_: object, **more: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(front_end, '_run', stop)
@@ -231,7 +231,7 @@ def handlers(foreground: None) -> Iterator[None]:
 @pytest.mark.parametrize('words', ['simulate', 'record', 'decode --live', 'read --watch=1'])
 def test_they_end_so_by_a_signal_and_when_their_terminal_is_closed(
         monkeypatch: pytest.MonkeyPatch, words: str, number: int) -> None:
-    def stop(*_: object) -> int:
+    def stop(*_: object, **more: object) -> int:
         if signal.getsignal(number) is not signal.SIG_DFL:
             signal.raise_signal(number)
         return 3
@@ -243,7 +243,7 @@ def test_they_end_so_by_a_signal_and_when_their_terminal_is_closed(
 
 @pytest.mark.usefixtures('handlers')
 def test_a_terminal_that_is_not_to_matter_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    def go_on(*_: object) -> int:
+    def go_on(*_: object, **more: object) -> int:
         signal.raise_signal(signal.SIGHUP)
         return 3
     signal.signal(signal.SIGHUP, signal.SIG_IGN)    # as nohup has it

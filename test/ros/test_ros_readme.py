@@ -6,6 +6,7 @@ import re
 import shlex
 
 from bridges import StartBridge
+from by_hand import Run
 import pytest
 
 import drive_can_bridge
@@ -25,8 +26,7 @@ def commands() -> list[list[str]]:
 
 
 def test_each_command_does_what_it_says(
-        bridge: StartBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        bridge: StartBridge, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text, = re.findall(r'```yaml\n(# my_drives\.yaml\n.*?)```', README, re.DOTALL)
     monkeypatch.chdir(tmp_path)
     Path('my_drives.yaml').write_text(text, encoding='utf-8')
@@ -45,9 +45,8 @@ def test_each_command_does_what_it_says(
     monkeypatch.setattr(jog.Jog, '_judge', look)
     for words in commands():
         if words[0] not in _OTHERS:
-            capsys.readouterr()
-            yes = ['--yes'] if words[0] == 'jog' else []
-            assert main([*words, *yes]) == 0, (words, capsys.readouterr())
+            code, lines, errors = run(*words, *(['--yes'] if words[0] == 'jog' else []))
+            assert code == 0, (words, lines, errors)
     wanted = next(float(words[-1]) for words in commands() if words[0] == 'jog')
     assert fastest == pytest.approx(wanted, abs=0.1)
     assert Path('axis.yaml').read_text(encoding='utf-8').count(
