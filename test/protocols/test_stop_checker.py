@@ -50,6 +50,13 @@ def test_maps_that_nobody_has_looked_at_since_are_the_other() -> None:
     assert not broken(kind, told, lenient=False)
 
 
+@pytest.mark.parametrize('seconds', [0.0, 0.2, 1.0])
+def test_such_a_drive_is_stopped_when_the_bus_is_back(seconds: float) -> None:
+    """Its maps are read before anything else then; and what is told by number reaches it."""
+    assert not broken('29 bit, no word', (
+        ('quiet', 0.013), ('maps', 0.9), ('bus down', 0.013), ('bus up', seconds)))
+
+
 @pytest.mark.parametrize('kind', [kind for kind, entry in KINDS.items() if entry.maps])
 @pytest.mark.parametrize('end', ['end', 'bus down'])
 def test_drive_that_is_silent_when_its_response_map_differs_is_named(kind: str, end: str) -> None:
