@@ -104,7 +104,7 @@ class Canable2(Canable):
 
 class Usbtin(Firmware):
     """
-    USBtin, firmware 1.4 (seen).
+    USBtin, firmware 1.4 (its parser was run by others; here by what it answered).
 
     CR, or BEL for what it does not want: an empty line, ``C`` when closed, ``O`` and ``S`` when
     open. Lines end at 99 characters, the rest overwrites the last one. What follows the data of a
@@ -157,7 +157,7 @@ class Usbtin(Firmware):
 
 
 class Lawicel(Usbtin):
-    """LAWICEL CANUSB, V1013 (manual): as USBtin, but a frame is answered by CR alone."""
+    """LAWICEL CANUSB, V1013 (as described, not tried): as USBtin, but frames get CR alone."""
 
     sent = {'t': b'\r', 'T': b'\r'}
     version = b'V1013\r'

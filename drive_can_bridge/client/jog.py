@@ -279,6 +279,8 @@ class Jog:
                 self._neutral_answered or now - self._since > NEUTRAL_TIMEOUT):
             return True
         if now >= self._due:
+            if self._phase is _Phase.MOVING:    # once more: it may have been suspended just now
+                self._judge(self._graph.now())
             moving = self._phase is _Phase.MOVING
             self._out.publish(self._message_type(
                 data=self._target.value if moving else self._target.neutral))
