@@ -2,10 +2,8 @@
 """Nobody reads the log any more: the drives must not notice, nor the way out."""
 
 from collections.abc import Iterator
-import os
 from pathlib import Path
 import signal
-import tty
 
 from parameter_files import bridge_file, CONVEYOR, NEIGHBOUR
 from processes import Client, command_line, Processes
@@ -53,22 +51,16 @@ def test_a_drive_falls_silent_and_the_bridge_is_stopped(
 
 def test_second_signal(processes: Processes, client: Client, namespace: str, tmp_path: Path,
                        output: StuckOutput) -> None:
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    try:
-        # its reader hangs in an open that never ends, so that the first signal takes its time
-        bridge = processes.bridge(
-            bridge_file(tmp_path, channel=os.ttyname(slave), bus={'sleep_after_open': 600.0}),
-            namespace, stderr=output.write)
-        client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='opening')
-        bridge.send(signal.SIGINT)
-        client.ask('rest', seconds=0.1)     # in the same breath they are one signal
-        bridge.send(signal.SIGTERM)
-        assert bridge.wait(timeout=10.0) == 128 + signal.SIGTERM
-        assert output.full
-    finally:
-        os.close(master)
-        os.close(slave)
+    # three stop frames 0.1 s apart, so that the first signal takes its time
+    file = bridge_file(tmp_path, drives={'conveyor': {**CONVEYOR, 'period': 0.1}})
+    processes.simulator(file)
+    bridge = processes.bridge(file, namespace, stderr=output.write)
+    start_moving(client, f'/{namespace}/conveyor')
+    bridge.send(signal.SIGINT)
+    client.ask('rest', seconds=0.06)    # in the same breath they are one signal
+    bridge.send(signal.SIGTERM)
+    assert bridge.wait(timeout=10.0) == 128 + signal.SIGTERM
+    assert output.full
 
 
 def test_whoever_closes_its_outputs_gets_a_bridge_all_the_same(
