@@ -610,7 +610,7 @@ def test_a_pipe_ends_at_the_second_channel(second: str) -> None:
 
 @given(st.sampled_from(['.log', '.asc', '.csv', '.trc', '.blf', '.db']), st.binary(max_size=300))
 def test_any_file(tmp_path_factory: pytest.TempPathFactory, suffix: str, content: bytes) -> None:
-    path = tmp_path_factory.mktemp('any') / f'trace{suffix}'
+    path = tmp_path_factory.getbasetemp() / f'any_trace{suffix}'   # no folder for each example
     path.write_bytes(content)
     for record in read_records(path, lambda _: None):
         assert isinstance(record, Record)
