@@ -105,8 +105,8 @@ class FaultWatch:
         if self._ended and (not self._is_told_soon or self._now >= self._tell_at):
             obeyed = self._session.interlock.obeyed
             fault = '' if obeyed is None else obeyed.fault_text
-            events += [replace(each, message=sentences.CODES[each.message.code](
-                **{**each.message.fields, 'fault': fault})) for each in self._ended]
+            events += [replace(each, message=each.message.also(fault=fault))
+                       for each in self._ended]
             self._ended.clear()
 
     @property

@@ -18,7 +18,9 @@ wherever text is wanted, which tells programs and tests what it says without bei
 A sentence that gives the reason of another one has it among its fields, code and all.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import Enum
+from itertools import cycle
 from string import Formatter
 from typing import Any
 
@@ -31,18 +33,25 @@ class Sentence(str):
 
     :ivar code: what it says, as a stable word.
     :ivar fields: of what, by name.
+    :ivar kind: what it is for programs, where they have to know.
     """
 
-    __slots__ = ('code', 'fields')
+    __slots__ = ('_row', 'code', 'fields', 'kind')
 
     code: str
     fields: Mapping[str, Any]
+    kind: Enum | None
+    _row: 'Text | None'
 
-    def __new__(cls, text: str = '', code: str = '',
-                fields: Mapping[str, Any] | None = None) -> 'Sentence':
+    def __new__(cls, text: str = '', code: str = '', fields: Mapping[str, Any] | None = None,
+                kind: Enum | None = None, row: 'Text | None' = None) -> 'Sentence':
         said = super().__new__(cls, text)
-        said.code, said.fields = code, fields or {}
+        said.code, said.fields, said.kind, said._row = code, fields or {}, kind, row
         return said
+
+    def also(self, **fields: Any) -> 'Sentence':
+        """Return the sentence of the same row with further fields."""
+        return self if self._row is None else self._row(**{**self.fields, **fields})
 
 
 #: what a way to write a number is made of; anything else joins
@@ -74,13 +83,16 @@ class Text:
     :ivar fields: the names of its fields, in the order in which they may be given.
     :ivar optional: those that may be missing.
     :param fields: that order, where it is not that of the text, or where a field is in no text.
+    :param kinds: what its sentences are for programs: one for all texts, or one for each.
     :param how: writes a field in a way of its own, by name.
     """
 
-    def __init__(self, *texts: str, do: str = '', fields: str = '',
+    def __init__(self, *texts: str, do: str = '', fields: str = '', kinds: Sequence[Enum] = (),
                  **how: Callable[[Any], str]) -> None:
         self.code, self.do, self.texts = '', do, texts
         *self._variants, self._last = [_Variant(text, how) for text in texts]
+        for each, kind in zip((*self._variants, self._last), cycle(kinds)):
+            each.kind = kind
         in_text = [name for each in (*self._variants, self._last) for name in each.fields]
         self.fields = tuple(fields.split()) or tuple(dict.fromkeys(in_text))
         self.optional = frozenset(in_text).difference(self._last.fields)
@@ -91,8 +103,8 @@ class Text:
         for variant in self._variants:
             if all(_is_there(fields.get(name)) for name in variant.fields
                    if name in self.optional):
-                return Sentence(variant.write(fields), self.code, fields)
-        return Sentence(self._last.write(fields), self.code, fields)
+                return Sentence(variant.write(fields), self.code, fields, variant.kind, self)
+        return Sentence(self._last.write(fields), self.code, fields, self._last.kind, self)
 
 
 class _Variant:
@@ -100,6 +112,7 @@ class _Variant:
 
     def __init__(self, text: str, how: Mapping[str, Callable[[Any], str]]) -> None:
         self.fields: list[str] = []
+        self.kind: Enum | None = None
         self._apart: list[tuple[str, str, Callable[[Any], str]]] = []
         self._text = ''
         for before, name, spec, conversion in Formatter().parse(text):

@@ -7,8 +7,17 @@ docs/messages.md is made of them.
 """
 
 from collections.abc import Mapping
+from enum import Enum
 
 from drive_can_bridge.core.messages import catalogue, Text
+
+
+class Absence(Enum):
+    """What a sentence on a drive that is not online says of what arrives from it."""
+
+    SILENT = 'nothing, as far as is known'
+    NO_HEARTBEAT = 'no heartbeat'
+    ANSWERS = 'something: power and cable are in order'
 
 
 def _by_name(raws: Mapping[str, int | None]) -> str:
@@ -366,6 +375,7 @@ deactivated = Text('deactivated', do='activate the bridge')
 looked_for = Text('being looked for', do='wait a moment')
 set_up_unanswered = Text(
     'no answer to SDO: drive silent, wrong station or bit rate',
+    kinds=(Absence.SILENT,),
     do='look at power, cable, node-ID and bit rate')
 found_enabled = Text(
     'found in state {state}: it is disabled before anything else',
@@ -382,15 +392,20 @@ bus_is_down = Text(
     do='see what diagnostics say of the bus')
 reconnected = Text('the drive is being reconnected', do='nothing')
 bridge_stood_still = Text('the bridge stood still', do='see what else the computer does')
-silent_for_cycles = Text('{what} for {cycles} cycles', do='power, cable, station, bit rate')
+silent_for_cycles = Text(
+    '{what} for {cycles} cycles',
+    kinds=(Absence.SILENT,),
+    do='power, cable, station, bit rate')
 no_round = Text(
     'no complete round of reads for {periods} periods',
+    kinds=(Absence.SILENT,),
     do='power, cable, station, bit rate; a longer period for a slow drive')
 device_restarted = Text('the device restarted', do='see why it lost its power')
 no_heartbeat = Text(
     '{answers:?}answers, but there is no heartbeat for {timeout:g} s',
     'no heartbeat for {timeout:g} s',
     fields='timeout answers',
+    kinds=(Absence.ANSWERS, Absence.NO_HEARTBEAT),
     do='power, cable; the producer of the device (1017h)')
 sync_not_begun = Text(
     'SYNC begins when every drive of the bus that hears it is known not to be enabled, was told '
@@ -405,31 +420,41 @@ node_state = Text(
     '{answers:?}answers, but is {state}',
     'node is {state}',
     fields='state answers emergency',
+    kinds=(Absence.ANSWERS, Absence.ANSWERS, Absence.SILENT),
     do='start the node (nmt_start); remove the cause of an emergency')
 answers_without = Text(
     'answers, but there is {lacks}: {emergency}',
     'answers, but there is {lacks}',
     fields='lacks emergency',
+    kinds=(Absence.ANSWERS,),
     do='see what its PDOs are (mapping); remove the cause of an emergency')
 answers_otherwise = Text(
     'answers, but not as CANopen has it: {what}',
+    kinds=(Absence.ANSWERS,),
     do='look for another device with its identifiers; see what its manual says of CANopen')
 pdo_length = Text(
     'TPDO {number} has {found:#byte} instead of {wanted}',
+    kinds=(Absence.ANSWERS,),
     do='let the bridge write its mapping (mapping configure), or correct the lists')
-silent = Text('{what}: {look_at}', do='look at what it names')
+silent = Text(
+    '{what}: {look_at}',
+    kinds=(Absence.SILENT,),
+    do='look at what it names')
 lost_because = Text('{why}: {gap}', do='correct cyclic_response')
 maps_unread = Text(
     'no answer to mapping read: drive silent, wrong station, bit rate or identifier mode',
     do='look at what it names')
 cycles_unanswered = Text(
     'no cyclic response: drive silent or response identifier taken',
+    kinds=(Absence.SILENT,),
     do='look at what it names')
 reads_unanswered = Text(
     'no answer to reads: drive silent, wrong station, bit rate or identifier mode',
+    kinds=(Absence.SILENT,),
     do='look at what it names')
 rounds_unanswered = Text(
     'no complete round of reads: drive silent, not operational, or other COB-IDs than configured',
+    kinds=(Absence.SILENT,),
     do='look at what it names')
 one_read_unanswered = Text(
     'no answer to the read of {names}, though others are answered: does this drive have it',

@@ -34,8 +34,6 @@ from drive_can_bridge.transport.failures import with_outlook
 
 #: s after the activation that a drive may take to be seen
 GRACE = 5.0
-#: what a session says of a drive that sends something, so that power and cable are in order
-_ANSWERS = frozenset(('answers_without', 'answers_otherwise', 'pdo_length'))
 #: bus load above which a bus is never OK
 LOAD_WARNING = 70.0
 #: s for which a command that changed nothing is worth a warning
@@ -49,7 +47,7 @@ def absence(drive: DriveNode) -> Sentence:
     if exchange.bus_state != 'up':      # which is told once, there
         return (sentences.bus_of_drive_opening if exchange.bus_state == 'opening' else
                 sentences.bus_of_drive_down)(exchange.bus.name)
-    answers = what.code in _ANSWERS or 'answers' in what.fields
+    answers = what.kind is sentences.Absence.ANSWERS
     if not session.ever_online:
         return (sentences.not_online if answers else sentences.never_seen)(what)
     since = time.strftime('%H:%M:%S', time.localtime(drive.lost_at // 1_000_000_000))

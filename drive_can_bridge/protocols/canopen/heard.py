@@ -10,15 +10,12 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.sentences import Absence
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import Node
 
 #: s for which something that arrived counts
 HEARD_TIME = 3.0
-#: what is said of a drive that sends nothing, as far as anybody knows
-_SILENCE = frozenset((
-    'cycles_unanswered', 'reads_unanswered', 'rounds_unanswered', 'set_up_unanswered', 'silent',
-    'silent_for_cycles', 'no_round', 'node_state', 'no_heartbeat'))
 
 
 class Heard:
@@ -48,7 +45,7 @@ class Heard:
     def instead_of(self, advice: Sentence, node: Node, now: float) -> Sentence:
         """Return what to say: the advice, unless that speaks of silence and something arrives."""
         came, wrong = now - self._at <= HEARD_TIME, now - self._wrong_at <= HEARD_TIME
-        if advice.code not in _SILENCE or not (came or wrong):
+        if advice.kind not in (Absence.SILENT, Absence.NO_HEARTBEAT) or not (came or wrong):
             return advice
         state, emergency = node.said(now), node.emergency
         what = '' if emergency is None else (
@@ -57,6 +54,6 @@ class Heard:
             return sentences.node_state(state.text, answers=True, emergency=what)
         if wrong:
             return self._wrong
-        if advice.code == 'no_heartbeat':
-            return sentences.no_heartbeat(**advice.fields, answers=True)
+        if advice.kind is Absence.NO_HEARTBEAT:
+            return advice.also(answers=True)
         return sentences.answers_without(self._lacks, what)

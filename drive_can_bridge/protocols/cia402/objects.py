@@ -58,7 +58,7 @@ class Objects:
     Reads and writes numbers.
 
     :param attempts: how often a write is tried: it stays the same.
-    :ivar abort: the code with which the last read was refused; None: it was not.
+    :ivar abort: the code with which the last transfer was refused; None: it was not.
     """
 
     def __init__(self, attempts: int) -> None:
@@ -67,7 +67,7 @@ class Objects:
 
     @property
     def absent(self) -> bool:
-        """The drive says that it has no such object as was read last."""
+        """The drive says that it has no such object as was asked for last."""
         return self.abort in sdo.ABSENT
 
     def transfer(self, ask: Ask) -> Generator[Ask, Reply, Reply]:
@@ -75,6 +75,7 @@ class Objects:
         reply = yield ask
         if silent(reply):
             raise End(Outcome(Found.SILENT))
+        self.abort = reply.abort
         return reply
 
     def read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
@@ -86,7 +87,6 @@ class Objects:
         :raises End: nobody answers.
         """
         reply = yield from self.transfer(Ask(index, subindex))
-        self.abort = reply.abort
         if reply.data is None:
             return None
         word = reply.word(length, signed=signed)

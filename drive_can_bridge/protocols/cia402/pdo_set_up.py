@@ -46,8 +46,7 @@ class PdoSetUp:
             refusal = yield from self._write(wanted, identifier, transmit=transmit)
             difference, _ = yield from self._compare(wanted, transmit=transmit, written=True)
             if refusal and difference:
-                raise differs(sentences.object_refused(
-                    **{**refusal.fields, 'meant': difference}), sentences.maps_fixed)
+                raise differs(refusal.also(meant=difference), sentences.maps_fixed)
             if difference:
                 raise differs(difference, sentences.maps_not_kept)
 
@@ -160,17 +159,18 @@ class PdoSetUp:
         if same_mapping(list(held.values())[1:], entries):
             return NOTHING
         steps = [(0, 0), *enumerate(entries, 1), (0, len(entries))]
-        count_fixed = NOTHING
+        count_fixed, count_abort = NOTHING, None
         while steps:
             place, content = steps.pop(0)
             refusal = yield from self._put_entry(wanted, place, content)
             if refusal and not place and not content and len(held) > len(entries):
-                count_fixed = refusal       # what is not needed is to be empty
+                # what is not needed is to be empty
+                count_fixed, count_abort = refusal, self._objects.abort
                 steps = list(enumerate([*entries, *[0] * (len(held) - 1 - len(entries))], 1))
                 continue
             if refusal:
                 return count_fixed if count_fixed and (
-                    count_fixed.fields['why'] == refusal.fields['why']) else refusal
+                    count_abort == self._objects.abort) else refusal
             if place in held:       # what was beyond the count was nothing
                 undo.append((place, held[place]))
                 held[place] = content
