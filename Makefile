@@ -25,7 +25,8 @@ help:
 	@echo '             makes half of it. What you add to it stays.'
 	@echo 'make clean   removes it, if nothing runs from it, and everything else that was built'
 	@echo
-	@echo 'With ROS 2 Jazzy sourced, that one is used; otherwise it comes as wheels (Linux on x86-64).'
+	@echo 'With ROS 2 Jazzy or Kilted sourced, that one is used; otherwise it comes as wheels (Linux on'
+	@echo 'x86-64), those of Jazzy; ROS_DISTRO_WHEELS=kilted: those of Kilted, in an environment of their own.'
 	@echo 'PYTHON=... says which Python, 3.10 to 3.13.'
 
 setup:

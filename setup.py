@@ -36,6 +36,13 @@ def shared_tree(top: str) -> list[tuple[str, list[str]]]:
     return list(folders.items())
 
 
+def wheels(rclpy: str, messages: str) -> list[str]:
+    """Require the packages of one distribution by their versions."""
+    return [f'ros-rclpy[fastrtps]=={rclpy}', *(
+        f'ros-{name}-msgs=={messages}' for name in ('diagnostic', 'sensor', 'std')),
+        f'ros-std-srvs=={messages}']
+
+
 setup(
     name=PACKAGE,
     version=version(),
@@ -71,14 +78,9 @@ setup(
         'pyserial',
     ],
     extras_require={
-        # ROS 2 Jazzy as wheels, for machines without a ROS installation.
-        'ros': [
-            'ros-rclpy[fastrtps]==7.1.6',
-            'ros-diagnostic-msgs==5.3.6',
-            'ros-sensor-msgs==5.3.6',
-            'ros-std-msgs==5.3.6',
-            'ros-std-srvs==5.3.6',
-        ],
+        # ROS 2 as wheels, for machines without a ROS installation: Jazzy, or Kilted.
+        'ros': wheels('7.1.6', '5.3.6'),
+        'ros-kilted': wheels('9.1.2', '5.5.1'),
         # EDS and DCF files as profiles. No rosdep key: without it, CSV tables can be imported.
         'eds': ['canopen>=2.3'],
         # completion in the shell; rosdep brings it

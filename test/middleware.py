@@ -10,10 +10,22 @@ what there is gets told in messages.
 """
 
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 import os
 from pathlib import Path
 
-_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+
+def _variable() -> str:
+    """Return what the Fast DDS of this ROS reads, of which nothing may be loaded yet."""
+    try:
+        rclpy = version('rclpy')
+    except PackageNotFoundError:    # no ROS here
+        rclpy = '0'
+    since_kilted = int(rclpy.partition('.')[0]) >= 8
+    return f'{"FASTDDS" if since_kilted else "FASTRTPS"}_DEFAULT_PROFILES_FILE'
+
+
+_VARIABLE = _variable()
 _PROFILES = str(Path(__file__).with_name('fastdds.xml'))
 
 

@@ -204,7 +204,7 @@ def test_pip_and_rosdep_bring_the_same(
     arguments: dict[str, Any], manifest: ElementTree.Element,
 ) -> None:
     extras = arguments['extras_require']
-    assert set(extras) == {*WITH_KEYS, *WITHOUT_KEYS, 'ros', 'test'}
+    assert set(extras) == {*WITH_KEYS, *WITHOUT_KEYS, 'ros', 'ros-kilted', 'test'}
     by_pip = {re.split('[<>=~!]', entry)[0] for entry in [
         *arguments['install_requires'], *(each for name in WITH_KEYS for each in extras[name])]}
     by_rosdep = {
@@ -226,7 +226,8 @@ def test_placeholders_stand_where_contributing_says() -> None:
 def test_drive_can_installs_without_ros(arguments: dict[str, Any]) -> None:
     needed = arguments['install_requires']
     assert not [entry for entry in needed if entry.startswith(('ros', 'rcl'))]
-    assert any(entry.startswith('ros-rclpy') for entry in arguments['extras_require']['ros'])
+    for extra in 'ros', 'ros-kilted':
+        assert any(entry.startswith('ros-rclpy') for entry in arguments['extras_require'][extra])
 
 
 def test_sources_carry_their_licence() -> None:

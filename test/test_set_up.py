@@ -57,22 +57,25 @@ class Checkout:
             (place / package / '__main__.py').write_text(text)
         self.installed.touch()
 
-    def run(self, *command: str, python: str = sys.executable, ros: bool = False,
+    def run(self, *command: str, python: str = sys.executable, ros: str = '', wheels: str = '',
             fails: bool = False) -> subprocess.CompletedProcess[str]:
-        """Run a command of ``.ci``; with a sourced ROS 2 Jazzy, or a pip that fails."""
+        """Run a command of ``.ci``; with a sourced ROS 2, other wheels, or a pip that fails."""
         path = [str(self.place / each) for each in ('pip', *(('ros',) if ros else ()))]
         inherited = {name: value for name, value in os.environ.items()
-                     if name not in ('ROS_DISTRO', 'VIRTUAL_ENV', 'PYTHONHOME')}
+                     if name not in ('ROS_DISTRO', 'ROS_DISTRO_WHEELS', 'VIRTUAL_ENV',
+                                  'PYTHONHOME')}
         return subprocess.run(
             [self.top / '.ci' / command[0], *(python,)[:command[0] == 'setup'], '.venv',
              *command[1:]],
             env={**inherited, 'PYTHONPATH': os.pathsep.join(path), 'PIP_FAILS': str(int(fails)),
-                 'INSTALLED': str(self.installed), **({'ROS_DISTRO': 'jazzy'} if ros else {})},
+                 'INSTALLED': str(self.installed), **({'ROS_DISTRO': ros} if ros else {}),
+                 **({'ROS_DISTRO_WHEELS': wheels} if wheels else {})},
             text=True, capture_output=True, check=False)
 
-    def set_up(self, *part: str, python: str = sys.executable, ros: bool = False) -> str:
+    def set_up(self, *part: str, python: str = sys.executable, ros: str = '',
+               wheels: str = '') -> str:
         """Return the folder that is used, in which somebody then adds a package."""
-        done = self.run('setup', *part, python=python, ros=ros)
+        done = self.run('setup', *part, python=python, ros=ros, wheels=wheels)
         assert done.returncode == 0, done.stderr
         folder = done.stdout.strip()
         added = self.top / folder / 'added_by_somebody'
@@ -129,10 +132,36 @@ def test_changed_requirements_only_add(checkout: Checkout) -> None:
 def test_sourced_ros_has_its_own(checkout: Checkout) -> None:
     assert checkout.set_up() == '.venv'
     sourced = f'.venv-sourced-jazzy-{PYTHON}'
-    assert checkout.set_up('demo', ros=True) == sourced
-    assert checkout.set_up() == '.venv' and checkout.set_up('demo', ros=True) == sourced
+    assert checkout.set_up('demo', ros='jazzy') == sourced
+    assert checkout.set_up() == '.venv' and checkout.set_up('demo', ros='jazzy') == sourced
     assert checkout.what_was_installed() == ['.venv .[ros,test,panel]', f'{sourced} .']
     assert checkout.kept()
+
+
+def test_each_distribution_has_its_own(checkout: Checkout) -> None:
+    assert checkout.set_up('demo') == '.venv'
+    wheels, sourced = f'.venv-wheels-kilted-{PYTHON}', f'.venv-sourced-kilted-{PYTHON}'
+    assert checkout.set_up(wheels='kilted') == wheels
+    assert checkout.set_up('demo', ros='kilted') == sourced
+    # which is what the sourced one is, whatever is asked for
+    assert checkout.set_up('demo', ros='kilted', wheels='kilted') == sourced
+    assert checkout.set_up('demo', wheels='jazzy') == '.venv'
+    assert checkout.what_was_installed() == [
+        '.venv .[ros]', f'{wheels} .[ros-kilted,test,panel]', f'{sourced} .']
+    # an activated one is itself, as long as the same is asked for
+    assert checkout.set_up('demo', python=checkout.activated(wheels), wheels='kilted') == wheels
+    assert checkout.what_was_installed() == [] and checkout.kept()
+
+
+@pytest.mark.parametrize(('given', 'words'), [
+    ({'ros': 'humble'}, 'ROS 2 humble is sourced: source jazzy or kilted or none, in a new shell'),
+    ({'wheels': 'humble'}, 'ROS_DISTRO_WHEELS=humble: there are wheels of jazzy kilted'),
+    ({'ros': 'jazzy', 'wheels': 'kilted'},
+     'ROS 2 jazzy is sourced: for the wheels of kilted open a new shell without')])
+def test_a_distribution_that_cannot_be_had(checkout: Checkout, given: dict[str, str],
+                                           words: str) -> None:
+    done = checkout.run('setup', 'demo', **given)
+    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'setup: {words}\n')
 
 
 def test_another_python_has_its_own(checkout: Checkout) -> None:

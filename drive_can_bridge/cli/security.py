@@ -26,6 +26,7 @@ from drive_can_bridge.cli.command import namespace, output_path, whole
 from drive_can_bridge.cli.output import write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.process.fast_dds import MARK
 from drive_can_bridge.protocols.families import FAMILIES
 
 _NODE = 'drive_can_bridge'
@@ -44,7 +45,8 @@ TRANSITIONS = ('change_state',)
 #: what every node has
 TYPE_DESCRIPTION = 'get_type_description'
 _NAMESPACE = 'http://www.eprosima.com'
-_TRANSPORT = 'drive_can_tls'
+#: by which a bridge recognises them
+_TRANSPORT = MARK.decode()
 #: a peer without a certificate of ours is shown out
 _VERIFY = ('VERIFY_PEER', 'VERIFY_FAIL_IF_NO_PEER_CERT')
 #: what is older than TLS 1.2

@@ -670,6 +670,21 @@ other_middleware = Text(
     'the bridge {bridge} runs on {theirs}, this shell on {ours} (RMW_IMPLEMENTATION): services do '
     'not work between them',
     do='set RMW_IMPLEMENTATION as the bridge has it')
+profiles_not_read = Text(
+    '{name} is not read by {middleware}: use {instead}',
+    '{name} is not read by {middleware}',
+    fields='name middleware instead',
+    do='use the name that is read, with a file for that version')
+protection_not_read = Text(
+    '{name} is not read by {middleware}: use {instead} (drive_can security wrote {file}: without '
+    'it everybody gets in)',
+    '{name} is not read by {middleware} (drive_can security wrote {file}: without it everybody '
+    'gets in)',
+    fields='name middleware file instead',
+    do='use the name that is read, or the middleware that reads it')
+profiles_not_there = Text(
+    '{name} names {file}, which is no file: {middleware} goes on without it',
+    do='correct the path; it counts from the working directory')
 no_memory_limit = Text(
     'no memory limit (memory_limit_mb): {reason}',
     do='none is needed where all use one middleware')

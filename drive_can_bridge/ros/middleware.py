@@ -1,13 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is asked of the middleware: quality of service of each kind of topic, and small histories.
+What is asked of the middleware: quality of service of each kind of topic.
 
 And what rclpy raises when the thing that is used, or its context, is there no more: ``GONE``.
 """
 
-from collections.abc import MutableMapping
-import os
-from pathlib import Path
 from typing import Any
 
 from rclpy.exceptions import InvalidHandle
@@ -18,8 +15,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from drive_can_bridge.resources import config_file
-
 RCLError = rclpy_implementation.RCLError
 GONE = (InvalidHandle, RCLError)
 #: s between two looks at who subscribes
@@ -27,10 +22,6 @@ COUNT_PERIOD = 0.1
 #: the default policies, and that which makes a topic a latched one
 _OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
                 QoSPolicyKind.DURABILITY)
-#: what names a file of profiles for Fast DDS, by its version; the first is that of Jazzy
-VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
-#: files that Fast DDS takes from the working directory by itself
-FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 
 
 def state_quality() -> QoSProfile:
@@ -94,24 +85,3 @@ class Audience:
             self._count_at = now + COUNT_PERIOD
             self._listens = bool(self._publisher.get_subscription_count())
         return self._listens
-
-
-def set_up_fast_dds(environment: MutableMapping[str, str] = os.environ) -> None:
-    """
-    Let Fast DDS use the profile of the bridge, unless somebody has profiles of their own.
-
-    Fast DDS makes room for a hundred messages at each end of each of them before there is one. A
-    drive has about thirty ends, most of which never see as many. So histories begin small and
-    grow where they have to; how many messages they keep is what each topic says, as ever. And it
-    wakes a thread of its own for every sample that a reliable reader gets, which costs as much as
-    a tenth of the bridge; in this profile one wake-up in 20 ms serves all of them.
-
-    To be called before ``rclpy.init``. Other middleware takes no notice.
-    """
-    if any(environment.get(name) for name in VARIABLES) or any(
-            Path(name).exists() for name in FILES):
-        return
-    try:
-        environment[VARIABLES[0]] = str(config_file('fastdds/profiles.xml'))
-    except FileNotFoundError:   # it only costs more
-        pass

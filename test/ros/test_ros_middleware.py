@@ -9,9 +9,12 @@ import sys
 import pytest
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from drive_can_bridge.core.sentences import profiles_not_read, profiles_not_there
+from drive_can_bridge.process.fast_dds import Middleware, RELEASES, running
 from drive_can_bridge.resources import config_file
-from drive_can_bridge.ros.middleware import FILES, set_up_fast_dds, VARIABLES
+from drive_can_bridge.ros.main import set_up_fast_dds
 
+VARIABLES = [release.variable for release in RELEASES.values()]
 #: prints how many bytes services take of the allocator; what is resident says less: memory that
 #: was freed before, while modules were imported, is used again
 GROWTH = """
@@ -50,13 +53,21 @@ def growth(**environment: str) -> float:
     return float(run.stdout)
 
 
-@pytest.mark.usefixtures('programs')
-def test_small_histories_save_half_of_the_memory() -> None:
-    if 'fastrtps' not in get_rmw_implementation_identifier():
+@pytest.fixture(name='middleware')
+def _middleware() -> Middleware:
+    """Return what runs here, which must be Fast DDS."""
+    found = running(get_rmw_implementation_identifier())
+    if found.release is None:
         pytest.skip('another middleware')
+    return found
+
+
+@pytest.mark.usefixtures('programs')
+def test_small_histories_save_half_of_the_memory(middleware: Middleware) -> None:
     environment: dict[str, str] = {}
-    set_up_fast_dds(environment)
-    assert environment == {VARIABLES[0]: str(config_file('fastdds/profiles.xml'))}
+    assert set_up_fast_dds(environment) == ('', [])
+    assert environment == {
+        middleware.variables[0]: str(config_file(middleware.release.shipped))}
     assert growth(**environment) < 0.7 * growth()
 
 
@@ -70,18 +81,24 @@ def test_clients_need_no_home(home: dict[str, str]) -> None:
     assert (run.returncode, run.stderr) == (0, '')
 
 
-@pytest.mark.parametrize('name', VARIABLES)
-def test_profiles_of_somebody_else_are_left_alone(name: str) -> None:
-    environment = {name: '/my/profiles.xml'}
-    set_up_fast_dds(environment)
-    assert environment == {name: '/my/profiles.xml'}
+def test_profiles_of_somebody_else_are_left_alone(middleware: Middleware) -> None:
+    for name in middleware.variables:
+        environment = {name: '/my/profiles.xml'}
+        assert set_up_fast_dds(environment) == (
+            '', [profiles_not_there(name, '/my/profiles.xml', middleware.name)])
+        assert environment == {name: '/my/profiles.xml'}
 
 
-@pytest.mark.parametrize('name', FILES)
 def test_a_file_in_the_working_directory_counts_too(
-        name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / name).touch()
+        middleware: Middleware, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    other, = (each for each in RELEASES.values() if each is not middleware.release)
+    (tmp_path / other.file).touch()
     environment: dict[str, str] = {}
-    set_up_fast_dds(environment)
+    assert set_up_fast_dds(environment) == (
+        '', [profiles_not_read(other.file, middleware.name, middleware.release.file)])
+    assert len(environment) == 1
+    (tmp_path / other.file).rename(tmp_path / middleware.release.file)
+    environment = {}
+    assert set_up_fast_dds(environment) == ('', [])
     assert not environment

@@ -17,9 +17,13 @@ from typing import Any
 from bridges import CONVEYOR, parameters
 from clients import wait_until
 import pytest
+from rclpy.utilities import get_rmw_implementation_identifier
 import yaml
 
+from drive_can_bridge.cli.main import main as drive_can
 from drive_can_bridge.core import complaints
+from drive_can_bridge.core.sentences import profiles_not_read, protection_not_read
+from drive_can_bridge.process.fast_dds import RELEASES, running
 from drive_can_bridge.ros.main import _quiet_rcl, main
 
 #: how rclpy writes a line
@@ -139,6 +143,36 @@ def test_file_with_a_namespace_of_its_own(run: Run, tmp_path: Path) -> None:
 def test_no_file_at_all(run: Run) -> None:
     assert problem(run('--ros-args', '-r', '__ns:=/refused')) == complaints.nothing_configured(
         node=NODE)
+
+
+@pytest.fixture(name='unread')
+def _unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, str, str]:
+    """Return a file that the other version would read, what runs here, and what that reads."""
+    middleware = running(get_rmw_implementation_identifier())
+    if middleware.release is None:
+        pytest.skip('another middleware')
+    monkeypatch.chdir(tmp_path)
+    other, = (each for each in RELEASES.values() if each is not middleware.release)
+    return tmp_path / other.file, middleware.name, middleware.release.file
+
+
+def test_profiles_that_nobody_reads(run: Run, unread: tuple[Path, str, str]) -> None:
+    file, running_here, read = unread
+    file.write_text('<profiles/>', encoding='utf-8')
+    code, (warning, *more) = run('--ros-args', '-r', '__ns:=/refused')
+    assert warning.endswith(f': {profiles_not_read(file.name, running_here, read)}')
+    assert '[WARN]' in warning
+    assert problem((code, more)) == complaints.nothing_configured(node=NODE)
+
+
+def test_no_bridge_without_the_protection_that_was_meant(
+        run: Run, unread: tuple[Path, str, str], capfd: pytest.CaptureFixture[str]) -> None:
+    file, running_here, read = unread
+    assert drive_can(['security', str(written(file.parent)), '-o', '.']) == 0
+    capfd.readouterr()
+    (file.parent / 'tls_bridge.xml').rename(file)
+    assert run(*with_file(file.parent / 'bridge.yaml')) == (1, [
+        f'drive_can_bridge: {protection_not_read(file.name, running_here, file.name, read)}'])
 
 
 @pytest.mark.parametrize('content', [
