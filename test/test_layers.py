@@ -35,14 +35,16 @@ INTERNAL: dict[str, set[str]] = {
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
-        'exchange', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.recognition'},
+        'exchange', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.rcl',
+        'ros.recognition'},
     'monitor': {'', 'core'},
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'clock', 'core', 'monitor'},
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
-    'ros.client': {'', 'clock', 'core', 'process', 'ros.recognition'},
+    'ros.client': {'', 'clock', 'core', 'process', 'ros.rcl', 'ros.recognition'},
+    'ros.rcl': {''},
     'ros.monitor': {
         '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
     'ros.demo': {
@@ -86,6 +88,7 @@ EXTERNAL: dict[str, set[str]] = {
     'ros.messages': ROS_PACKAGES,
     'ros.monitor': ROS_PACKAGES,
     'ros.client': ROS_PACKAGES,
+    'ros.rcl': ROS_PACKAGES,
     'client.ros_way': {'rcl_interfaces'},
     'client.jog': ROS_PACKAGES,
     'ros.demo': ROS_PACKAGES,

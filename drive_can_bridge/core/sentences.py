@@ -655,6 +655,9 @@ requests_hold_up = Text(
     'a request that the middleware takes long to read, or an answer to a caller that it has not '
     'found yet, holds up the whole process: rclpy takes and sends them ({reason})',
     do='report it, with the version of rclpy')
+client_by_rclpy = Text(
+    'bridges are asked more slowly: this rclpy is used by its public interface ({reason})',
+    do='report it, with the version of rclpy')
 request_hangs = Text(
     'the middleware has been reading a request of {service} for {seconds:g} s: other services go '
     'on without it',

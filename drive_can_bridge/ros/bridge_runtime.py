@@ -273,7 +273,7 @@ class BridgeRuntime:
             closing.callback(self._reporting.stop)
             self._attendance = Attendance(log, list(self.drives.values()), clock)
             closing.callback(self._attendance.end)
-            self._passing = Passing(node, clock)
+            self._passing = Passing(node, clock, log.warning)
             closing.callback(self._passing.end)
             self.local_way = LocalWay(
                 presence, domain, name, self.drives, list(configuration.drives), seen=seen,

@@ -7,18 +7,19 @@ are matched within some milliseconds. Only what a command of this host asks for 
 nothing goes round in circles.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
 
 from rclpy.node import Node
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
+from drive_can_bridge.core.sentences import client_by_rclpy
 from drive_can_bridge.process.local_server import Asked
 from drive_can_bridge.process.local_stop import Answer, RUNNING
 from drive_can_bridge.ros.client.control import Stop
 from drive_can_bridge.ros.client.search import LOOK_PERIOD
-from drive_can_bridge.ros.middleware import GONE
+from drive_can_bridge.ros.rcl.end import End
+from drive_can_bridge.ros.rcl.extension import GONE
 
 #: s that the bridges may take to say which drives they have, and the drives to stop
 PATIENCE = 1.0
@@ -28,20 +29,14 @@ class NodeEnd:
     """
     The node of a bridge, as a client of other bridges wants one.
 
-    :ivar handle: of the node, as rclpy has it.
+    :param warn: takes why its end cannot be the node itself.
+    :ivar end: of the node.
     """
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self.handle: Any = node.handle
-
-    def services(self) -> Sequence[tuple[str, list[str]]]:
-        """Return all services that have been discovered, with their types."""
-        return self._node.get_service_names_and_types()
-
-    def topics(self) -> Sequence[tuple[str, list[str]]]:
-        """Return all topics that have been discovered, with their types."""
-        return self._node.get_topic_names_and_types()
+    def __init__(self, node: Node, warn: Callable[[str], object]) -> None:
+        self.end = End(node.context, f'_{node.get_name()}_passing_on',
+                       lambda reason: warn(client_by_rclpy(reason)), node)
+        self.services, self.topics = self.end.services, self.end.topics
 
 
 class Passing:
@@ -49,10 +44,13 @@ class Passing:
     Passes stops on, one after the other; those that came meanwhile share the next.
 
     The thread begins with the first one.
+
+    :param warn: takes a line for the log.
     """
 
-    def __init__(self, node: Node, clock: Clock) -> None:
-        self._end_of = NodeEnd(node)
+    def __init__(self, node: Node, clock: Clock, warn: Callable[[str], object]) -> None:
+        self._node, self._warn = node, warn
+        self._end_of: NodeEnd | None = None
         self._clock = clock
         self._waiting: Mailbox[tuple[tuple[str, ...], Asked] | None] = Mailbox(clock)
         self._ending = False
@@ -76,6 +74,8 @@ class Passing:
         self._waiting.put(None)
         if self._thread is not None:
             self._thread.join(PATIENCE)
+        if self._end_of is not None:
+            self._end_of.end.close()
 
     def _run(self) -> None:
         while not self._ending:
@@ -105,6 +105,8 @@ class Passing:
         bridges, handled, meant = (list(part) for part in _parts(words))
         stop: Stop | None = None
         try:
+            if self._end_of is None:
+                self._end_of = NodeEnd(self._node, self._warn)
             stop = Stop(self._end_of, None, meant, bridges, only=bridges, patience=PATIENCE)
             stop.leave(handled)
             while not self._ending and not stop.look(self._clock.now()):

@@ -197,7 +197,7 @@ class Node(Destroyable):
     """A node; see ``rcl_node_t``."""
 
     def __init__(self, name: str, namespace: str, context: Context, arguments: Any,
-                 use_global: bool, rosout: bool) -> None:
+                 use_global: bool, rosout: bool, *_: Any) -> None:
         super().__init__()
         self.context = context
         sources = [Arguments(arguments)] if arguments else []
@@ -473,7 +473,8 @@ class Subscription(TopicEnd):
 
     where, offers = 'subscriptions', False
 
-    def __init__(self, node: Node, kind: Any, name: str, quality: Any) -> None:
+    def __init__(self, node: Node, kind: Any, name: str, quality: Any,
+                 content_filter: Any = None) -> None:
         super().__init__(node, kind, name, quality)
         self._queue: deque[tuple[bytes, dict[str, Any]]] = deque(maxlen=self.depth())
         for each in self.peers(self.graph.publishers):

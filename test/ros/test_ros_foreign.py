@@ -11,11 +11,11 @@ from bridges import LIFT, parameters, StartBridge
 from clients import Client
 import graph
 import pytest
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from waiting import clock
 
 from drive_can_bridge.core.errors import SilentBridge
 from drive_can_bridge.monitor.snapshot import Outcome, Stop as StopKind
-from drive_can_bridge.ros.client import foreign
 from drive_can_bridge.ros.client.control import Stop
 from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph
 from drive_can_bridge.ros.monitor.client import Operations
@@ -45,7 +45,7 @@ class Seen:
             return send(client, request)
         monkeypatch.setattr(graph.Client, 'send_request', counted)
         monkeypatch.setattr(
-            foreign.rclpy_implementation, 'rclpy_get_subscriptions_info_by_topic',
+            rclpy_implementation, 'rclpy_get_subscriptions_info_by_topic',
             lambda node, topic, mangled: [{'endpoint_gid': [*gid]} for gid in self.gids]
             if mangled and topic.startswith('rq/') and topic.endswith('Request') else [])
 

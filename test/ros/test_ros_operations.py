@@ -20,6 +20,7 @@ from drive_can_bridge.core.sentences import (
 from drive_can_bridge.monitor.snapshot import Outcome, Stop
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
 from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT
+from drive_can_bridge.ros.passing import NodeEnd
 
 
 @contextmanager
@@ -28,7 +29,7 @@ def asking(client: Client) -> Iterator[Operations]:
     node = rclpy.create_node('asking', context=client.node.context, enable_rosout=False,
                              start_parameter_services=False)
     try:
-        yield Operations(node)
+        yield Operations(NodeEnd(node, str))
     finally:
         node.destroy_node()
 

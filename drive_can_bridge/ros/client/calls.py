@@ -15,7 +15,7 @@ An executor wakes for every message and makes a Python object of it. A view want
 second; the middleware's own queue of depth one throws the others away at next to no cost.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -27,14 +27,15 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParameters,
 )
 from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile, ReliabilityPolicy
-from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.core.errors import DriveCanError
+from drive_can_bridge.core.sentences import client_by_rclpy
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.environment import domain_problem
 from drive_can_bridge.ros.client.foreign import foreign
+from drive_can_bridge.ros.rcl.end import End, Names
 
 # What makes messages from their definitions comes with every type support, is used by none, and
 # takes 0.15 s to be imported; its package goes without where it cannot be.
@@ -79,7 +80,7 @@ class ClientNode:
     asked.
 
     :param purpose: part of the node's name.
-    :ivar handle: of the node, as rclpy has it.
+    :ivar end: what it does there.
     :ivar full_name: of the node in the graph.
     :raises DriveCanError: ROS does not start.
     """
@@ -95,11 +96,7 @@ class ClientNode:
         try:
             # takes no signals, and no log file: a stop has to work where nothing can be written
             self.context.init([], initialize_logging=False)
-            context: Any = self.context.handle
-            with context:
-                # no arguments of the process, no /rosout
-                self.handle: Any = rclpy_implementation.Node(
-                    name, '', context, None, False, False)
+            self.end = End(self.context, name, _tell_slow)
         except Exception as error:  # rcl fails in several types
             reason = str(error).partition(', at ')[0]
             raise DriveCanError(f'ROS does not start: {reason}') from error
@@ -109,36 +106,33 @@ class ClientNode:
         """It has not gone."""
         return bool(self.context.ok())
 
-    def services(self) -> Sequence[tuple[str, list[str]]]:
+    def services(self) -> Names:
         """Return all services that have been discovered, with their types."""
-        with self.handle:
-            found: Sequence[tuple[str, list[str]]] = (
-                rclpy_implementation.rclpy_get_service_names_and_types(self.handle))
-        return found
+        return self.end.services()
 
-    def topics(self) -> Sequence[tuple[str, list[str]]]:
+    def topics(self) -> Names:
         """Return all topics that have been discovered, with their types."""
-        with self.handle:
-            found: Sequence[tuple[str, list[str]]] = (
-                rclpy_implementation.rclpy_get_topic_names_and_types(self.handle, False))
-        return found
+        return self.end.topics()
 
     def servers(self, service: str) -> int:
         """Return how many offer a service of this name."""
-        with self.handle:
-            return int(self.handle.get_count_services(service))
+        return self.end.servers(service)
 
     def leave(self) -> None:
         """Go. Idempotent."""
         if self.context.ok():
-            self.handle.destroy_when_not_in_use()
+            self.end.close()
             self.context.try_shutdown()
 
 
-class HasHandle(Protocol):
-    """A node of rclpy, or a client node."""
+class HasEnd(Protocol):
+    """A client node, or another one that has its part in the graph."""
 
-    handle: Any
+    end: End
+
+
+def _tell_slow(reason: str) -> None:
+    print(f'drive_can: {printable(client_by_rclpy(reason), None)}', file=sys.stderr, flush=True)
 
 
 @dataclass(slots=True)
@@ -166,24 +160,19 @@ class Service:
     :param again: s after which it is asked once more while there is no answer.
     """
 
-    def __init__(self, node: HasHandle, service_type: Any, name: str, timeout: float,
+    def __init__(self, node: HasEnd, service_type: Any, name: str, timeout: float,
                  again: float = math.inf) -> None:
-        self._type = service_type
         self._node, self._name = node, name
         self._timeout = timeout
         self._again = again
-        check_is_valid_srv_type(service_type)
-        with node.handle:
-            self._handle: Any = rclpy_implementation.Client(
-                node.handle, service_type, name, qos_profile_parameters.get_c_qos_profile())
+        self._client = node.end.asking(service_type, name)
         self._waiting: dict[int, _Call] = {}
         self._unsent: list[_Call] = []
 
     @property
     def ready(self) -> bool:
         """Somebody offers it."""
-        with self._handle:
-            return bool(self._handle.service_server_is_available())
+        return self._client.ready
 
     @property
     def foreign(self) -> bool:
@@ -222,8 +211,7 @@ class Service:
         if call.again_at == math.inf:   # for the first time
             call.deadline = now + self._timeout
         call.again_at, call.seen_at = now + self._again, now
-        with self._handle:
-            self._waiting[self._handle.send_request(call.request)] = call
+        self._waiting[self._client.send(call.request)] = call
 
     def look(self, now: float) -> None:
         """Ask what could not be asked before, and hand over the answers that have arrived."""
@@ -239,11 +227,11 @@ class Service:
             else:
                 call.unasked()
         while self._waiting:
-            with self._handle:
-                header, response = self._handle.take_response(self._type.Response)
-            if response is None:
+            taken = self._client.take()
+            if taken is None:
                 break
-            answered = self._waiting.get(header.request_id.sequence_number)
+            number, response = taken
+            answered = self._waiting.get(number)
             if answered is not None:
                 self._end(answered, response)
         for call in {id(call): call for call in self._waiting.values()}.values():
@@ -266,7 +254,7 @@ class Service:
 
     def close(self) -> None:
         """Wait for no answer any more."""
-        self._handle.destroy_when_not_in_use()
+        self._client.close()
 
 
 class NodeCalls:
@@ -277,7 +265,7 @@ class NodeCalls:
     :param timeout: s after which an answer is not waited for any more.
     """
 
-    def __init__(self, node: HasHandle, timeout: float) -> None:
+    def __init__(self, node: HasEnd, timeout: float) -> None:
         self._node = node
         self._timeout = timeout
         self._hosts: dict[str, _Host] = {}
@@ -340,7 +328,7 @@ class _Host:
     :ivar asked_at: when it was asked last.
     """
 
-    def __init__(self, node: HasHandle, name: str, timeout: float) -> None:
+    def __init__(self, node: HasEnd, name: str, timeout: float) -> None:
         self.asked_at = self._heard_at = -math.inf
         self._node, self._name, self._timeout = node, name, timeout
         self._services: dict[str, Service] = {}
@@ -440,8 +428,6 @@ def _nothing(_: Any) -> None:
     pass
 
 
-RCLError = rclpy_implementation.RCLError
-
 #: messages taken at once; what is left waits for the next look
 _BATCH = 200
 
@@ -471,20 +457,16 @@ def undemanding_quality() -> QoSProfile:
 class Outbox:
     """A publisher of the newest message only."""
 
-    def __init__(self, node: HasHandle, message_type: Any, topic: str) -> None:
-        check_is_valid_msg_type(message_type)
-        with node.handle:
-            self._handle: Any = rclpy_implementation.Publisher(
-                node.handle, message_type, topic, QoSProfile(depth=1).get_c_qos_profile())
+    def __init__(self, node: HasEnd, message_type: Any, topic: str) -> None:
+        self._writing = node.end.writing(message_type, topic, QoSProfile(depth=1))
 
     def publish(self, message: Any) -> None:
         """Publish a message."""
-        with self._handle:
-            self._handle.publish(message)
+        self._writing.publish(message)
 
     def close(self) -> None:
         """Publish nothing any more."""
-        self._handle.destroy_when_not_in_use()
+        self._writing.close()
 
 
 class Inbox:
@@ -494,27 +476,22 @@ class Inbox:
     :param take: takes each message.
     """
 
-    def __init__(self, node: HasHandle, message_type: Any, topic: str, quality: QoSProfile,
+    def __init__(self, node: HasEnd, message_type: Any, topic: str, quality: QoSProfile,
                  take: Callable[[Any], None]) -> None:
-        self._type = message_type
         self._take = take
-        check_is_valid_msg_type(message_type)
-        with node.handle:
-            self._handle: Any = rclpy_implementation.Subscription(
-                node.handle, message_type, topic, quality.get_c_qos_profile())
+        self._reading = node.end.reading(message_type, topic, quality)
 
     def look(self) -> None:
         """Take what has arrived."""
-        with self._handle:
-            for _ in range(_BATCH):
-                try:
-                    taken = self._handle.take_message(self._type, False)
-                except RCLError:  # anybody can publish rubbish
-                    continue
-                if taken is None:
-                    return
-                self._take(taken[0])
+        for _ in range(_BATCH):
+            try:
+                message = self._reading.take()
+            except RuntimeError:  # anybody can publish rubbish
+                continue
+            if message is None:
+                return
+            self._take(message)
 
     def close(self) -> None:
         """Unsubscribe."""
-        self._handle.destroy_when_not_in_use()
+        self._reading.close()

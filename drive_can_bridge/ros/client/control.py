@@ -22,7 +22,7 @@ from drive_can_bridge.process.local_way import meant
 from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unoffered
 from drive_can_bridge.process.presence import Present, short
 from drive_can_bridge.ros.client.calls import (
-    HasHandle, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
+    HasEnd, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
 from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.client.search import (
     find_bridges, find_drives, Graph, Search, Seeing)
@@ -37,7 +37,7 @@ _ONLINE_TIMEOUT = 5.0
 class _Stopping:
     """One drive that is told to stop."""
 
-    def __init__(self, client_node: HasHandle, node: str, now: float) -> None:
+    def __init__(self, client_node: HasEnd, node: str, now: float) -> None:
         self.node = node
         self.answer: Answer | None = None
         self._client_node = client_node

@@ -7,12 +7,13 @@ their requests may do harm on the other side. The first two bytes of an endpoint
 its middleware (RTPS 2.5, 9.3.1.5 and 8.3.3.1.3: vendor identifiers).
 """
 
-from typing import Any, Protocol
+from typing import Protocol
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.sentences import other_middleware
+from drive_can_bridge.ros.rcl.end import End
 from drive_can_bridge.ros.recognition import namespace_of
 
 VENDORS = {b'\x01\x0f': 'Fast DDS', b'\x01\x10': 'Cyclone DDS'}
@@ -23,12 +24,12 @@ _BRIDGE = 'drive_can_bridge'
 
 
 class _Node(Protocol):
-    handle: Any
+    end: End
 
 
 def ours() -> str:
     """Return the middleware of this process; '': one that nobody of ours knows."""
-    return _OURS.get(rclpy_implementation.rclpy_get_rmw_implementation_identifier(), '')
+    return _OURS.get(get_rmw_implementation_identifier(), '')
 
 
 def foreign(node: _Node, service: str) -> str:
@@ -37,10 +38,7 @@ def foreign(node: _Node, service: str) -> str:
 
     :param service: full name.
     """
-    with node.handle:
-        readers = rclpy_implementation.rclpy_get_subscriptions_info_by_topic(
-            node.handle, f'rq{service}Request', True)
-    found = {VENDORS.get(bytes(reader['endpoint_gid'][:2]), '') for reader in readers}
+    found = {VENDORS.get(gid[:2], '') for gid in node.end.who_reads(f'rq{service}Request')}
     own = ours()
     return found.pop() if own and len(found) == 1 and own not in found else ''
 

@@ -30,6 +30,7 @@ from drive_can_bridge.process.environment import nobody
 from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.client.foreign import foreign, why_not
+from drive_can_bridge.ros.rcl.end import End
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
 #: s between two looks at what has arrived
@@ -178,7 +179,7 @@ class Found:
 class Seeing(Protocol):
     """A node that can say what it sees in the graph."""
 
-    handle: Any
+    end: End
 
     def services(self) -> Entries:
         """Return all services that have been discovered, with their types."""

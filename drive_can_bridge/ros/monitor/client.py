@@ -29,7 +29,7 @@ from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Outcome, Place, Status, Stop
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
-    ClientNode, HasHandle, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
+    ClientNode, HasEnd, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
 )
 from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
 from drive_can_bridge.ros.client.foreign import why_not
@@ -338,7 +338,7 @@ class Operations:
     :param node: of the monitor.
     """
 
-    def __init__(self, node: HasHandle) -> None:
+    def __init__(self, node: HasEnd) -> None:
         self._node = node
         self._stops: dict[tuple[str, Stop], Service] = {}
         self._calls = NodeCalls(node, PARAMETER_TIMEOUT)

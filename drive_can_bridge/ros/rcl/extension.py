@@ -1,0 +1,44 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+The extension of rclpy, which all that is here goes through: nobody promises what is in it.
+
+Looked up each time, because another one may stand in its place (tests), and by name only here.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from drive_can_bridge.ros.rcl.unfit import Unfit
+
+
+class Extension:
+    """What rclpy has of rcl, by the names that it has there."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(rclpy_implementation, name)
+
+
+extension = Extension()
+#: what rcl refuses; RuntimeError is the class above it
+RCLError: type[Exception] = getattr(rclpy_implementation, 'RCLError', RuntimeError)
+#: what is raised when the thing that is used, or its context, is there no more
+GONE = InvalidHandle, RCLError
+
+
+def look_for(names: Iterable[str]) -> None:
+    """
+    See that members are there.
+
+    :param names: ``Client.take_response``, and the like.
+    :raises Unfit: they are not; it says which.
+    """
+    for name in names:
+        found: Any = extension
+        for part in name.split('.'):
+            try:
+                found = getattr(found, part)
+            except AttributeError:
+                raise Unfit(f'rclpy has no {name} any more') from None
