@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 from drive_can_bridge.client.way import Described, Found
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.bridges import bridges_of, is_some, must_stand_together
 from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import Value
@@ -176,18 +177,19 @@ class LocalWay:
         try:
             bridge.ask(action, node, *words)
         except OSError:
-            raise NoAnswer(f'{node} has gone', asked=False) from None
+            raise NoAnswer(sentences.node_gone(node=node), asked=False) from None
         try:
             return bridge.answers(self._clock.now() + CALL_TIMEOUT)
         except BaseException as error:
             bridge.close()      # what may still come is no answer to the next question
             if isinstance(error, TimeoutError):
-                raise NoAnswer(f'{node} does not answer for {CALL_TIMEOUT:g} s',
+                raise NoAnswer(sentences.node_unanswering(node=node, timeout=CALL_TIMEOUT),
                                asked=True) from None
             if isinstance(error, OSError):
-                raise NoAnswer(f'{node} has gone', asked=True) from None
+                raise NoAnswer(sentences.node_gone(node=node), asked=True) from None
             if isinstance(error, Rubbish):
-                raise NoAnswer(f'{node} does not answer: {error}', asked=False) from None
+                raise NoAnswer(sentences.node_does_not_answer(
+                    node=node, reason=str(error)), asked=False) from None
             raise
 
     def get(self, node: str, names: Sequence[str]) -> Sequence[Found]:

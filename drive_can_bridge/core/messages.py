@@ -34,24 +34,25 @@ class Sentence(str):
     :ivar code: what it says, as a stable word.
     :ivar fields: of what, by name.
     :ivar kind: what it is for programs, where they have to know.
+    :ivar row: of the catalogue; None: it is made of others.
     """
 
-    __slots__ = ('_row', 'code', 'fields', 'kind')
+    __slots__ = ('code', 'fields', 'kind', 'row')
 
     code: str
     fields: Mapping[str, Any]
     kind: Enum | None
-    _row: 'Text | None'
+    row: 'Text | None'
 
     def __new__(cls, text: str = '', code: str = '', fields: Mapping[str, Any] | None = None,
                 kind: Enum | None = None, row: 'Text | None' = None) -> 'Sentence':
         said = super().__new__(cls, text)
-        said.code, said.fields, said.kind, said._row = code, fields or {}, kind, row
+        said.code, said.fields, said.kind, said.row = code, fields or {}, kind, row
         return said
 
     def also(self, **fields: Any) -> 'Sentence':
         """Return the sentence of the same row with further fields."""
-        return self if self._row is None else self._row(**{**self.fields, **fields})
+        return self if self.row is None else self.row(**{**self.fields, **fields})
 
 
 #: what a way to write a number is made of; anything else joins

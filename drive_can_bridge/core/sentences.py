@@ -837,5 +837,155 @@ jog_neutral_unseen = Text(
 jog_interrupted = Text('interrupted', do='nothing: the drive got neutral')
 jog_done = Text('{value} was sent and answered, then neutral', do='nothing')
 
+# -- the bridge, its topics and its services: what the log and answers say ------------------------
+possible_are = Text('possible are {possible:, }', do='ask for one of these')
+being_stopped = Text('the bridge is being stopped', do='start the bridge again when it has ended')
+transition_failed = Text(
+    '{name} failed: {kind}: {text}',
+    do='report it, with the log of the bridge')
+nameless_parameter = Text('a parameter has a name', do='give the parameter a name')
+no_such_type = Text(
+    'type {number} does not exist',
+    do='send one of the types of rcl_interfaces/msg/ParameterType')
+validate_names_lines = Text('drive_can validate {file} names the lines', do='run that command')
+active = Text('active: {drives:#drive} on {buses}', do='nothing')
+stop_frames_not_sent = Text(
+    'bus {bus}: the stop frames could not all be sent: {reason}',
+    do='make sure that its drives stand still, by other means if need be')
+commands_discarded = Text(
+    '{count} commands thrown away: {why}',
+    do='see what held the bridge up; publish again')
+command_while_disabled = Text(
+    'command {name} has no effect: disabled, {enable}',
+    do='enable it, or stop what commands it')
+command_while_not_armed = Text(
+    'command {name} has no effect: not armed, send {neutral} once first',
+    do='publish neutral once, then the value')
+joint_command_short = Text(
+    'joint_command has fewer {quantity} values than names',
+    do='have its publisher give as many values as names')
+call_enable = Text('call ~/enable{whom} ({command})', do='run that command')
+call_reset = Text(
+    'call ~/reset_fault{whom} ({reset}) and ~/enable ({enable})',
+    do='run these commands, when the cause is gone')
+reset_at_drive = Text('reset it at the drive', do='reset it at the drive')
+attendance_failed = Text('attendance: {kind}: {text}', do='report it')
+any_command_to = Text('a command to {topic}/command/{name}', do='publish it')
+neutral_to = Text('{neutral} to {topic}/command/{name}', do='publish it')
+failed_and_looked_for = Text(
+    'offline: {reason}; told to stop, and then looked for again',
+    do='report it, with the log of the bridge')
+command_timed_out = Text(
+    'no command for {timeout:g} s: {names:, } neutral until armed again',
+    do='publish at least once in command_timeout; arm it again')
+no_cyclic_frame = Text(
+    'mapping differs, no cyclic frame is sent: {how}',
+    do='correct the drive or the configuration, or set mapping configure')
+maps_rewritten = Text('maps of the drive rewritten: {how}', do='nothing')
+frame_rejected = Text('frame rejected: {what}', do='see who else sends on its identifiers')
+stopped_state_differs = Text(
+    'told to stop, and answers, but its last status word does not say so: {state}',
+    do='look whether it stands; its status word may lag, or the drive still runs down')
+cannot_publish = Text(
+    'cannot publish: {reason}',
+    do='report it, with the version of the middleware')
+identity_unread = Text(
+    'identity: {name} ({address}): {reason}',
+    do='correct identity or the parameter in the profile')
+too_many_names = Text(
+    '{names} names, at most {most} are allowed',
+    do='publish fewer joints in one message')
+ends_too_soon = Text(
+    '{whole} bytes, which end too soon',
+    do='see who publishes it, and with which middleware')
+too_many_bytes = Text('{whole} bytes, at most {most} are looked at', do='publish shorter messages')
+command_unreadable = Text(
+    'command on {topic} cannot be read: {reason}',
+    do='have its publisher use the type of the topic')
+values_for_names = Text(
+    '{count} {quantity} values for {names} names; allowed are as many as names, with NaN for '
+    'joints that are to be left alone, or none',
+    do='have its publisher give as many values as names')
+joint_twice = Text(
+    '{name} stands twice, allowed is once',
+    do='have its publisher name each joint once')
+foreign_joint = Text(
+    'joint_commands name {name}, which is no joint of this bridge: ignored',
+    do='nothing, where another bridge has that joint; else correct the name')
+local_name_taken = Text(
+    'commands on this host take the way through ROS: another process has the name by which this '
+    'bridge would listen to them',
+    do='nothing; see what other process of this host has the name where it should not')
+makes_no_sense = Text('this makes no sense', do='use a command of the same version as the bridge')
+no_such_node = Text('no such node', do='see ros2 node list for the names of drives')
+unknown_order = Text(
+    'nobody knows what that is',
+    do='use a command of the same version as the bridge')
+lines_left_out = Text(
+    '{lines} more lines left out: too many different ones at once',
+    do='see what floods the log')
+names_in_call = Text(
+    '{names} names in one call, at most {most} are allowed',
+    do='ask with fewer names in one call')
+name_too_long = Text('a name longer than {most} characters', do='use the name of a parameter')
+more_names_failed = Text(
+    '{count} more names of the same call failed',
+    do='see why the others of the call failed')
+internal_error_in_answer = Text(
+    'internal error in an answer: {kind}: {text}',
+    do='report it, with the log of the bridge')
+internal_error_in_callback = Text(
+    'internal error in a callback: {kind}: {text}',
+    do='report it, with the log of the bridge')
+clock_impossible = Text(
+    'the {which} clock says {seconds} s since 1970, stamps hold 0 to {most}: they are 0 until it '
+    'is set right',
+    do='set the clock')
+exchange_late = Text('the exchange was {seconds:.2f} s late', do='see what else the computer does')
+stood_still_for = Text(
+    'the bridge stood still for {seconds:.2f} s',
+    do='see what else the computer does')
+bus_blocks = Text('the bus blocks', do='look at adapter, cable and termination')
+ros_does_not_start = Text(
+    'ROS does not start: {why}',
+    do='correct what it says of ROS_DOMAIN_ID, RMW_IMPLEMENTATION or the installation')
+silent_and_holds = Text(
+    '{name}: {how}, and holds its drives',
+    do='see whether that process hangs; end it and start the bridge again')
+several_not_all_answer = Text(
+    'several bridges are running: {names:, }, and not every one answers: {silent:, }',
+    do='choose one with --namespace; see why the others do not answer')
+node_unanswering = Text(
+    '{node} does not answer for {timeout:g} s',
+    do='see whether the bridge hangs')
+no_such_service = Text(
+    '{node} does not offer {service}',
+    do='see whether it is a drive of a bridge, and of this version')
+way_closed = Text('the way to the bridge is closed already', do='open it again')
+node_gone = Text('{node} has gone', do='see why the bridge has ended')
+node_does_not_answer = Text('{node} does not answer: {reason}', do='see whether the bridge hangs')
+transition_impossible = Text(
+    'transition {transition} is not possible in state {state} ({why})',
+    do='ask for one of the transitions that are possible (ros2 lifecycle list)')
+command_refused = Text(
+    'command {name} refused: {reason}',
+    do='publish a value inside of the range of the setpoint')
+publisher_incompatible = Text(
+    'a publisher of {topic} offers incompatible quality of service ({policy}): nothing is '
+    'received from it',
+    do='have its publisher use the QoS of the topic (docs/ros_interface.md)')
+command_late = Text(
+    'command on {topic} thrown away: it came {seconds:.2f} s later than others have',
+    do='see what slows the network, or the publisher, down')
+joint_states_unpublished = Text(
+    'joint_states cannot be published: {reason}',
+    do='report it, with the version of the middleware')
+joint_commands_refused = Text(
+    'joint_commands refused: {why}',
+    do='correct what publishes joint_commands')
+values_without_names = Text(
+    '{count} {quantity} values and no names',
+    do='have its publisher name the joints')
+
 #: all sentences there are, by their codes
 CODES = catalogue(globals())

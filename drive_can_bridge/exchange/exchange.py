@@ -28,12 +28,12 @@ import threading
 from typing import Any, Generic, TypeVar
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.control import ControlRequest
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Route
 from drive_can_bridge.core.requests import Request
-from drive_can_bridge.core.sentences import bus_hangs
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.member import BusListener, DriveListener, Member, STOP_MARGIN
 from drive_can_bridge.transport.end_point import EndPoint
@@ -373,7 +373,7 @@ class BusExchange:
         member = self._member(session)
         with self.entered() as entered:
             if not entered:
-                raise TransportError(bus_hangs(self.bus.name))
+                raise TransportError(sentences.bus_hangs(self.bus.name))
             now = self._clock()
             self._notice_lost_time(now)     # else an enable would go by what was before
             try:
@@ -484,7 +484,7 @@ class BusExchange:
             self._meant_at = now
             for member in self._members if self.active else ():
                 member.tell(member.listener.discard_commands,
-                            f'the exchange was {late:.2f} s late')
+                            sentences.exchange_late(seconds=late))
         return now
 
     def _tell_again(self, now: float) -> None:
@@ -501,7 +501,7 @@ class BusExchange:
         self._last_pass = self._meant_at = now
         for member in self._members:
             member.tell(member.listener.discard_commands,
-                        f'the bridge stood still for {gap:.2f} s')
+                        sentences.stood_still_for(seconds=gap))
             member.take(member.session.time_lost, now)
         return True
 
@@ -621,7 +621,7 @@ def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
         try:
             if exchange.deactivate():
                 return
-            reason = exchange.bus_reason or 'the bus blocks'
+            reason = exchange.bus_reason or sentences.bus_blocks()
         except Exception as error:  # noqa: BLE001  outermost call of a thread: nothing is silent
             reason = f'{type(error).__name__}: {error}'
         failures[exchange.bus.name] = reason

@@ -17,7 +17,7 @@ import warnings
 from rclpy.service import Service
 
 from drive_can_bridge.clock import Clock, Mailbox
-from drive_can_bridge.core.sentences import answer_not_delivered
+from drive_can_bridge.core import sentences
 from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
 from drive_can_bridge.ros.rcl.unfit import Unfit
@@ -117,7 +117,7 @@ class Answers:
             name = service.service_name
         except GONE:    # meanwhile; nobody misses the answer
             return
-        self._warn(f'answer of {name}', answer_not_delivered(name))
+        self._warn(f'answer of {name}', sentences.answer_not_delivered(name))
 
     # -- the thread that waits for clients out of reach -------------------------------------------
 
@@ -142,4 +142,5 @@ class Answers:
         except GONE:    # service or context are gone
             pass
         except Exception as error:  # noqa: BLE001  outermost call of a thread
-            self._warn('answer', f'internal error in an answer: {type(error).__name__}: {error}')
+            self._warn('answer', sentences.internal_error_in_answer(
+                kind=type(error).__name__, text=str(error)))

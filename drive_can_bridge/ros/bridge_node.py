@@ -43,10 +43,10 @@ from drive_can_bridge.configuration.load import (
     check_dynamic, configuration_from_file, configuration_from_overrides, declared_parameters)
 from drive_can_bridge.configuration.parameter_file import directory_that_sets, unseen_problems
 from drive_can_bridge.configuration.problems import report
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.directory import NAME_SHOWN
 from drive_can_bridge.core.errors import ConfigurationError
-from drive_can_bridge.core.sentences import bus_hangs, rearm_would_jump, requests_hold_up
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.memory import reserve
@@ -182,7 +182,7 @@ class NodeParameters:
             return SetParametersResult(successful=True)
         for parameter in parameters:
             if not parameter.name:  # rclpy would add one
-                return SetParametersResult(successful=False, reason='a parameter has a name')
+                return SetParametersResult(successful=False, reason=sentences.nameless_parameter())
             if parameter.name.startswith(_OURS) or parameter.name in _OURS_ALONE:
                 problem = (check_dynamic(parameter.name, parameter.value)
                            or self._refusal(parameter.name, parameter.value))
@@ -226,7 +226,7 @@ class _Services(ParameterService):
             try:
                 parameters.append(Parameter.from_parameter_msg(message))
             except ValueError:
-                reason = f'type {message.value.type} does not exist'
+                reason: str = sentences.no_such_type(message.value.type)
                 if len(messages) > 1:
                     reason = f'{printable(message.name, NAME_SHOWN)}: {reason}'
                 return SetParametersResult(successful=False, reason=reason)
@@ -281,7 +281,7 @@ class BridgeNode(LifecycleNode):
         self._node_parameters = NodeParameters(self, self._parameter_changed,
                                                self._parameter_refusal, self._made_parameter)
         _guard_transitions(self, self.log.warning, self._transition_lock,
-                           lambda: 'the bridge is being stopped' if self._ending else '')
+                           lambda: sentences.being_stopped() if self._ending else '')
         spinner.executor.add_node(self)
 
     def _service_thread(self, name: str, *options: Any, **more: Any) -> ServiceThread:
@@ -334,10 +334,10 @@ class BridgeNode(LifecycleNode):
             return ''
         with drive.exchange.entered() as entered:
             if not entered:
-                return bus_hangs(drive.exchange.bus.name)
+                return sentences.bus_hangs(drive.exchange.bus.name)
         if name.endswith('.rearm') and value == 'immediate':
             for setpoint in drive.session.setpoints.held:
-                return rearm_would_jump(setpoint.parameter.name)
+                return sentences.rearm_would_jump(setpoint.parameter.name)
         return ''
 
     def _made_parameter(self, name: str) -> Any:
@@ -393,7 +393,8 @@ class BridgeNode(LifecycleNode):
                 self.log.error(problem)
             return FAILURE
         except Exception as error:  # noqa: BLE001  see above
-            self.log.error(f'{name} failed: {type(error).__name__}: {error}')
+            self.log.error(sentences.transition_failed(
+                name=name, kind=type(error).__name__, text=str(error)))
             return TransitionCallbackReturn.ERROR
         return SUCCESS
 
@@ -411,7 +412,7 @@ class BridgeNode(LifecycleNode):
                 self._node_parameters.current, adapters=adapters,
                 namespace=self.get_namespace().rstrip('/'), setter=self._directory_that_sets)
         except ConfigurationError as error:
-            lines = [f'drive_can validate {shlex.quote(file)} names the lines'
+            lines = [sentences.validate_names_lines(file=shlex.quote(file))
                      for file in filter(_is_wrong, self._files)][:1]
             raise ConfigurationError([*problems, *error.problems, *lines]) from None
         if problems:
@@ -549,7 +550,7 @@ def _rcl_services(services: Iterable[Service], warn: Callable[[str], None]) -> R
         for service in services:
             rcl.check(service)
     except Unfit as error:
-        warn(requests_hold_up(str(error)))
+        warn(sentences.requests_hold_up(str(error)))
         return None
     return rcl
 
@@ -597,14 +598,14 @@ def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: L
             possible = {known: name for known, name, *_ in machine.available_transitions}
             why = refusal()
             if not why and (label not in possible.values() if label else number not in possible):
-                why = f'possible are {", ".join(possible.values()) or "none"}'
+                why = sentences.possible_are(list(possible.values()) or ['none'])
             if not why:
                 try:
                     return change_state(request, response)
                 except RuntimeError as error:
                     why = printable(' '.join(str(error).split()))
-            warn(f'transition {printable(label) or f"number {number}"} is not possible in state '
-                 f'{machine.current_state[1]} ({why})')
+            warn(sentences.transition_impossible(
+                printable(label) or f'number {number}', machine.current_state[1], why))
             response.success = False
             return response
 

@@ -21,11 +21,11 @@ from std_srvs.srv import Trigger as TriggerService
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import identity_name
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.events import DriveState, Event, MappingDiffered, StationLost
-from drive_can_bridge.core.sentences import no_memory_limit, nothing_recorded
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.exchange.exchange import BusExchange, stop_all
 from drive_can_bridge.exchange.one_master import InUse, Ownership
@@ -177,7 +177,7 @@ class FlightWatch:
     async def _saved(self, response: Any) -> Any:
         buses = self._recorder.buses
         if not buses:
-            response.success, response.message = False, nothing_recorded()
+            response.success, response.message = False, sentences.nothing_recorded()
             return response
         paths: list[str] = []
         refusals: list[str] = []
@@ -336,8 +336,8 @@ class BridgeRuntime:
             exchange.activate()
         self._attendance.begin()
         self._limit_memory()
-        self._log.info(f'active: {counted(len(self.drives), "drive")} on '
-                       f'{counted(len(self.exchanges), "bus", "buses")}')
+        self._log.info(sentences.active(
+            drives=len(self.drives), buses=counted(len(self.exchanges), 'bus', 'buses')))
 
     def _limit_memory(self) -> None:
         """Limit what requests may take; who must go on has what that takes."""
@@ -350,7 +350,7 @@ class BridgeRuntime:
             try:
                 data_limit.set(megabytes * MEGABYTE + self._flight.memory)
             except OSError as error:
-                self._log.warning(no_memory_limit(str(error)))
+                self._log.warning(sentences.no_memory_limit(str(error)))
 
     def stop(self) -> None:
         """Stop the drives safely, if they run."""
@@ -358,7 +358,7 @@ class BridgeRuntime:
             failures = stop_all(self.exchanges.values(), self._clock)
         self._attendance.end()      # which may be waiting for a bus that hangs
         for bus, reason in failures.items():
-            self._log.error(f'bus {bus}: the stop frames could not all be sent: {reason}')
+            self._log.error(sentences.stop_frames_not_sent(bus=bus, reason=reason))
 
     def close(self) -> None:
         """Close the buses, let the drives go, let others have them."""

@@ -18,10 +18,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import is_misplaced_integer, Value, ValueKind
-from drive_can_bridge.core.sentences import joint_not_named, joint_quantity_ignored
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.core.text import value_text
@@ -43,16 +43,16 @@ def _by_hand(command: str, drive: str, node: Node) -> str:
 def how_to_enable(session: Session, node: Node) -> str:
     """Say what to do about a drive that is disabled."""
     lead, whom = _leader(session)
-    return f'call ~/enable{whom} ({_by_hand("enable", lead, node)})'
+    return sentences.call_enable(whom=whom, command=_by_hand('enable', lead, node))
 
 
 def how_to_reset(session: Session, node: Node) -> str:
     """Say what to do about a drive in fault, when its cause is gone."""
     if session.control is None:
-        return 'reset it at the drive'
+        return sentences.reset_at_drive()
     lead, whom = _leader(session)
-    return (f'call ~/reset_fault{whom} ({_by_hand("reset", lead, node)}) and ~/enable '
-            f'({_by_hand("enable", lead, node)})')
+    return sentences.call_reset(
+        whom=whom, reset=_by_hand('reset', lead, node), enable=_by_hand('enable', lead, node))
 
 
 def _leader(session: Session) -> tuple[str, str]:
@@ -123,7 +123,7 @@ class CommandIntake:
         """Count and tell commands that were thrown away."""
         if count and why:
             self._session.statistics.commands_refused += count
-            self._warn('discarded', f'{count} commands thrown away: {why}')
+            self._warn('discarded', sentences.commands_discarded(count=count, why=why))
 
     def destroy(self) -> None:
         """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
@@ -156,19 +156,18 @@ class CommandIntake:
             outcome = session.services.command(index, value, now)
         except ValueRefused as error:
             name = session.setpoints.items[index].parameter.name
-            self._warn(f'refused {name}', f'command {name} refused: {error}')
+            self._warn(f'refused {name}', sentences.command_refused(name, str(error)))
             return
         if outcome is CommandOutcome.DISABLED and session.active:
             name = session.setpoints.items[index].parameter.name
-            self._warn('disabled', f'command {name} has no effect: disabled, '
-                       f'{how_to_enable(session, self._node)}', once=True)
+            self._warn('disabled', sentences.command_while_disabled(
+                name=name, enable=how_to_enable(session, self._node)), once=True)
         if outcome is CommandOutcome.NOT_ARMED and session.setpoints.enabled:
             parameter = session.setpoints.items[index].parameter
             neutral = value_text(
                 parameter.value_from_raw(session.setpoints.items[index].neutral))
             self._warn(f'not armed {parameter.name}',
-                       f'command {parameter.name} has no effect: not armed, send {neutral} '
-                       f'once first')
+                       sentences.command_while_not_armed(name=parameter.name, neutral=neutral))
 
     def _take_joint(self, message: JointMessage, now: float) -> None:
         joint = self._joint
@@ -178,14 +177,14 @@ class CommandIntake:
             entry = message.names.index(joint.name)
         except ValueError:
             self._session.statistics.commands_refused += 1
-            self._warn('joint name', joint_not_named(joint.name), once=True)
+            self._warn('joint name', sentences.joint_not_named(joint.name), once=True)
             return
         for quantity, values in message.columns:
             if entry < len(values):
                 self.take_quantity(quantity, values[entry], now)
             elif quantity in self._joint_targets:
                 self.refuse(f'joint {quantity}',
-                            f'joint_command has fewer {quantity} values than names')
+                            sentences.joint_command_short(quantity=quantity))
             else:
                 self._tell_ignored(quantity)
 
@@ -219,7 +218,7 @@ class CommandIntake:
     def _tell_ignored(self, quantity: str) -> None:
         if quantity not in self._told:
             self._told.add(quantity)
-            self._inform(joint_quantity_ignored(quantity))
+            self._inform(sentences.joint_quantity_ignored(quantity))
 
     def refuse(self, topic: str, text: str) -> None:
         """Count and tell a command that is thrown away."""

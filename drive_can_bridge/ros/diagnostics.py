@@ -89,7 +89,7 @@ class Attendance:
             if not self._over.wait(self._clock.now() + GRACE):
                 self.look()
         except Exception as error:  # noqa: BLE001  outermost of a thread: no failure is silent
-            self._log.error(f'attendance: {type(error).__name__}: {error}')
+            self._log.error(sentences.attendance_failed(type(error).__name__, str(error)))
 
     def look(self) -> None:
         """Say who is missing."""
@@ -324,10 +324,11 @@ class DriveReporter:
         for setpoint in session.setpoints.waiting:
             parameter = setpoint.parameter
             if session.setpoints.rearm_immediate:
-                wanted.append(f'a command to {name}/command/{parameter.name}')
+                wanted.append(sentences.any_command_to(topic=name, name=parameter.name))
             else:
                 neutral = value_text(parameter.value_from_raw(setpoint.neutral))
-                wanted.append(f'{neutral} to {name}/command/{parameter.name}')
+                wanted.append(sentences.neutral_to(
+                    neutral=neutral, topic=name, name=parameter.name))
         return sentences.not_armed(wanted)
 
 

@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter as NodeParameter
 from std_msgs.msg import Bool
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -27,7 +28,6 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, Outcome, ReadRequest, ReadValue, Request)
-from drive_can_bridge.core.sentences import answer_late, bridge_inactive, internal_error
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -157,7 +157,7 @@ class DriveNode(DriveListener):
         :return: all calls are answered, and the node may go.
         """
         for request in list(self._asked):
-            self._refuse(request, bridge_inactive())
+            self._refuse(request, sentences.bridge_inactive())
         return not self.calls
 
     @property
@@ -254,23 +254,23 @@ class DriveNode(DriveListener):
             elif event.ordered and not self._may_run:
                 self._tell_stopped()    # else it was lost before the end of its stop
         elif isinstance(event, DriveFailed):
-            self._log.error(f'offline: {event.reason}; told to stop, and then looked for again')
+            self._log.error(sentences.failed_and_looked_for(reason=event.reason))
             self._tell_online(False)
             self.samples.forget()
             self.times_lost += 1
         elif isinstance(event, SetpointsExpired):
             self.warn('command timeout',
-                      f'no command for {self.session.configuration.command_timeout:g} s: '
-                      f'{", ".join(event.names)} neutral until armed again')
+                      sentences.command_timed_out(
+                          self.session.configuration.command_timeout, event.names))
         elif isinstance(event, MappingDiffered):
-            self._log.error(f'mapping differs, no cyclic frame is sent: {event.text}')
+            self._log.error(sentences.no_cyclic_frame(how=event.text))
         elif isinstance(event, MappingWritten):
-            self._log.warning(f'maps of the drive rewritten: {event.text}')
+            self._log.warning(sentences.maps_rewritten(how=event.text))
         elif isinstance(event, FrameRejected):
             self.rejected_text = event.text
-            self.warn('rejected', f'frame rejected: {event.text}')
+            self.warn('rejected', sentences.frame_rejected(what=event.text))
         elif isinstance(event, AnswerLate):
-            self._log.warning(answer_late(event.seconds))
+            self._log.warning(sentences.answer_late(event.seconds))
         elif isinstance(event, ForeignMasterSeen):
             self.foreign_text = event.text
             self.warn('foreign master', event.text)
@@ -314,14 +314,13 @@ class DriveNode(DriveListener):
         control = self.session.control
         if control is not None and control.table.enabled is not None and not control.off:
             # it may lag, or the drive runs down
-            self._log.warning(f'told to stop, and answers, but its last status word does not say '
-                              f'so: {control.state}')
+            self._log.warning(sentences.stopped_state_differs(state=control.state))
         else:
             self._log.info('stopped')
 
     def _cannot_publish(self, error: Exception) -> None:
         if self.node.context.ok():
-            self.warn('publish', f'cannot publish: {error}')
+            self.warn('publish', sentences.cannot_publish(reason=str(error)))
 
     # -- users ------------------------------------------------------------------------------------
 
@@ -368,7 +367,7 @@ class DriveNode(DriveListener):
         except TransportError as error:     # no other drive's stop waits for it
             self._refuse(request, error.sentence)
         except Exception as error:  # noqa: BLE001  told as the drive's; whoever asks is not left out
-            self._refuse(request, internal_error(type(error).__name__, str(error)))
+            self._refuse(request, sentences.internal_error(type(error).__name__, str(error)))
 
     def _refuse(self, request: Request | ControlRequest, reason: Sentence) -> None:
         """Tell whoever asked that nothing comes of it, unless there was an answer."""
@@ -446,7 +445,8 @@ class IdentityReader:
             self._known.append(f'{parameter.name}={value}')
         elif isinstance(outcome, Failure):
             self._failures += 1
-            self._warn(f'identity: {parameter.name} ({parameter.address}): {outcome.reason}')
+            self._warn(sentences.identity_unread(
+                name=parameter.name, address=parameter.address, reason=outcome.reason))
         if place + 1 < len(self._parameters) and self._failures < FAILURES_MAX:
             self._ask(attempt, place + 1)
         else:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.ros.polled_topics import HEADER
 
 #: what a JointState carries beside names
@@ -130,7 +131,7 @@ class JointReader:
 
 def _check(names: int) -> None:
     if names > NAMES_MAX:
-        raise ValueError(f'{names} names, at most {NAMES_MAX} are allowed')
+        raise ValueError(sentences.too_many_names(names=names, most=NAMES_MAX))
 
 
 def _name_count(data: bytes) -> int:
@@ -171,7 +172,7 @@ def _fields(data: bytes) -> list[_Field]:
         fields.append((kind, size))
         at += filled + size
         if at > whole:
-            raise ValueError(f'{whole} bytes, which end too soon')
+            raise ValueError(sentences.ends_too_soon(whole=whole))
         return at - size
 
     def count() -> int:

@@ -26,6 +26,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, JointConfiguration
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import PeriodicTask
@@ -120,7 +121,7 @@ class JointStates:
                 self._publish(now)
         except GONE as error:
             if self._node.context.ok():
-                self._warn('joint states', f'joint_states cannot be published: {error}')
+                self._warn('joint states', sentences.joint_states_unpublished(str(error)))
 
     def destroy(self) -> None:
         """Take the publisher out of its node."""
@@ -250,7 +251,7 @@ class _Taker:
             for name in self._joints.keys() & set(names):
                 self._joints[name].commands.count_refused()
             kind, text = wrong
-            self._warn(f'joint commands: {kind}', f'joint_commands refused: {text}')
+            self._warn(f'joint commands: {kind}', sentences.joint_commands_refused(text))
             return
         if names != self._names:
             self._names = names
@@ -286,20 +287,18 @@ class _Taker:
                  columns: Sequence[Column]) -> tuple[str, str] | None:
         """Return what kind of problem a message has, and the words for it; None: it has none."""
         if columns and not names:
-            return 'no names', f'{len(columns[0][1])} {columns[0][0]} values and no names'
+            return 'no names', sentences.values_without_names(
+                len(columns[0][1]), columns[0][0])
         for quantity, values in columns:
             if len(values) != len(names):
-                return 'length', (
-                    f'{len(values)} {quantity} values for {len(names)} names; allowed are as '
-                    f'many as names, with NaN for joints that are to be left alone, or none')
+                return 'length', sentences.values_for_names(len(values), quantity, len(names))
         if names != self._names and len(set(names)) != len(names):
             twice, _ = Counter(names).most_common(1)[0]
-            return 'twice', f'{printable(twice)} stands twice, allowed is once'
+            return 'twice', sentences.joint_twice(name=printable(twice))
         return None
 
     def _tell_stranger(self, name: str) -> None:
         """Say once that a joint is none of this bridge; there may be any number of them."""
         if name not in self._strangers and len(self._strangers) < STRANGERS_MAX:
             self._strangers.add(name)
-            self._inform(f'joint_commands name {printable(name)}, which is no joint of this '
-                         f'bridge: ignored')
+            self._inform(sentences.foreign_joint(name=printable(name)))

@@ -16,6 +16,7 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, ListParameters, SetParameters)
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.process.local_server import Asked, LocalServer
 from drive_can_bridge.process.local_way import (
@@ -75,8 +76,7 @@ class LocalWay:
         if not switched_on():
             return
         if presence.taken:
-            warn('commands on this host take the way through ROS: another process has the name '
-                 'by which this bridge would listen to them')
+            warn(sentences.local_name_taken())
             return
         self._server = LocalServer(
             presence.socket, self.serve, open_to_all=not security_enforced(), report=warn,
@@ -102,7 +102,7 @@ class LocalWay:
         elif asked.action in _CALLS:
             self._call(asked)
         else:
-            asked.refuse('nobody knows what that is')
+            asked.refuse(sentences.unknown_order())
 
     # -- what a hand does -------------------------------------------------------------------------
 
@@ -166,7 +166,7 @@ class LocalWay:
         try:
             service, request, show = _CALLS[asked.action](words)
         except (IndexError, Rubbish):
-            asked.refuse('this makes no sense')
+            asked.refuse(sentences.makes_no_sense())
             return
 
         def answer(response: Any) -> None:
@@ -180,7 +180,7 @@ class LocalWay:
         elif node == self._name and asked.action == 'get':
             self._spinner.later(lambda: answer(self._get(request, GetParameters.Response())))
         else:
-            asked.refuse('no such node')
+            asked.refuse(sentences.no_such_node())
 
 
 #: of what is asked: service, request, and what its response is in messages

@@ -33,7 +33,7 @@ import threading
 from typing import Any
 
 from drive_can_bridge.clock import Clock, Mailbox
-from drive_can_bridge.core.sentences import log_too_fast
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.standard_outputs import MOMENT, Taking
 
@@ -187,8 +187,7 @@ class Speaker:
                 self._sum_up(newest, now)
                 summed_up = newest
         if self._left_out:
-            self._emit(Level.WARNING, f'{self._left_out} more lines left out: too many different '
-                                      f'ones at once')
+            self._emit(Level.WARNING, sentences.lines_left_out(lines=self._left_out))
             self._left_out = 0
         if summed_up is not None and newest is not None and summed_up is not newest:
             # written before all this, which was over by then: how it is now stands last
@@ -379,7 +378,7 @@ class Log:
             self._limit.sum_up()
             if self._dropped and (not self._lines or line is _END):
                 dropped, self._dropped = self._dropped, 0
-                self._write(Level.WARNING, log_too_fast(dropped))
+                self._write(Level.WARNING, sentences.log_too_fast(dropped))
             if line is _END:
                 return
 

@@ -21,6 +21,7 @@ from rcl_interfaces.srv import (
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameter_events
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.directory import contradictions, NAME_SHOWN, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
@@ -29,7 +30,6 @@ from drive_can_bridge.core.requests import (
     Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
 )
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import bridge_inactive, nothing_written
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
@@ -98,9 +98,9 @@ class ParameterServices:
         of them logged.
         """
         if len(names) > NAMES_MAX:
-            reason = f'{len(names)} names in one call, at most {NAMES_MAX} are allowed'
+            reason = sentences.names_in_call(names=len(names), most=NAMES_MAX)
         elif any(len(name) > TEXT_MAX for name in names):
-            reason = f'a name longer than {TEXT_MAX} characters'
+            reason = sentences.name_too_long(most=TEXT_MAX)
         else:
             return ''
         self._failed(what, reason, len(names))
@@ -141,8 +141,8 @@ class ParameterServices:
         elif request.names:
             for name, known in zip(request.names, found):
                 if known is not None:
-                    self._remember(name, bridge_inactive())
-            self._failed('read parameters', bridge_inactive(),
+                    self._remember(name, sentences.bridge_inactive())
+            self._failed('read parameters', sentences.bridge_inactive(),
                          sum(parameter is not None for parameter in found))
         response.values = [values.get(place, _NOT_SET) for place in range(len(found))]
         return response
@@ -228,7 +228,7 @@ class ParameterServices:
         excess = self._excess([message.name for message in request.parameters],
                               'set parameters')
         if excess:
-            response.result = SetParametersResult(reason=nothing_written(excess))
+            response.result = SetParametersResult(reason=sentences.nothing_written(excess))
             return response
         items: list[tuple[Parameter, int]] = []
         for message in request.parameters:
@@ -262,7 +262,7 @@ class ParameterServices:
     def _nothing_set(self, response: Any, name: str, reason: str) -> Any:
         """Refuse all of a call for one of its names."""
         shown = printable(name, NAME_SHOWN)
-        reason = nothing_written(f'{shown}: {reason}')
+        reason = sentences.nothing_written(f'{shown}: {reason}')
         self._failed(f'set {shown}', reason, 1)
         response.result = SetParametersResult(reason=reason)
         return response
@@ -278,7 +278,7 @@ class ParameterServices:
         if parameter is None:
             raise ValueRefused(self._directory.unknown(message.name, hint=hint))
         if not self._active():
-            raise ValueRefused(bridge_inactive())
+            raise ValueRefused(sentences.bridge_inactive())
         refusal = self._write_refusal(parameter)
         if refusal:
             raise ValueRefused(refusal)
@@ -290,7 +290,7 @@ class ParameterServices:
             self._failed(f'{what} {printable(name, NAME_SHOWN)}', reason, 1)
         more = len(failures) - TOLD_MAX
         if more > 0:
-            self._failed(f'{what} parameters', f'{more} more names of the same call failed', more)
+            self._failed(f'{what} parameters', sentences.more_names_failed(more), more)
 
     def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Failure]]) -> None:
         """Log what became of a call's names: of what is no fault of theirs what a log takes."""
@@ -301,7 +301,7 @@ class ParameterServices:
                 self._failed(f'{what} {_title(parameter)}', failure.reason, 0)
         if alike > BURST:
             self._failed(f'{what} parameters',
-                         f'{alike - BURST} more names of the same call failed', 0)
+                         sentences.more_names_failed(count=alike - BURST), 0)
 
     def _announce(self, written: list[tuple[str, Parameter, int]]) -> None:
         if not written:

@@ -29,8 +29,8 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_age import Age, ALONE, CommandAges
-from drive_can_bridge.core.sentences import clock_of_publisher_set, clocks_differ, steadily_late
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.ros.middleware import command_quality, GONE, overriding
 
@@ -151,9 +151,9 @@ class CommandTopic:
             if HEADER + code.size <= len(data) < HEADER + code.size + 4:
                 return code.unpack_from(data, HEADER)[0]
         if len(data) < self._shortest:  # no middleware need have words for that
-            raise ValueError(f'{len(data)} bytes, which end too soon')
+            raise ValueError(sentences.ends_too_soon(whole=len(data)))
         if len(data) > LENGTH_MAX:
-            raise ValueError(f'{len(data)} bytes, at most {LENGTH_MAX} are looked at')
+            raise ValueError(sentences.too_many_bytes(whole=len(data), most=LENGTH_MAX))
         message = self._read(data)
         return message.data if self._structs else message
 
@@ -247,9 +247,8 @@ class PolledTopics:
         name = node.resolve_topic_name(topic)
 
         def incompatible(status: Any) -> None:
-            self._warn(f'quality {name}', f'a publisher of {name} offers incompatible quality of '
-                       f'service ({qos_policy_name_from_kind(status.last_policy_kind)}): nothing '
-                       f'is received from it')
+            self._warn(f'quality {name}', sentences.publisher_incompatible(
+                name, qos_policy_name_from_kind(status.last_policy_kind)))
         subscription = node.create_subscription(
             message_type, topic, _never, command_quality(), callback_group=self._group,
             qos_overriding_options=overriding(node, topic),
@@ -260,18 +259,18 @@ class PolledTopics:
 
         def aged(age: Age, seconds: float) -> None:
             if age is Age.LATE:
-                self._refuse(f'late {name}', f'command on {name} thrown away: it came '
-                             f'{seconds:.2f} s later than others have')
+                self._refuse(f'late {name}', sentences.command_late(name, seconds))
             elif age is Age.CLOCKS_DIFFER:
-                self._refuse(f'clocks {name}', clocks_differ(name, seconds))
+                self._refuse(f'clocks {name}', sentences.clocks_differ(name, seconds))
             else:
                 disarm()
-                said = clock_of_publisher_set if age is Age.CLOCK_SET else steadily_late
+                said = (sentences.clock_of_publisher_set if age is Age.CLOCK_SET else
+                        sentences.steadily_late)
                 self._warn(f'begins again {name}', said(name, seconds))
 
         def unreadable(reason: str) -> None:
             self._refuse(f'unreadable {name}',
-                         f'command on {name} cannot be read: {printable(reason)}')
+                         sentences.command_unreadable(topic=name, reason=printable(reason)))
         self._topics.append(CommandTopic(subscription, use=take, old=old, aged=aged,
                                          unreadable=unreadable, read=read))
 

@@ -9,6 +9,7 @@ from builtin_interfaces.msg import Time
 from rclpy.clock import Clock as RosClock, ROSClock
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 
 #: s that two looks at clocks may be apart, and how often it is tried
 APART_MAX = 0.0001
@@ -85,9 +86,9 @@ class Stamps:
             return divmod(nanoseconds, NANOSECONDS)
         if not self._told:
             self._told = True
-            self._warn(f'the {"simulated" if self._simulated else "system"} clock says '
-                       f'{nanoseconds // NANOSECONDS} s since 1970, stamps hold 0 to '
-                       f'{SECONDS_MAX}: they are 0 until it is set right')
+            self._warn(sentences.clock_impossible(
+                'simulated' if self._simulated else 'system', nanoseconds // NANOSECONDS,
+                SECONDS_MAX))
         return NO_STAMP
 
 

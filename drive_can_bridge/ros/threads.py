@@ -34,8 +34,8 @@ from rclpy.service import Service
 from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.core.sentences import service_given_up
 from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.polled_topics import PolledGroup
 from drive_can_bridge.ros.requests import full_name, Take, take_by_rclpy
@@ -121,7 +121,8 @@ class ExecutorThread:
                     return
                 now = self._clock.now()
                 if not isinstance(error, InvalidHandle) or now > self._left_at + LEAVING:
-                    self._report(f'internal error in a callback: {type(error).__name__}: {error}')
+                    self._report(sentences.internal_error_in_callback(
+                        kind=type(error).__name__, text=str(error)))
                 self._clock.wait(now + ERROR_PAUSE)
 
 
@@ -316,7 +317,8 @@ class ServiceThread:
             except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
                 if self._ending:
                     return
-                self._report(f'internal error in a callback: {type(error).__name__}: {error}')
+                self._report(sentences.internal_error_in_callback(
+                    kind=type(error).__name__, text=str(error)))
                 self._clock.wait(self._clock.now() + ERROR_PAUSE)
         if taker.superseded:
             taker.guard.destroy_when_not_in_use()
@@ -394,7 +396,7 @@ class ServiceThread:
             self._stopped_threads[service] += 1
             if self._stopped_threads[service] >= STOPPED_MAX:
                 self._served.pop(service, None)
-                self._report(service_given_up(full_name(service), STOPPED_MAX))
+                self._report(sentences.service_given_up(full_name(service), STOPPED_MAX))
             self._taker.change()
 
     # -- the thread that answers ------------------------------------------------------------------
@@ -432,7 +434,7 @@ class ServiceThread:
         try:
             job()
         except Exception as error:  # noqa: BLE001  outermost loop: no failure is silent
-            self._report(f'internal error in an answer: {type(error).__name__}: {error}')
+            self._report(sentences.internal_error_in_answer(type(error).__name__, str(error)))
         return True
 
 

@@ -30,6 +30,7 @@ from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.sentences import client_by_rclpy
 from drive_can_bridge.core.text import printable
@@ -88,7 +89,7 @@ class ClientNode:
     def __init__(self, purpose: str) -> None:
         why = domain_problem()
         if why:
-            raise DriveCanError(f'ROS does not start: {why}')
+            raise DriveCanError(sentences.ros_does_not_start(why=why))
         self.context = Context()
         # a leading underscore hides a node from "ros2 node list"
         name = f'_drive_can_{purpose}_{os.getpid()}'
@@ -99,7 +100,7 @@ class ClientNode:
             self.end = End(self.context, name, _tell_slow)
         except Exception as error:  # rcl fails in several types
             reason = str(error).partition(', at ')[0]
-            raise DriveCanError(f'ROS does not start: {reason}') from error
+            raise DriveCanError(sentences.ros_does_not_start(why=reason)) from error
 
     @property
     def open(self) -> bool:

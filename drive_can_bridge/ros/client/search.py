@@ -22,6 +22,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.bridges import bridges_of, must_stand_together, stand_apart
 from drive_can_bridge.core.errors import (
     DriveCanError, NoAnswer, NoBridge, SilentBridge, WhichBridge)
@@ -105,9 +106,9 @@ class Graph:
             self._heard.add(node)
             return answers[0]
         if calls.offered(node, service):
-            raise NoAnswer(f'{node} does not answer for {timeout:g} s', asked=asked)
-        raise NoAnswer(f'{node} has gone' if node in self._heard
-                       else f'{node} does not offer {service}', asked=asked)
+            raise NoAnswer(sentences.node_unanswering(node=node, timeout=timeout), asked=asked)
+        raise NoAnswer(sentences.node_gone(node) if node in self._heard
+                       else sentences.no_such_service(node=node, service=service), asked=asked)
 
     def newest_status(self, name: str, *, age: float, patience: float) -> dict[str, str]:
         """
@@ -136,7 +137,7 @@ class Graph:
 
     def _check(self) -> None:
         if not self.client_node.open:
-            raise DriveCanError('the way to the bridge is closed already')
+            raise DriveCanError(sentences.way_closed())
 
 
 #: s without anything new in the graph until nobody is there, and how long that may go on
@@ -314,8 +315,8 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     must_stand_together(names)
     silent = [name for name in names if not search.found[name].answered]
     if silent and len(names) > 1:
-        raise WhichBridge(f'several bridges are running: {", ".join(names)}, and not every one '
-                          f'answers: {", ".join(silent)}')
+        raise WhichBridge(sentences.several_not_all_answer(
+            names=names, silent=silent))
     bridge_of = bridges_of({name: search.found[name].drives or () for name in names})
     if silent or not bridge_of:
         raise _none(graph, namespace, search.found.values(), silent)
@@ -356,6 +357,7 @@ def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],
         return SilentBridge(nobody(pattern, silent))
     domain = graph.client_node.context.get_domain_id()
     known = {short(each.name) for each in seen}
-    hung = [f'{each.name}: {each.silence(domain)}, and holds its drives' for each in bridges()
+    hung = [sentences.silent_and_holds(name=each.name, how=each.silence(domain))
+            for each in bridges()
             if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
     return SilentBridge('; '.join(hung)) if hung else NoBridge(nobody(pattern))
