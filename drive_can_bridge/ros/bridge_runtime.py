@@ -16,7 +16,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
-from rclpy.task import Future
 from std_srvs.srv import Trigger as TriggerService
 
 from drive_can_bridge.clock import Clock
@@ -40,7 +39,8 @@ from drive_can_bridge.ros.local_way import LocalWay
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.passing import Passing
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import ExecutorThread, PeriodicThread, ServiceThread
+from drive_can_bridge.ros.threads import (
+    ExecutorThread, PeriodicThread, Question, ServiceThread)
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.failures import with_outlook
@@ -179,20 +179,24 @@ class FlightWatch:
         if not buses:
             response.success, response.message = False, sentences.nothing_recorded()
             return response
-        paths: list[str] = []
-        refusals: list[str] = []
-        for future in [self._ask(bus) for bus in buses]:
-            path, refusal = await future
-            (paths if path else refusals).append(path or refusal)
+        told = await Question[list[tuple[str, str]]](partial(self._ask, buses))
+        paths = [path for path, _ in told if path]
+        refusals = [refusal for path, refusal in told if not path]
         response.success = bool(paths) and not refusals
         response.message = '\n'.join([*paths, *refusals])
         return response
 
-    def _ask(self, bus: str) -> Future:
-        future = Future(executor=self._thread.executor)
-        self._recorder.save(bus, 'save_trace', lambda path, refusal: self._thread.later(
-            future.set_result, (path, refusal)))
-        return future
+    def _ask(self, buses: Sequence[str],
+             done: Callable[[list[tuple[str, str]]], None]) -> None:
+        """Have the traces of several buses written; told when there is the last one."""
+        told: dict[str, tuple[str, str]] = {}
+
+        def written(bus: str, path: str, refusal: str) -> None:
+            told[bus] = path, refusal
+            if len(told) == len(buses):
+                done([told[each] for each in buses])
+        for bus in buses:
+            self._recorder.save(bus, 'save_trace', partial(self._thread.later, written, bus))
 
 
 def _tell(occasions: Occasions, drive: DriveNode, event: Event) -> None:

@@ -15,7 +15,7 @@ coroutine, the one that answers goes on with it.
 
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from functools import partial
 from inspect import isawaitable
 import math
@@ -52,6 +52,7 @@ TAKE_MAX = 8
 STOP_PATIENCE = 1.0
 #: threads that the requests of one service may stop for ever: each keeps its stack
 STOPPED_MAX = 3
+_NO_LOCK: AbstractContextManager[Any] = nullcontext()
 
 #: takes the response, or the error that there is none for; to be called once, from any thread
 Answer = Callable[[Any], None]
@@ -465,22 +466,25 @@ class ExecutorServices:
         """Begin to serve services."""
         for service in services:
             service.callback_group = PolledGroup()
-            self._thread.serve(service, partial(self._spinner.later, _serve, service))
+            self._thread.serve(service, partial(self._spinner.later, self._serve, service))
 
     def leave(self, service: Service, then: Callable[[], object]) -> None:
         """Stop to serve one; what follows happens when its answers have been sent."""
         self._thread.forget([service])
         self._thread.later(partial(self._spinner.later, then))
 
-
-async def _serve(service: Service, request: Any, answer: Answer) -> None:
-    kind: Any = service.srv_type
-    try:
-        response = service.callback(request, kind.Response())
-        answer(await response if isawaitable(response) else response)
-    except Exception as error:
-        answer(error)
-        raise
+    def _serve(self, service: Service, request: Any, answer: Answer) -> None:
+        kind: Any = service.srv_type
+        try:
+            response = service.callback(request, kind.Response())
+        except Exception as error:
+            answer(error)
+            raise
+        if isawaitable(response):
+            coroutine: Any = response
+            go_on(coroutine, self._spinner.later, answer)
+        else:
+            answer(response)
 
 
 class Question(Generic[AnswerT]):
@@ -497,6 +501,33 @@ class Question(Generic[AnswerT]):
 
     def __await__(self) -> Generator[Any, AnswerT, AnswerT]:
         return (yield self)
+
+
+def go_on(coroutine: Coroutine[Any, Any, Any], later: Callable[[Callable[[], None]], None],
+          answer: Answer, found: Any = None, *,
+          alone: AbstractContextManager[Any] = _NO_LOCK) -> None:
+    """
+    Run a coroutine until it asks something, and once there is an answer go on, to its end.
+
+    No future of rclpy takes part: an executor looks at those in an order that differs with its
+    version, and may sleep over one that was completed.
+
+    :param later: has the rest done, in the thread that is meant for it.
+    :param answer: takes what the coroutine returns, or raises.
+    :param found: the answer to what it has asked.
+    :param alone: is held while it runs.
+    """
+    try:
+        with alone:
+            question: Question[Any] = coroutine.send(found)
+        question.ask(lambda what: later(
+            partial(go_on, coroutine, later, answer, what, alone=alone)))
+    except StopIteration as end:
+        answer(end.value)
+    except Exception as error:
+        coroutine.close()
+        answer(error)
+        raise
 
 
 class CoroutineServices:
@@ -547,21 +578,7 @@ class CoroutineServices:
                answer: Answer) -> None:
         with self._counting:
             self.calls += 1
-        self._go_on(callback(request, response()), answer, None)
-
-    def _go_on(self, coroutine: Coroutine[Any, Any, Any], answer: Answer, found: Any) -> None:
-        """Run a coroutine until it asks something, or to its end."""
-        try:
-            with self._running:
-                question: Question[Any] = coroutine.send(found)
-            question.ask(lambda what: self._thread.later(
-                partial(self._go_on, coroutine, answer, what)))
-        except StopIteration as end:
-            answer(end.value)
-        except Exception as error:
-            coroutine.close()
-            answer(error)
-            raise
+        go_on(callback(request, response()), self._thread.later, answer, alone=self._running)
 
     def _ended(self) -> None:
         """Record that one caller less waits: it was answered, or is out of reach."""
