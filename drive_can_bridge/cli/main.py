@@ -34,6 +34,7 @@ GROUPS: dict[str, dict[str, str]] = {
         'simulate': 'play every drive of a parameter file on its bus',
     },
     'Set up a bridge': {
+        'adapters': 'list the CAN adapters of this host',
         'scan': 'find the drives on a bus',
         'probe': 'settle by reads which keys a drive needs',
         'profile': 'list, show, check and import parameter tables',
@@ -70,6 +71,7 @@ SUBCOMMANDS = {name: text for group in GROUPS.values() for name, text in group.i
 EXAMPLES: dict[str, tuple[str, str]] = {
     'demo': ('demo', 'demo --drive --duration 60'),
     'simulate': ('simulate -p robot.yaml --pty', 'simulate -p robot.yaml --interface vcan0'),
+    'adapters': ('adapters', 'adapters --json'),
     'scan': ('scan --interface socketcan --channel can0',
              'scan --interface slcan --channel /dev/ttyACM0 --bitrate 125k -o found.yaml'),
     'probe': ('probe -p robot.yaml', 'probe lift -p robot.yaml --json'),
@@ -141,7 +143,7 @@ WITHOUT_BUS = (*GROUPS['By hand'], 'monitor', 'panel')
 #: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
 WITH_ROS = (*GROUPS['By hand'], *GROUPS['Parameters of drives'], 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
-SHOWING = ('validate', 'decode', 'explain', 'profile')
+SHOWING = ('adapters', 'validate', 'decode', 'explain', 'profile')
 #: exit codes of what could not be done, where 1 says something else
 TROUBLE = {'compare': 2}
 #: what says itself where something is wrong: ``FILE:LINE:``, ``bus main:``, ``conveyor:``

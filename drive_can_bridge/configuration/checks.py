@@ -6,7 +6,7 @@ A drive is built even when parts of it are wrong, with defaults in place of the 
 that everything else about it can be checked in the same run.
 """
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 import math
 import pathlib
@@ -17,6 +17,7 @@ from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
 from drive_can_bridge.core import complaints
+from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
@@ -31,6 +32,8 @@ from drive_can_bridge.protocols.family import Claim, Complaint, Family
 
 #: how much a key has to look like one of ours to be taken for a slip of the pen
 _SLIP = 0.8
+#: what several adapters call a mode in which they send nothing
+_LISTEN_ONLY = 'listen_only'
 _COMMAND = '_command'
 _KEYS = tuple(quantity.value + suffix for suffix in ('', _COMMAND) for quantity in Quantity)
 
@@ -60,6 +63,12 @@ class Adapters(Protocol):
 
     def serial_port(self, bus: BusConfiguration) -> tuple[str, ...]:
         """Return what the serial port of a bus is known by here; empty: there is none."""
+
+    def check_name(self, interface: str, name: str) -> Sentence | None:
+        """Say why an adapter of this name cannot be meant; None: it can."""
+
+    def traits(self, bus: BusConfiguration) -> AdapterTraits | None:
+        """Return what is known of the adapter of a bus; None: nothing."""
 
 
 def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfiguration]:
@@ -102,6 +111,9 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
     message = adapters.check_bitrate(interface, values['bitrate'])
     if message is not None:
         tree.wrong((*path, 'bitrate'), message)
+    message = adapters.check_name(interface, values['adapter']) if values['adapter'] else None
+    if message is not None:
+        tree.wrong((*path, 'adapter'), message)
     return adapters.adapter_keywords(interface)
 
 
@@ -239,6 +251,54 @@ def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfig
                 ('drives', drive.name, 'period'),
                 complaints.period_too_short(
                     period=drive.period, bitrate=bus.bitrate, least=allowed))
+
+
+#: share of a serial line above which it is warned about
+LINE_WARNING = 0.7
+#: bits of a long frame, its stuffing included: of an exchange that an adapter makes late
+_FRAME_BITS = 160
+
+
+def check_adapter(tree: Tree, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
+                  traits: AdapterTraits) -> None:
+    """Look for what an adapter cannot do, and these drives need."""
+    path = ('buses', bus.name)
+    if bus.options.get(_LISTEN_ONLY):
+        instead = traits.listen_only
+        tree.suspicious((*path, _LISTEN_ONLY), complaints.only_listens()
+                        if instead == f'{_LISTEN_ONLY}: true' else
+                        complaints.no_listen_only(adapter=traits.title, instead=instead))
+    for drive in drives:
+        claims = FAMILIES[drive.protocol].claims(drive)
+        dropped = [each.what for each in traits.drops
+                   if any(Claim(each.route, '').overlaps(claim) for claim in claims)]
+        if dropped:
+            tree.wrong((*path, 'adapter' if bus.adapter else 'channel'), complaints.adapter_drops(
+                adapter=traits.title, what=dropped, drive=drive.name, protocol=drive.protocol))
+    for drive in drives:
+        _check_latency(tree, bus, drive, traits)
+    if traits.line_rate:
+        # about half of it goes either way
+        bits = 0.5 * traits.line_bits * bus.bitrate * sum(bus_shares(bus, drives).values())
+        share = bits / traits.line_rate
+        if share > LINE_WARNING:
+            tree.suspicious(path, complaints.line_too_slow(
+                adapter=traits.title, rate=traits.line_rate, share=100 * share,
+                most=100 * LINE_WARNING))
+
+
+def _check_latency(tree: Tree, bus: BusConfiguration, drive: DriveConfiguration,
+                   traits: AdapterTraits) -> None:
+    """Look whether a drive's answers come within its period, as long as the adapter keeps them."""
+    family = FAMILIES[drive.protocol]
+    # of those that are polled, each answer is waited for before the next question
+    exchanges = 1 if family.cyclic else max(1, round(
+        family.loads([drive])[0] * drive.period / (2 * _FRAME_BITS)))
+    least = exchanges * (traits.latency + 2 * _FRAME_BITS / bus.bitrate)
+    if traits.latency and drive.period < least:
+        tree.suspicious(('drives', drive.name, 'period'), complaints.adapter_late(
+            period=drive.period, adapter=traits.title, latency=f'{1e3 * traits.latency:g}',
+            least=math.ceil(least * 1e3) / 1e3, remedy=traits.remedy))
 
 
 def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:

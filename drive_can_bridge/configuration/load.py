@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import yaml
 
 from drive_can_bridge.configuration.checks import (
-    Adapters, check_buses, check_identifiers, check_joint_names, check_load, check_neighbours,
-    check_rounds, check_topics, DriveChecker, LISTS,
+    Adapters, check_adapter, check_buses, check_identifiers, check_joint_names, check_load,
+    check_neighbours, check_rounds, check_topics, DriveChecker, LISTS,
 )
 from drive_can_bridge.configuration.parameter_file import read_parameter_file
 from drive_can_bridge.configuration.problems import Path, report, Tree
@@ -232,7 +232,7 @@ def _configuration(tree: Tree, adapters: Adapters | None,
         drive = checker.check()
         if drive is not None:
             drives[name] = drive
-    _check_together(tree, buses, drives, checkers)
+    _check_together(tree, buses, drives, checkers, adapters)
     check_topics(tree, drives.values(), namespace)
     if not _names(tree, 'drives') and not tree.is_damaged(('drives',)):
         tree.suspicious(('drives',), complaints.no_drive())
@@ -255,7 +255,7 @@ def _configuration(tree: Tree, adapters: Adapters | None,
 
 def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
                     drives: Mapping[str, DriveConfiguration],
-                    checkers: Mapping[str, DriveChecker]) -> None:
+                    checkers: Mapping[str, DriveChecker], adapters: Adapters | None) -> None:
     """Check what drives do to each other, as far as enough is known of them."""
     placed = {name: drive for name, drive in drives.items()
               if checkers[name].is_sound('bus', 'protocol', 'station')}
@@ -268,6 +268,9 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
         if ('buses', bus.name, 'bitrate') not in tree.damaged:
             check_load(tree, bus, here)
             check_rounds(tree, bus, here)
+            traits = None if adapters is None else adapters.traits(bus)
+            if traits is not None:
+                check_adapter(tree, bus, [each for each in here if each.name in placed], traits)
         check_neighbours(tree, [drive for drive in here if drive.name in placed])
 
 

@@ -130,6 +130,26 @@ no_bitrate = Text('{bitrate} is impossible with {interface}, allowed is one of {
 adapter_does_not_name = Text(
     'the adapter for {interface} does not name this key{near}; it is handed over all the same')
 adapter_needs = Text('the adapter for {interface} needs {keys:, }')
+unknown_adapter = Text('{name!r} is unknown, {hint}; docs/adapters.md has them all')
+adapter_of_other_interface = Text(
+    '{name!r} is an adapter for {other}, allowed is interface: {other}, or to leave this key out')
+adapter_drops = Text(
+    '{adapter} never sends {what:, }, which drive {drive} needs ({protocol}); allowed is another '
+    'adapter, or another firmware')
+no_listen_only = Text(
+    '{adapter} has no listen-only mode by this key; it has: {instead}',
+    '{adapter} has no listen-only mode',
+    fields='adapter instead')
+only_listens = Text('the adapter only listens then: no drive is sent anything')
+adapter_late = Text(
+    '{period:g} s is too short for {adapter}, which keeps what it has received for up to '
+    '{latency} ms: answers will be late; recommended is at least {least:g} s, or: {remedy}',
+    '{period:g} s is too short for {adapter}, which keeps what it has received for up to '
+    '{latency} ms: answers will be late; recommended is at least {least:g} s',
+    fields='period adapter latency least remedy')
+line_too_slow = Text(
+    'the serial line to {adapter} has {rate} bit/s, of which these drives need up to '
+    '{share:.0f} %, recommended is at most {most:.0f} %: longer periods, or a faster line')
 channel_of_other_bus = Text(
     '{channel!r} is also the channel of bus {bus}; the load is checked for each bus alone')
 port_of_other_bus = Text(

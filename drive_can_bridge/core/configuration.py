@@ -24,6 +24,7 @@ class BusConfiguration:
     :param interface: python-can interface name.
     :param channel: as the interface wants it; digits stay a string unless given as an integer.
     :param bitrate: bit/s.
+    :param adapter: which one it is, by its name in docs/adapters.md; '': as can be seen.
     :param reconnect_period: s between attempts to open a lost bus.
     :param trace_seconds: s that the flight recorder keeps; 0: it is off.
     :param trace_directory: where its traces go; '': the default.
@@ -35,6 +36,7 @@ class BusConfiguration:
     interface: str
     channel: str | int
     bitrate: int = 125_000
+    adapter: str = ''
     reconnect_period: float = 1.0
     trace_seconds: float = 0.0
     trace_directory: str = ''

@@ -7,7 +7,7 @@ work, and a key that the adapter's class does not name is probably misspelt. Mos
 unknown keywords silently.
 """
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 import importlib
 import inspect
@@ -19,10 +19,12 @@ import can
 import can.interfaces
 
 from drive_can_bridge.core import complaints
+from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
+from drive_can_bridge.transport.known_adapters import BY_NAME, traits_of
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')
@@ -109,10 +111,38 @@ def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
         allowed=', '.join(str(rate) for rate in sorted(rates)))
 
 
+def check_name(interface: str, name: str) -> Sentence | None:
+    """Say why an adapter of this name cannot be meant; None: it can."""
+    row = BY_NAME.get(name)
+    if row is None:
+        fitting = [each.name for each in BY_NAME.values() if each.interface == interface]
+        return complaints.unknown_adapter(name=name, hint=suggestion(name, fitting or BY_NAME))
+    if row.interface != interface:
+        return complaints.adapter_of_other_interface(name=name, other=row.interface)
+    return None
+
+
+def traits(bus: BusConfiguration) -> AdapterTraits | None:
+    """Return what is known of the adapter of a bus; None: nothing."""
+    return traits_of(bus)
+
+
 def serial_port(bus: BusConfiguration) -> tuple[str, ...]:
     """Return what the serial port of a bus is known by on this host; empty: there is none."""
     identity = identity_of(bus)
     return identity.names if identity.port else ()
+
+
+def detected(interface: str) -> list[Mapping[str, Any]]:
+    """
+    Return what an interface finds of its devices on this host, as python-can describes it.
+
+    :raises Exception: whatever its library throws.
+    """
+    try:
+        return list(_adapter_class(interface)._detect_available_configs())
+    except (_Unusable, NotImplementedError):
+        return []
 
 
 class _Unusable(Exception):
@@ -122,7 +152,7 @@ class _Unusable(Exception):
 def _adapter_class(interface: str) -> type[Any]:
     try:
         module, name = can.interfaces.BACKENDS[interface]
-        with _quiet():
+        with quiet():
             adapter: type[Any] = getattr(importlib.import_module(module), name)
     except Exception as error:  # adapters, plugins among them, raise anything here
         raise _Unusable(error) from error
@@ -130,7 +160,7 @@ def _adapter_class(interface: str) -> type[Any]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep adapters from logging about optional libraries while they are only looked at."""
     logger = logging.getLogger('can')
     level = logger.level

@@ -61,6 +61,9 @@ _LINE_MAX = 4096
 _UNFINISHED = '_buffer', '_rxbuffer'
 # Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
 _KERNEL_ERRORS = ('socketcan', 'socketcand')
+# Interfaces that hand back what they have sent, and say so. Others may mark what another program
+# sends by the same adapter, which is another master.
+_MARKS_OWN = ('gs_usb', 'cantact')
 # Where python-can keeps the serial port of an interface.
 _PORTS = {'slcan': 'serialPortOrig', 'robotell': 'serialPortOrig', 'seeedstudio': 'ser',
           'serial': '_ser'}
@@ -74,18 +77,21 @@ class Port(EndPoint):
     CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
 
     :param host_stamps: the kernel of this machine makes the stamps.
+    :param marks_own: it marks what it hands back of what it was handed to send.
     :param lock: of its device, released when it is closed.
     :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
     """
 
     def __init__(self, bus: can.BusABC, clock: Clock, *, kernel_errors: bool = False,
-                 host_stamps: bool = False, lock: DeviceLock | None = None) -> None:
+                 host_stamps: bool = False, marks_own: bool = False,
+                 lock: DeviceLock | None = None) -> None:
         super().__init__()
         self._now, self._stamp = clock.now, clock.stamp
         self.host_stamps = host_stamps
         self._foreign = None if host_stamps else ForeignClock()
-        # on SocketCAN an equal frame is another master's
-        self._echo = None if host_stamps else Echo(clock)
+        # there, an equal frame is another master's
+        self._echo = None if host_stamps or marks_own else Echo(clock)
+        self._marks_own = marks_own
         self._bus = bus
         self._lock = lock
         # what python-can documents for adapters to implement; the ``recv`` around it looks at the
@@ -135,6 +141,8 @@ class Port(EndPoint):
             self.witness(message)
         if message.is_error_frame:
             self._error_frame(message)
+            return None
+        if self._marks_own and not message.is_rx:
             return None
         if not (filtered or self._matches(message)):
             self.rejected_frames += 1
@@ -378,7 +386,8 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
             opened = can.Bus(interface=bus.interface, channel=bus.channel, ignore_config=True,
                              **options)
         port = Port(opened, clock, kernel_errors=bus.interface in _KERNEL_ERRORS,
-                    host_stamps=bus.interface == 'socketcan', lock=lock)
+                    host_stamps=bus.interface == 'socketcan',
+                    marks_own=bus.interface in _MARKS_OWN, lock=lock)
     except Exception as error:  # the one place where adapters may throw anything
         _abandon(error)
         reason = in_words(error)

@@ -18,6 +18,7 @@ import errno
 import math
 import os
 import select
+import socket
 from typing import Any
 
 #: what ends a line or packet that was begun and never finished, whatever is lacking, so that
@@ -264,6 +265,7 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
             below = Below(value, SerialWriter.take_over(value, now), FILLERS[interface],
                           AdapterAnswers() if slcan else None)
             object.__setattr__(self, 'drive_can_below', below)
+            _hurry(value)
             if below.writer is None:
                 value.write_timeout = OPEN_TIMEOUT
             # what the process before has left may not even leave room for a command
@@ -277,6 +279,13 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
     slcan = interface == 'slcan'
     return type(adapter.__name__, (_SlcanLines, adapter) if slcan else (adapter,), {
         '__setattr__': set_attribute, 'drive_can_now': staticmethod(now)})
+
+
+def _hurry(port: Any) -> None:
+    """Let frames leave at once where the port is a connection: pyserial does not."""
+    connection = getattr(port, '_socket', None)
+    if isinstance(connection, socket.socket):
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def _await_quiet(port: Any, now: Callable[[], float]) -> None:

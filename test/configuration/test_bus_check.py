@@ -10,6 +10,7 @@ import pytest
 from saying import says
 
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import ConfigurationError
 from drive_can_bridge.core.messages import Sentence
@@ -107,6 +108,12 @@ class Adapters:
 
     def serial_port(self, bus: BusConfiguration) -> tuple[str, ...]:
         return ()
+
+    def check_name(self, interface: str, name: str) -> Sentence | None:
+        return None
+
+    def traits(self, bus: BusConfiguration) -> AdapterTraits | None:
+        return None
 
 
 @pytest.mark.parametrize(('old', 'new', 'expected'), [

@@ -29,6 +29,7 @@ def test_all_effective_values(tmp_path: Path) -> None:
         ('buses.main.interface', 'virtual'),
         ('buses.main.channel', 'demo'),
         ('buses.main.bitrate', 125000),
+        ('buses.main.adapter', ''),
         ('buses.main.reconnect_period', 1.0),
         ('buses.main.trace_seconds', 0.0),
         ('buses.main.trace_directory', ''),

@@ -8,6 +8,7 @@ line, and the packets of the other serial interfaces.
 
 from collections.abc import Iterator
 from functools import lru_cache
+import socket
 
 from clocks import REAL
 from literal_adapters import (
@@ -227,3 +228,12 @@ def test_half_packets_come_to_nothing(interface: str, frames: object, text: str)
     for end in range(len(packet)):
         assert frames(packet[:end] + at_opening + sent) == ['123#0102'], end
         assert frames(packet[:end] + behind_a_loss + at_opening + sent) == ['123#0102'], end
+
+
+def test_frames_leave_at_once_over_a_connection() -> None:
+    """Pyserial leaves Nagle's algorithm on: every second frame would wait for 40 ms."""
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        port = opened(f'socket://127.0.0.1:{server.getsockname()[1]}')
+        connection = port._bus.serialPortOrig._socket   # type: ignore[attr-defined]
+        assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+        port.close()
