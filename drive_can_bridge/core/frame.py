@@ -62,12 +62,18 @@ def worst_bits(length: int, *, extended: bool) -> int:
 
 
 class RecordKind(Enum):
-    """What was seen."""
+    """
+    What was seen.
+
+    A frame that an error has destroyed, and a state in words, are in traces of other makers only.
+    """
 
     DATA = 'data'
     REMOTE = 'remote'
     ERROR = 'error'
     FD = 'fd'
+    DESTROYED = 'destroyed'
+    STATE = 'state'
 
 
 class Record(NamedTuple):
@@ -79,7 +85,9 @@ class Record(NamedTuple):
 
     :param time: s, since 1970 or since the start of the trace.
     :param channel: what the trace calls the bus: a name, a number, or '' where it has none.
-    :param identifier: of an error frame: the classes of errors, as in linux/can/error.h.
+    :param identifier: of an error frame: the classes of errors, as in linux/can/error.h; of a
+        state: 0 where all is well.
+    :param data: of a state: its words.
     :param sent: by the machine that recorded it; None: the trace does not say.
     """
 
@@ -93,3 +101,8 @@ class Record(NamedTuple):
 
 
 DATA = RecordKind.DATA
+
+
+def state_record(time: float, channel: str | int, words: str, *, well: bool = False) -> Record:
+    """Return an entry that tells a state of the bus, or of a controller, in words."""
+    return Record(time, channel, 0 if well else 1, words.encode(), False, RecordKind.STATE)

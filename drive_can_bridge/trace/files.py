@@ -16,6 +16,7 @@ python-can's reader takes most error frames for data frames, ends at the first l
 its own, and does not know the screen.
 """
 
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from datetime import datetime
@@ -38,6 +39,9 @@ from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
 from drive_can_bridge.core.text import printable
+from drive_can_bridge.trace.blf import read_blf
+from drive_can_bridge.trace.peak import PeakLines
+from drive_can_bridge.trace.vector import of_vector
 from drive_can_bridge.transport.tap import message_of, record_of
 
 
@@ -242,7 +246,7 @@ _CANDUMP = ('.log', '.txt', '.candump')
 _TEXT_READERS: dict[str, Any] = {
     '.asc': can.ASCReader, '.csv': can.CSVReader, '.trc': can.TRCReader}
 #: by which number the tools of a format call what python-can calls 0; else they agree
-_FIRST = {'.asc': 1, '.blf': 1}
+_FIRST = {'.asc': 1}
 _BINARY_READERS = ('.blf', '.db', '.mf4')
 _WRITERS: dict[str, Callable[[Path], Any]] = {
     '.asc': lambda path: can.ASCWriter(open_text(path)),
@@ -286,6 +290,8 @@ _HEADS = {
     '.db': _Head(re.compile(b'SQLite format 3'), 'this is no .db trace of python-can'),
     '.mf4': _Head(re.compile(b'MDF '), 'this is no .mf4 trace (ASAM MDF 4)'),
 }
+#: kinds of entries that are passed over and named
+_PASSED_MAX = 6
 #: lines before the first frame that are kept, to go on reading behind a damaged line
 _HEADER_MAX = 200
 
@@ -316,8 +322,7 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
     suffix, packed = check_readable(path)
     if suffix in _BINARY_READERS and not packed:
         if _begins_as(_HEADS[suffix], path, complain):
-            read = _database_records if suffix == '.db' else _binary_records
-            yield from read(path, complain)
+            yield from _BINARY_RECORDS[suffix](path, complain)
         return
     with _open_text(path, packed) as stream:
         try:
@@ -427,7 +432,6 @@ class _Lines:
     def __init__(self, lines: Iterator[str]) -> None:
         self._lines = lines
         self.taken: list[str] = []
-        self.exhausted = False
         self.failure: Exception | None = None   # of the file, not of a line
 
     def __iter__(self) -> '_Lines':
@@ -437,7 +441,6 @@ class _Lines:
         try:
             line = next(self._lines)
         except StopIteration:
-            self.exhausted = True
             raise
         except Exception as error:
             self.failure = error
@@ -490,62 +493,33 @@ class _Heard(logging.Handler):
         self._complain('' if 'Failed to parse' in text else text.partition('Reader: ')[2] or text)
 
 
-#: of a header by Vector: each time is told from the line before; and a line with its time
-_FROM_THE_LAST = re.compile(r'\s*base\s+(?:hex|dec)\s+timestamps\s+relative', re.IGNORECASE)
-_DECIMAL = re.compile(r'\s*base\s+dec', re.IGNORECASE)
-_TIMED = re.compile(r'\s*([0-9]+\.[0-9]+)(?=\s)')
+def _prepared(suffix: str, lines: Iterator[str], aside: deque[Record],
+              passed: Counter[str]) -> Iterator[str]:
+    """Return the lines of a text as the reader of python-can wants them."""
+    if suffix == '.asc':
+        return of_vector(lines, aside, passed)
+    return PeakLines(aside, passed).of(lines) if suffix == '.trc' else lines
 
 
-def _from_vector(stream: Iterable[str]) -> Iterator[str]:
-    """
-    Give python-can's reader what it needs: times from the beginning, an end of the header.
-
-    It takes all ``CANFD`` lines for CAN FD, and requests to send (``TxRq``) for frames.
-    """
-    lines = iter(stream)
-    relative, elapsed, base = False, 0.0, 16
-    for line in lines:
-        relative = relative or _FROM_THE_LAST.match(line) is not None
-        base = 10 if _DECIMAL.match(line) else base
-        timed = _TIMED.match(line)
-        if timed is not None:
-            yield 'no internal events logged\n'     # takes the next line for that, whatever it is
-            lines = itertools.chain((line,), lines)
-            break
-        yield line
-    for line in lines:
-        if relative and (timed := _TIMED.match(line)) is not None:
-            elapsed += float(timed[1])
-            line = f'{elapsed:.6f}{line[timed.end():]}'
-        if 'CANFD' in line:
-            line = _classical(line, base)
-        if ' TxRq ' not in line:
-            yield line
+def _tell_passed(passed: Counter[str], complain: Complain) -> None:
+    """Tell, once, what has no entry."""
+    if passed:
+        complain('passed over: ' + ', '.join(
+            f'{kind} ({count})' for kind, count in passed.most_common(_PASSED_MAX))
+            + (', …' if len(passed) > _PASSED_MAX else ''))
 
 
-#: bits of the flags of a ``CANFD`` line: remote frame, and EDL, without which it is classical
-_REMOTE_FLAG, _EDL = 0x10, 0x1000
-
-
-def _classical(line: str, base: int) -> str:
-    """Return a ``CANFD`` line of a classical frame as a line of such frames."""
-    words = line.split()
-    if len(words) < 6 or words[4].lower() == 'errorframe':
-        return line
-    # time CANFD channel direction identifier [name] BRS ESI DLC length data… duration bits flags
-    place = 5 if words[5].isdigit() else 6
-    try:
-        size = int(words[place + 3])
-        after = place + 4 + size
-        flags = int(words[after + 2], 16)
-        if flags & _EDL or int(words[place + 2], base) > 15:
-            return line
-    except (IndexError, ValueError):
-        return line
-    time, _, channel, direction, identifier = words[:5]
-    content = f'r {size}' if flags & _REMOTE_FLAG else ' '.join(
-        ('d', f'{size}', *words[place + 4:after]))
-    return f'{time} {channel} {identifier} {direction} {content}\n'
+def _blf_records(path: Path, complain: Complain) -> Iterator[Record]:
+    passed: Counter[str] = Counter()
+    with path.open('rb') as file:
+        for number, record in enumerate(read_blf(file, complain, passed), 1):
+            try:
+                record = checked(record)
+            except ValueError as error:
+                complain(f'entry {number}: {error}')
+            else:
+                yield record
+    _tell_passed(passed, complain)
 
 
 def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
@@ -558,7 +532,9 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     known = False
     reader, first = _TEXT_READERS[suffix], _FIRST.get(suffix, 0)
     numbered = _Numbered(stream)
-    stream = _from_vector(numbered.lines) if suffix == '.asc' else numbered.lines
+    aside: deque[Record] = deque()      # that the reader does not know, before its next one
+    passed: Counter[str] = Counter()
+    stream = _prepared(suffix, numbered.lines, aside, passed)
 
     def wrong(text: str) -> None:
         complain(f'line {numbered.number()}: {text or f"no entry of a {suffix} trace"}')
@@ -567,40 +543,41 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     logger.addHandler(heard)
     logger.propagate = False    # told once
     try:
-        while True:
-            lines = _Lines(itertools.chain(header, stream))
+        for line in stream:     # readers complain of a file without a frame
+            lines = _Lines(itertools.chain(header, (line,), stream))
             try:
                 for message in reader(lines):
                     if not known:
                         header, known = lines.taken[:-1], True
+                    while aside:
+                        yield aside.popleft()
                     try:
                         record = _record(message, first)
                     except ValueError as error:
                         wrong(str(error))
                         continue
                     yield record
-                return
+                break
             except Exception:  # noqa: BLE001  readers raise whatever a line makes them
                 if lines.failure is not None:
                     raise lines.failure from None
                 wrong('')
-                if lines.exhausted:
-                    return
                 if not known:
                     header = lines.taken[:-1]
+        yield from aside
+        _tell_passed(passed, complain)
     finally:
         logger.propagate = True
         logger.removeHandler(heard)
 
 
-def _binary_records(path: Path, complain: Complain) -> Iterator[Record]:
-    """Read a binary format: behind something damaged there is nothing to hold on to."""
-    first = _FIRST.get(path.suffix.lower(), 0)
+def _measured_records(path: Path, complain: Complain) -> Iterator[Record]:
+    """Read an .mf4: behind something damaged there is nothing to hold on to."""
     try:
         with can.LogReader(str(path)) as reader:
             for number, message in enumerate(reader, 1):
                 try:
-                    record = _record(message, first)
+                    record = _record(message, 0)
                 except ValueError as error:
                     complain(f'entry {number}: {error}')
                     continue
@@ -632,6 +609,10 @@ def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
                     yield record
         except sqlite3.Error as failure:
             complain(f'the rest cannot be read: {failure}')
+
+
+_BINARY_RECORDS: dict[str, Callable[[Path, Complain], Iterator[Record]]] = {
+    '.blf': _blf_records, '.db': _database_records, '.mf4': _measured_records}
 
 
 def _kind_by_length(data: bytes) -> RecordKind:
@@ -897,7 +878,7 @@ def checked(record: Record) -> Record:
     :raises ValueError: it is not.
     """
     longest = _LENGTH_MAX if record.kind is RecordKind.FD else _CLASSICAL_MAX
-    if len(record.data) > longest:
+    if len(record.data) > longest and record.kind is not RecordKind.STATE:
         raise ValueError(f'{len(record.data)} data bytes')
     highest = EXTENDED_IDENTIFIER_MAX if record.extended else STANDARD_IDENTIFIER_MAX
     if record.kind is not RecordKind.ERROR and not 0 <= record.identifier <= highest:

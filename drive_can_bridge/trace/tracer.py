@@ -245,6 +245,16 @@ class Tracer:
             self._tell(bus, record.time, 'error frame',
                        decode_error_frame(record.identifier, record.data).text)
             return
+        if record.kind is RecordKind.DESTROYED:
+            bus.error_frames += 1
+            self._tell(bus, record.time, 'error frame', f'error of the frame {_hex(record)}')
+            return
+        if record.kind is RecordKind.STATE:
+            bus.error_frames += bool(record.identifier)
+            self._tell(bus, record.time, 'bus state',
+                       printable(record.data.decode(errors='replace')),
+                       Verdict.SUSPICIOUS if record.identifier else Verdict.NORMAL)
+            return
         bus.count(bits_on_bus(len(record.data), record.extended), record.time)
         title = 'CAN FD frame'
         if record.kind is RecordKind.REMOTE:

@@ -140,6 +140,20 @@ def decode_error_frame(classes: int, data: bytes) -> BusError:
     return BusError(', '.join(texts) or 'error without details', state, advice)
 
 
+def protocol_error(kind: int, place: int, *, sending: bool,
+                   counters: tuple[int, int]) -> tuple[int, bytes]:
+    """
+    Return classes and data of an error frame that tells of a violated protocol.
+
+    :param kind: 1 bit error, 2 form error, 4 stuff error; anything else is none of them.
+    :param place: where in the frame, as the SJA1000 numbers it (and linux/can/error.h).
+    :param counters: of errors, transmit and receive.
+    """
+    known = kind if kind in (1, 2, 4) else 0
+    return PROTOCOL | BUS_ERROR | COUNTERS, bytes(
+        (0, 0, known | (_VIOLATION_SENDING if sending else 0), place, 0, 0, *counters))
+
+
 def _controller(byte: int) -> tuple[list[str], str | None, str]:
     texts = []
     state: str | None = None
