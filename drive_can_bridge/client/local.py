@@ -25,6 +25,8 @@ from drive_can_bridge.process.presence import (
 LOOK_PERIOD = 0.0005
 #: s that an answer may take: many reads that nobody answers are slow
 CALL_TIMEOUT = 120.0
+#: what comes of taking apart what no bridge says
+_SENSELESS = (Rubbish, ValueError, IndexError)
 
 
 class _Bridge:
@@ -58,12 +60,27 @@ class _Bridge:
         """
         try:
             self._line.ask(*words)
-        except OSError:     # it hangs up on who has asked nothing for long
+        except OSError:     # it hangs up on who has asked nothing for long, or has ended
             self._line.close()
-            self._line = Line(self._present)
+            self._line = self._called_again()
             if not self._line.believed:
                 raise PermissionError from None
             self._line.ask(*words)
+
+    def _called_again(self) -> Line:
+        """
+        Return a new line, to a successor of the same name where it has ended.
+
+        :raises OSError: nobody is there.
+        """
+        try:
+            return Line(self._present)
+        except OSError:
+            heirs = [each for each in bridges() if each[1:3] == self._present[1:3]]
+            if len(heirs) != 1 or heirs[0].process == self._present.process:
+                raise
+            self._present, = heirs
+            return Line(self._present)
 
     def answers(self, until: float) -> list[list[str]]:
         """
@@ -76,15 +93,15 @@ class _Bridge:
         found: list[list[str]] = []
         while True:
             message = self._line.take()
+            now = self._clock.now()
+            if message is not None and message[0] == END:
+                return found
+            if now > until:
+                raise TimeoutError
             if message is None:
-                now = self._clock.now()
-                if now > until:
-                    raise TimeoutError
                 self._clock.wait(now + LOOK_PERIOD)
             elif message[0] == NO:
                 raise Rubbish(*message[1:])
-            elif message[0] == END:
-                return found
             else:
                 found.append(message)
 
@@ -123,7 +140,7 @@ def _found(namespace: str | None, clock: Clock) -> list[_Bridge] | None:
         until = clock.now() + PATIENCE
         for bridge in found:
             bridge.introduce(until)
-    except (OSError, Rubbish):
+    except (OSError, *_SENSELESS):
         for bridge in found:
             bridge.close()
         return None
@@ -194,12 +211,15 @@ class LocalWay:
 
     def get(self, node: str, names: Sequence[str]) -> Sequence[Found]:
         """Return values of parameters; fewer where a bridge does not know one of them."""
-        return [_value(words[0]) for _, *words in self._ask('get', node, *names)]
+        with _sense(node):
+            return [_value(words[0]) for _, *words in self._ask('get', node, *names)]
 
     def describe(self, node: str, names: Sequence[str]) -> Sequence[Described]:
         """Return what a drive says of parameters."""
-        return [Described(name, text, facts, _limit(minimum), _limit(maximum))
-                for _, name, text, facts, minimum, maximum in self._ask('describe', node, *names)]
+        with _sense(node):
+            return [Described(name, text, facts, _limit(minimum), _limit(maximum))
+                    for _, name, text, facts, minimum, maximum in self._ask(
+                        'describe', node, *names)]
 
     def listed(self, node: str) -> Sequence[str]:
         """Return the names of the parameters that a drive lists."""
@@ -207,18 +227,34 @@ class LocalWay:
 
     def set(self, node: str, name: str, value: Value) -> tuple[bool, str]:
         """Set a parameter of a drive; return whether it was, and why not, or a note."""
-        (_, done, reason), = self._ask('set', node, name, value_text(value))
-        return done == '1', reason
+        with _sense(node):
+            (_, done, reason), = self._ask('set', node, name, value_text(value))
+            return done == '1', reason
 
     def condition(self, drive: str, *, age: float, patience: float) -> Mapping[str, str]:
         """Return what diagnostics say of a drive now; none: its bus hangs."""
         node = f'{self.bridge_of[drive].rpartition("/")[0]}/{drive}'
-        return {words[0]: words[1] for _, *words in self._ask('status', node)}
+        with _sense(node):
+            return {words[0]: words[1] for _, *words in self._ask('status', node)}
 
     def close(self) -> None:
         """Hang up. Idempotent."""
         for each in self._found:
             each.close()
+
+
+@contextmanager
+def _sense(node: str) -> Iterator[None]:
+    """
+    Take apart what was said of a node.
+
+    :raises NoAnswer: no bridge says such things.
+    """
+    try:
+        yield
+    except _SENSELESS:
+        raise NoAnswer(sentences.node_does_not_answer(
+            node=node, reason=sentences.makes_no_sense()), asked=True) from None
 
 
 def _value(text: str) -> Found:
@@ -312,7 +348,7 @@ class LocalWays:
                 for kind, name, *words in bridge.answers(until):
                     answers[name] = (unoffered(name, order) if kind == 'unoffered'
                                      else Answer(name, words[0] == '1', words[2]))
-            except (OSError, Rubbish):
+            except (OSError, *_SENSELESS):
                 continue
         return [answers[node] for node in nodes]
 

@@ -917,6 +917,7 @@ local_name_taken = Text(
     'bridge would listen to them',
     do='nothing; see what other process of this host has the name where it should not')
 makes_no_sense = Text('this makes no sense', do='use a command of the same version as the bridge')
+too_many_patterns = Text('too many patterns', do='name the drives, or use shorter patterns')
 no_such_node = Text('no such node', do='see ros2 node list for the names of drives')
 unknown_order = Text(
     'nobody knows what that is',

@@ -27,8 +27,8 @@ CALLERS_MAX, OF_A_STRANGER, BUSY_MAX = 300, 30, 60
 UNREAD_MAX, UNREAD_PATIENCE = 4000, 5.0
 #: s that a connection may stay without a question, and how often it is looked for those
 IDLE, _LOOK_PERIOD = 60.0, 0.25
-#: connections taken in a row
-_TAKE_MAX = 16
+#: connections taken in a row; strangers that are heard between two looks at everybody
+_TAKE_MAX, _STRANGERS_HEARD = 16, 4
 #: what is heard from everybody
 STOPPING = ('stop', 'pass')
 
@@ -39,12 +39,15 @@ class Asked:
 
     :ivar action: what it wants.
     :ivar words: the rest.
+    :ivar trusted: the caller is root, or our user.
     """
 
-    def __init__(self, caller: '_Caller', action: str, words: list[str]) -> None:
+    def __init__(self, caller: '_Caller', action: str, words: list[str], *,
+                 trusted: bool = True) -> None:
         self._caller = caller
         self.action = action
         self.words = words
+        self.trusted = trusted
 
     def answer(self, *message: str) -> None:
         """Say something. From any thread; nobody is waited for."""
@@ -84,6 +87,13 @@ class _Caller:
     def unread(self) -> bool:
         """Something waits to be read."""
         return bool(self._unread)
+
+    @property
+    def left(self) -> bool:
+        """It has hung up: nobody waits for an answer."""
+        poll = select.poll()
+        poll.register(self.socket, 0)
+        return bool(poll.poll(0))
 
     def say(self, message: Sequence[str], *, last: bool = False) -> None:
         """Send a message, as far as it is read."""
@@ -193,12 +203,20 @@ class LocalServer:
         found = dict(poll.poll(1e3 * _LOOK_PERIOD if self._callers else None))
         if found.pop(self._bell, 0):
             os.eventfd_read(self._bell)
-        now = self._clock.now()
-        for number, caller in list(self._callers.items()):
+        now, heard = self._clock.now(), 0
+        # ours first; what strangers ask costs ours no more than a moment
+        for number, caller in sorted(self._callers.items(), key=lambda each: self._is_strange(
+                each[1])):
             events = found.get(number, 0)
             if events & select.POLLOUT:
                 caller.flush()
             if events & select.POLLIN and not caller.busy:
+                if self._is_strange(caller):
+                    heard += 1
+                    if heard > _STRANGERS_HEARD:
+                        continue
+                    # the others of them have their turn before it has another one
+                    self._callers[number] = self._callers.pop(number)
                 self._hear(caller)
             elif events & (select.POLLHUP | select.POLLERR):
                 caller.gone = True
@@ -206,6 +224,9 @@ class LocalServer:
                 self._hang_up(caller)
         if self._listener.fileno() in found:
             self._accept()
+
+    def _is_strange(self, caller: _Caller) -> bool:
+        return caller.user not in self._trusted
 
     def _accept(self) -> None:
         for _ in range(_TAKE_MAX):
@@ -220,15 +241,16 @@ class LocalServer:
             caller = _Caller(connection, user_of(connection), self._clock.now, self._ring)
             if self._may_stay(caller):
                 self._callers[connection.fileno()] = caller
-                self._hear(caller)  # who asks mostly has asked by now
-                if caller.gone:
-                    self._hang_up(caller)
+                if not self._is_strange(caller):
+                    self._hear(caller)  # who asks mostly has asked by now
+                    if caller.gone:
+                        self._hang_up(caller)
             else:
                 connection.close()
 
     def _may_stay(self, caller: _Caller) -> bool:
         """Tell whether there is room for one more; those that ask nothing make it."""
-        if caller.user not in self._trusted and (
+        if self._is_strange(caller) and (
                 not self._open_to_all or self._is_full_for(caller.user)):
             return False
         return len(self._callers) < CALLERS_MAX or self._make_room(None)
@@ -269,11 +291,13 @@ class LocalServer:
     def _begin(self, caller: _Caller, message: list[str]) -> None:
         version, action, words = message[0], ''.join(message[1:2]), message[2:]
         caller.busy, caller.has_asked = action or '?', True
-        asked = Asked(caller, action, words)
+        asked = Asked(caller, action, words, trusted=not self._is_strange(caller))
         if version != VERSION:
             asked.refuse(f'version {VERSION} is understood here')
-        elif action not in STOPPING and caller.user not in self._trusted:
+        elif action not in STOPPING and not asked.trusted:
             asked.refuse('another user')
+        elif action not in STOPPING and caller.left:    # nothing but a stop is done too late
+            caller.gone = True
         elif action not in STOPPING and sum(
                 bool(each.busy) and each.busy not in STOPPING
                 for each in self._callers.values()) > BUSY_MAX:

@@ -18,6 +18,8 @@ from drive_can_bridge.process.presence import (
 SOON = 0.15
 #: s that a drive may take to stop
 STOP_TIMEOUT = 10.0
+#: messages of one bridge that are taken in a row: one that never ends holds up nobody
+_AT_ONCE = 1000
 RUNNING = 'may still be running'
 
 
@@ -46,6 +48,7 @@ class _Told:
     """
     A bridge of this host.
 
+    :param question: what it is asked.
     :ivar line: to it; None: there is none.
     :ivar busy: it takes no calls just now.
     :ivar name: as it says itself; '' until then.
@@ -57,8 +60,9 @@ class _Told:
     :ivar passed: what became of others that it has passed a stop on to; None: was not asked to.
     """
 
-    def __init__(self, present: Present) -> None:
+    def __init__(self, present: Present, question: Sequence[str]) -> None:
         self.present = present
+        self._question = question
         self.line: Line | None = None
         self.busy = False
         self.name = ''
@@ -69,12 +73,12 @@ class _Told:
         self.passed: list[Answer] | None = None
         self.ended = False
 
-    def ask(self, *words: str) -> None:
+    def ask(self) -> None:
         """Ask it, if it listens."""
         try:
             self.busy = False
             self.line = Line(self.present)
-            self.line.ask(*words)
+            self.line.ask(*self._question)
         except BlockingIOError:
             self.hang_up()
             self.busy = True
@@ -99,16 +103,19 @@ class _Told:
     def look(self) -> None:
         """Take what it has said."""
         line = self.line
-        while line is not None and line is self.line:
-            try:
+        # one that is not believed was asked all the same: it may be what it says
+        if line is None or not line.believed:
+            return
+        try:
+            for _ in range(_AT_ONCE):
                 message = line.take()
                 if message is None:
                     return
-                if not line.believed:   # was asked all the same: it may be what it says
-                    continue
                 self._take(message)
-            except (OSError, Rubbish, ValueError):
-                self.hang_up()
+                if self.line is None:
+                    return
+        except (OSError, Rubbish, ValueError, IndexError):
+            self.hang_up()
 
     def _take(self, message: Sequence[str]) -> None:
         kind, *words = message
@@ -153,9 +160,9 @@ class LocalStop:
         self._namespace = namespace
         self._words = list(words)
         self._began: float | None = None
-        self._question = ['stop', ANYWHERE if namespace is None else namespace, *self._words]
+        question = ['stop', ANYWHERE if namespace is None else namespace, *self._words]
         everywhere = not words and namespace is None
-        self._told = [_Told(each) for each in bridges()
+        self._told = [_Told(each, question) for each in bridges()
                       if everywhere or each.domain in (None, self.domain)
                       and each.may_be_in(namespace)]
         #: connections by which stops are passed on
@@ -163,7 +170,7 @@ class LocalStop:
         if switched_on():
             for each in self._told:
                 if each.present.domain is not None:
-                    each.ask(*self._question)
+                    each.ask()
 
     def look(self, now: float) -> bool:
         """Take what was said; return whether all that anybody knows of have answered."""
@@ -172,7 +179,7 @@ class LocalStop:
         waited = now - self._began
         for each in (*self._told, *self._passing):
             if each.busy and waited < PATIENCE:
-                each.ask(*self._question)
+                each.ask()
             each.look()
         if waited >= SOON or not any(each.quiet for each in self._told):
             self._pass_on()
@@ -180,17 +187,21 @@ class LocalStop:
 
     def over(self, now: float) -> bool:
         """Tell whether nothing more is to be expected of this host."""
-        waited = now - (now if self._began is None else self._began)
-        if any(each.quiet for each in self._told) and waited < PATIENCE:
+        waited = self._waited(now)
+        if waited < PATIENCE and (any(each.quiet for each in self._told)
+                                  or any(each.busy for each in self._passing)):
             return False
         return waited > STOP_TIMEOUT + PATIENCE or not any(
             each.line is not None and (each.here or each.passed is not None)
             for each in (*self._told, *self._passing))
 
+    def _waited(self, now: float) -> float:
+        return 0.0 if self._began is None else now - self._began
+
     def wants_ros(self, now: float) -> bool:
         """Tell whether there may be bridges that only ROS reaches, or that have said nothing."""
         own = [each for each in self._told if each.present.domain in (None, self.domain)]
-        if any(each.quiet for each in own) and now - (self._began or now) < SOON:
+        if any(each.quiet for each in own) and self._waited(now) < SOON:
             return False
         return (not self._knows_own_domain or not all(each.here for each in own)
                 or any(each.failed for each in self._passing
@@ -213,10 +224,11 @@ class LocalStop:
                      and name not in asked and (
                          self._namespace is None or in_namespace(name, self._namespace))]
             if names:
-                passing = _Told(each.present)
+                passing = _Told(each.present, [
+                    'pass', *names, '', *(node for other in same for node in other.drives), '',
+                    *self._words])
                 passing.seen, passing.passed = names, []
-                passing.ask('pass', *names, '', *(node for other in same for node in other.drives),
-                            '', *self._words)
+                passing.ask()
                 self._passing.append(passing)
 
     # -- what has become of it --------------------------------------------------------------------

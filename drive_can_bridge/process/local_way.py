@@ -40,7 +40,7 @@ import os
 import socket
 import sys
 
-from drive_can_bridge.process.presence import Present
+from drive_can_bridge.process.presence import Present, WILD
 
 VERSION = '1'
 #: bytes of a packet; of all packets of what is asked
@@ -69,8 +69,15 @@ def matches(word: str, node: str) -> bool:
     name = node if word.startswith('/') else node.rpartition('/')[2]
     if name == word:
         return True
+    if not is_pattern(word):
+        return False
     from fnmatch import fnmatchcase
     return fnmatchcase(name, word)
+
+
+def is_pattern(word: str) -> bool:
+    """Tell whether a word is a shell pattern, and no name."""
+    return any(wild in word for wild in WILD)
 
 
 class Rubbish(Exception):

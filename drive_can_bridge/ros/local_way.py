@@ -19,12 +19,14 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.process.local_server import Asked, LocalServer
+from drive_can_bridge.process.local_stop import does_not_answer
 from drive_can_bridge.process.local_way import (
-    ANYWHERE, meant, Rubbish, value_of, value_text)
+    ANYWHERE, is_pattern, meant, Rubbish, value_of, value_text)
 from drive_can_bridge.process.presence import in_namespace, Presence, switched_on
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.messages import limits_of, parameter_message, value_of as value_in
+from drive_can_bridge.ros.passing import OthersStop
 from drive_can_bridge.ros.threads import CpuThrottle, ExecutorThread
 
 #: what is asked of drives, and what that is
@@ -34,6 +36,8 @@ _ACTIONS = {'enable': ControlAction.ENABLE, 'disable': ControlAction.DISABLE,
 _SHARE, _IN_HAND = 0.15, 0.02
 #: s for which the bridges that were seen are taken for those that there are
 _SEEN_FOR = 0.2
+#: patterns in a stop, and characters of each: anybody may send one, and to look at them takes time
+_PATTERNS_MAX, _PATTERN_MAX = 16, 256
 
 
 def security_enforced() -> bool:
@@ -59,7 +63,7 @@ class LocalWay:
                  drives: Mapping[str, DriveNode], order: Sequence[str], *,
                  seen: Callable[[], tuple[list[str], list[str]]],
                  get: Callable[[Any, Any], Any], spinner: ExecutorThread,
-                 pass_on: Callable[[Sequence[str], Asked], None],
+                 pass_on: Callable[[OthersStop, Asked], None],
                  warn: Callable[[str], None], clock: Clock) -> None:
         self._domain = domain
         self._name = name
@@ -98,7 +102,7 @@ class LocalWay:
             self._introduce(asked)
             asked.end()
         elif asked.action == 'pass':
-            self._pass_on(asked.words, asked)
+            self._pass(asked)
         elif asked.action in _CALLS:
             self._call(asked)
         else:
@@ -108,6 +112,9 @@ class LocalWay:
 
     def _stop(self, asked: Asked) -> None:
         place, words = ''.join(asked.words[:1]), asked.words[1:]
+        if _is_costly(asked.words):
+            asked.refuse(sentences.too_many_patterns())
+            return
         if place != ANYWHERE and not in_namespace(self._name, place):
             asked.answer('bridge', self._name, str(self._domain))
             asked.end()
@@ -115,6 +122,22 @@ class LocalWay:
         self._command(asked, ControlAction.QUICK_STOP,
                       {drive.full_name: drive for drive in list(self._drives.values())
                        if meant(words, drive.full_name)}, introduce=True)
+
+    def _pass(self, asked: Asked) -> None:
+        """Have a stop passed on to those of the bridges that are seen: anybody may name any."""
+        stop = OthersStop.of(asked.words)
+        if _is_costly(stop.words):
+            asked.refuse(sentences.too_many_patterns())
+            return
+        seen = set(self._around()[0]) - {self._name}
+        known = [name for name in stop.bridges if name in seen]
+        for name in stop.bridges:
+            if name not in seen:    # it has gone meanwhile
+                asked.answer('passed', name, '0', does_not_answer(), '1')
+        if known:
+            self._pass_on(stop._replace(bridges=tuple(known)), asked)
+        else:
+            asked.end()
 
     def _named(self, names: Sequence[str]) -> dict[str, DriveNode | None]:
         known = {drive.full_name: drive for drive in list(self._drives.values())}
@@ -149,14 +172,18 @@ class LocalWay:
 
     def _introduce(self, asked: Asked) -> None:
         """Say who this is, which drives there are, and which other bridges."""
-        now = self._clock.now()
-        if now - self._seen_at >= _SEEN_FOR:
-            self._seen_at, self._found = now, self._seen()
-        bridges, drives = self._found
+        bridges, drives = self._around()
         asked.answer('drives', *(self._drives[name].full_name for name in self._order
                                  if name in self._drives))
         asked.answer('around', *drives)
         asked.answer('bridge', self._name, str(self._domain), *bridges)
+
+    def _around(self) -> tuple[list[str], list[str]]:
+        """Return the bridges that are seen, and the drives around them."""
+        now = self._clock.now()
+        if now - self._seen_at >= _SEEN_FOR:
+            self._seen_at, self._found = now, self._seen()
+        return self._found
 
     # -- parameters -------------------------------------------------------------------------------
 
@@ -181,6 +208,12 @@ class LocalWay:
             self._spinner.later(lambda: answer(self._get(request, GetParameters.Response())))
         else:
             asked.refuse(sentences.no_such_node())
+
+
+def _is_costly(words: Sequence[str]) -> bool:
+    """Tell whether it takes long to see what words mean."""
+    patterns = [word for word in words if is_pattern(word)]
+    return len(patterns) > _PATTERNS_MAX or any(len(word) > _PATTERN_MAX for word in patterns)
 
 
 #: of what is asked: service, request, and what its response is in messages

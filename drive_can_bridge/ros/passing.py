@@ -7,8 +7,10 @@ are matched within some milliseconds. Only what a command of this host asks for 
 nothing goes round in circles.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+import math
+from typing import NamedTuple
 
 from rclpy.node import Node
 
@@ -23,6 +25,8 @@ from drive_can_bridge.ros.rcl.extension import GONE
 
 #: s that the bridges may take to say which drives they have, and the drives to stop
 PATIENCE = 1.0
+#: stops of strangers that are passed on at a time
+STRANGERS_AT_ONCE = 4
 
 
 class NodeEnd:
@@ -39,11 +43,100 @@ class NodeEnd:
         self.services, self.topics = self.end.services, self.end.topics
 
 
+class OthersStop(NamedTuple):
+    """
+    A stop of drives of other bridges.
+
+    :ivar bridges: their full names.
+    :ivar handled: drives that have theirs already.
+    :ivar words: names, patterns or full names of those that are meant; none: all.
+    """
+
+    bridges: tuple[str, ...]
+    handled: tuple[str, ...]
+    words: tuple[str, ...]
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> 'OthersStop':
+        """Take apart what was asked: the three, with an empty word between two of them."""
+        parts: list[list[str]] = [[]]
+        for word in words:
+            if word or len(parts) == 3:
+                parts[-1].append(word)
+            else:
+                parts.append([])
+        bridges, handled, meant = [*parts, [], []][:3]
+        return cls(tuple(bridges), tuple(handled), tuple(meant))
+
+
+class _Way:
+    """
+    A stop on its way to other bridges.
+
+    :param find_end: returns what asks them.
+    :param asked: who wants to know what becomes of it.
+    """
+
+    def __init__(self, find_end: Callable[[], NodeEnd], wanted: OthersStop,
+                 asked: list[Asked]) -> None:
+        self.wanted = wanted
+        self.asked = asked
+        self.is_strangers = not any(each.trusted for each in asked)
+        self._stop: Stop | None = None
+        self._failure = ''
+        with self._told():
+            self._stop = Stop(find_end(), None, wanted.words, wanted.bridges,
+                              only=wanted.bridges, patience=PATIENCE)
+            self._stop.leave(wanted.handled)
+
+    def look(self, now: float) -> bool:
+        """Go on; return whether all is done."""
+        done = True
+        with self._told():
+            done = self._stop is None or self._stop.look(now)
+        return done
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Have a failure told: a policy, or an end meanwhile; rcl has many types of it."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001
+            self._failure = str(error).partition(', at ')[0]
+            self.close()
+
+    def answer(self) -> None:
+        """Say what has become of it."""
+        drives: list[str] = []
+        answers: list[Answer] | None = None
+        if self._stop is not None:
+            with self._told():
+                drives, answers = self._stop.drives, self._stop.answers()
+        if answers is None:
+            answers = [Answer(name, False, f'a stop cannot be passed on to this bridge '
+                                           f'({self._failure}): its drives {RUNNING}', bridge=True)
+                       for name in self.wanted.bridges]
+        for one in self.asked:
+            one.answer('drives', *drives)
+            for answer in answers:
+                one.answer('passed', answer.name, f'{answer.ok:d}', answer.text,
+                           f'{answer.bridge:d}')
+            one.end()
+        self.close()
+
+    def close(self) -> None:
+        """Wait for nothing any more."""
+        stop, self._stop = self._stop, None
+        if stop is not None:
+            with suppress(*GONE):
+                stop.close()
+
+
 class Passing:
     """
-    Passes stops on, one after the other; those that came meanwhile share the next.
+    Passes stops on, each at once; those that are the same as one under way share the next.
 
-    The thread begins with the first one.
+    Strangers have a few under way. The thread begins with the first one.
 
     :param warn: takes a line for the log.
     """
@@ -52,26 +145,29 @@ class Passing:
         self._node, self._warn = node, warn
         self._end_of: NodeEnd | None = None
         self._clock = clock
-        self._waiting: Mailbox[tuple[tuple[str, ...], Asked] | None] = Mailbox(clock)
+        self._mail: Mailbox[tuple[OthersStop, Asked] | None] = Mailbox(clock)
+        self._waiting: list[tuple[OthersStop, Asked]] = []
+        self._under_way: list[_Way] = []
         self._ending = False
         self._thread: Worker | None = None
 
-    def begin(self, words: Sequence[str], asked: Asked) -> None:
-        """
-        Pass a stop on. From one thread.
-
-        :param words: full names of bridges; behind an empty word drives to be left alone; behind
-            another one what is meant.
-        """
+    def begin(self, wanted: OthersStop, asked: Asked) -> None:
+        """Pass a stop on. From one thread."""
         if self._thread is None:
             self._thread = self._clock.worker(self._run, 'passing on')
             self._thread.start()
-        self._waiting.put((tuple(words), asked))
+        self._mail.put((wanted, asked))
+
+    def _find_end(self) -> NodeEnd:
+        """Return what asks others; made when it is needed first."""
+        if self._end_of is None:
+            self._end_of = NodeEnd(self._node, self._warn)
+        return self._end_of
 
     def end(self) -> None:
         """Pass nothing on any more."""
         self._ending = True
-        self._waiting.put(None)
+        self._mail.put(None)
         if self._thread is not None:
             self._thread.join(PATIENCE)
         if self._end_of is not None:
@@ -79,52 +175,37 @@ class Passing:
 
     def _run(self) -> None:
         while not self._ending:
-            first = self._waiting.get()
-            if first is None:
-                return
-            words, asked = first
-            together, others = [asked], []
-            for _ in range(len(self._waiting)):
-                each = self._waiting.get()
-                if each is not None and each[0] == words:
-                    together.append(each[1])
-                else:
-                    others.append(each)
-            for each in others:
-                self._waiting.put(each)
-            drives, answers = self._passed(words)
-            for one in together:
-                one.answer('drives', *drives)
-                for answer in answers:
-                    one.answer('passed', answer.name, f'{answer.ok:d}', answer.text,
-                               f'{answer.bridge:d}')
-                one.end()
+            self._take_mail()
+            self._begin_what_may()
+            now = self._clock.now()
+            for way in list(self._under_way):
+                if way.look(now):
+                    self._under_way.remove(way)
+                    way.answer()
+        for way in self._under_way:
+            way.close()
 
-    def _passed(self, words: Sequence[str]) -> tuple[list[str], list[Answer]]:
-        """Return drives of bridges, and what became of them, or of bridges that do not answer."""
-        bridges, handled, meant = (list(part) for part in _parts(words))
-        stop: Stop | None = None
-        try:
-            if self._end_of is None:
-                self._end_of = NodeEnd(self._node, self._warn)
-            stop = Stop(self._end_of, None, meant, bridges, only=bridges, patience=PATIENCE)
-            stop.leave(handled)
-            while not self._ending and not stop.look(self._clock.now()):
-                self._clock.wait(self._clock.now() + LOOK_PERIOD)
-            return stop.drives, stop.answers()
-        except Exception as error:  # noqa: BLE001  a policy, or an end meanwhile: rcl has many types
-            reason = str(error).partition(', at ')[0]
-            text = f'a stop cannot be passed on to this bridge ({reason}): its drives {RUNNING}'
-            return [], [Answer(name, False, text, bridge=True) for name in bridges]
-        finally:
-            if stop is not None:
-                with suppress(*GONE):
-                    stop.close()
+    def _take_mail(self) -> None:
+        """Take what has come; wait for it, a moment only where something is under way."""
+        busy = self._under_way or self._waiting
+        with suppress(TimeoutError):
+            until = self._clock.now() + LOOK_PERIOD if busy else math.inf
+            while not self._ending:
+                item = self._mail.get(until)
+                if item is not None:
+                    self._waiting.append(item)
+                until = -math.inf
 
-
-def _parts(words: Sequence[str]) -> tuple[Sequence[str], Sequence[str], Sequence[str]]:
-    """Take apart what stands between empty words."""
-    first = words.index('') if '' in words else len(words)
-    rest = words[first + 1:]
-    second = rest.index('') if '' in rest else len(rest)
-    return words[:first], rest[:second], rest[second + 1:]
+    def _begin_what_may(self) -> None:
+        """Begin what waits, and may; whoever wants the same at the same time shares it."""
+        together: dict[OthersStop, list[Asked]] = {}
+        for wanted, asked in self._waiting:
+            together.setdefault(wanted, []).append(asked)
+        self._waiting = []
+        for wanted, askers in together.items():
+            strange = not any(each.trusted for each in askers)
+            if any(way.wanted == wanted for way in self._under_way) or strange and sum(
+                    way.is_strangers for way in self._under_way) >= STRANGERS_AT_ONCE:
+                self._waiting += [(wanted, each) for each in askers]
+            else:
+                self._under_way.append(_Way(self._find_end, wanted, askers))

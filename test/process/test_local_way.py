@@ -337,6 +337,55 @@ def test_a_bridge_of_a_stranger_is_not_believed(
     host.close()
 
 
+def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> None:
+    goes_on = threading.Event()
+
+    def wait(asked: Asked) -> None:
+        goes_on.wait(60.0)
+        host.echo(asked)
+    host.serve = wait
+    first = host.call()
+    first.ask('who')
+    while not host.asked:
+        time.sleep(0.001)
+    for action in ('enable', 'stop', 'set'):    # by who loses patience, or is ended
+        line = host.call()
+        line.ask(action, '/lift')
+        line.close()
+    goes_on.set()
+    assert ask(host, 'who') == [['who'], ['end']]
+    assert [each.action for each in host.asked] == ['who', 'stop', 'who']
+    first.close()
+
+
+def test_ours_are_heard_before_strangers(host: Host) -> None:
+    goes_on = threading.Event()
+
+    def wait(asked: Asked) -> None:
+        goes_on.wait(60.0)
+        host.echo(asked)
+    host.serve = wait
+    first = host.call()
+    first.ask('who')
+    while not host.asked:
+        time.sleep(0.001)
+    with stranger():
+        strange = [host.call() for _ in range(10)]
+    for each in strange:
+        each.ask('stop', '*')
+    ours = host.call()
+    ours.ask('stop', '*', 'lift')
+    host.serve = host.echo
+    goes_on.set()
+    assert answers(ours) == [['stop', '*', 'lift'], ['end']]
+    assert host.asked[1].words == ['*', 'lift'] and host.asked[1].trusted
+    for each in strange:    # whoever they are, they are heard
+        assert answers(each) == [['stop', '*'], ['end']]
+    assert not any(each.trusted for each in host.asked[2:])
+    for each in (first, ours, *strange):
+        each.close()
+
+
 def test_longer_questions_than_allowed(host: Host) -> None:
     line = host.call()
     with pytest.raises(OSError):

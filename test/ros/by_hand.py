@@ -49,11 +49,14 @@ class Line:
     """
     A connection that is none: what is said travels in packets all the same.
 
-    :ivar heard: what was asked.
+    :param asked: takes what is asked.
+    :param trusted: who asks is root, or the user of the bridge.
     """
 
-    def __init__(self, bridge: Bridge | None, asked: list[list[str]]) -> None:
+    def __init__(self, bridge: Bridge | None, asked: list[list[str]], *,
+                 trusted: bool = True) -> None:
         self.believed = True
+        self._trusted = trusted
         self._bridge = bridge
         self._asked = asked
         self._messages: deque[list[str]] = deque()
@@ -65,7 +68,8 @@ class Line:
         if self._bridge is not None:
             caller: Any = self
             runtime: Any = self._bridge.node._runtime
-            runtime.local_way.serve(Asked(caller, message[1], message[2:]))
+            runtime.local_way.serve(Asked(
+                caller, message[1], message[2:], trusted=self._trusted))
 
     def say(self, message: Sequence[str], *, last: bool = False) -> None:
         """Take what the bridge says."""

@@ -1,0 +1,173 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""A stop that came by the local way, passed on to bridges of other hosts."""
+
+from typing import Any
+
+from bridges import Bridge, LIFT, parameters, StartBridge
+from by_hand import Line, Lines, no_ros, Run
+from clients import Client, LATCHED, wait_until
+from graph_builders import answer, hang, offer
+import pytest
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+import waiting
+
+from drive_can_bridge.ros import passing
+
+
+class Far:
+    """
+    A bridge of another host.
+
+    :ivar stops: how often each drive was told to stop.
+    """
+
+    def __init__(self, client: Client, name: str, *drives: str) -> None:
+        self.stops = dict.fromkeys(drives, 0)
+        self.name = name
+        answer(client, name, drives=' '.join(drives))()
+        for each in drives:
+            node = f'{name.rpartition("/")[0]}/{each}'
+            offer(client, node, 'quick_stop', Trigger, lambda _, response, each=each: self._stop(
+                each, response))
+            client.node.create_publisher(Bool, f'{node}/online', LATCHED).publish(Bool(data=True))
+
+    def _stop(self, drive: str, response: Any) -> Any:
+        self.stops[drive] += 1
+        response.success, response.message = True, 'stopped'
+        return response
+
+
+@pytest.fixture
+def here(bridge: StartBridge) -> Bridge:
+    """Start a bridge of this host."""
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    return one
+
+
+def seen(here: Bridge, *names: str) -> None:
+    """Wait until the bridge sees others."""
+    parameter = here.node._node_parameters
+    wait_until(lambda: {*names} <= {*parameter.around()[0]})
+    waiting.pause(0.3)      # and until it tells so
+
+
+def ask(here: Bridge, *words: str, trusted: bool = True) -> Line:
+    """Ask it."""
+    line = Line(here, [], trusted=trusted)
+    line.ask(*words)
+    return line
+
+
+def answers(line: Line) -> list[list[str]]:
+    """Wait for all that is said."""
+    found: list[list[str]] = []
+
+    def ended() -> bool:
+        while (message := line.take()) is not None:
+            found.append(message)
+        return bool(found) and found[-1][0] in ('end', 'no')
+    wait_until(ended)
+    return found
+
+
+def test_a_stop_reaches_bridges_of_other_hosts_once(
+        here: Bridge, client: Client, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch,
+        ) -> None:
+    far = Far(client, '/far/bridge', 'hoist', 'belt')
+    further = Far(client, '/further/bridge', 'arm')
+    seen(here, far.name, further.name)
+    locally(here)
+    no_ros(monkeypatch)
+    assert run('stop') == (0, ['lift: ready', 'far/hoist: stopped', 'far/belt: stopped',
+                               'further/arm: stopped'], '')
+    assert [*far.stops.values(), *further.stops.values()] == [1, 1, 1]
+    assert run('stop', 'h*') == (0, ['far/hoist: stopped'], '')
+    assert [*far.stops.values(), *further.stops.values()] == [2, 1, 1]
+
+
+def test_one_of_another_host_that_hangs_is_named_and_the_others_are_stopped(
+        here: Bridge, client: Client, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch,
+        bench: Any) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    hang(client, '/mute/bridge')
+    seen(here, far.name, '/mute/bridge')
+    locally(here)
+    no_ros(monkeypatch)
+    began = bench.clock.now()
+    assert run('stop') == (1, [
+        'mute/bridge: NOT STOPPED: this bridge does not answer: its drives may still be running',
+        'lift: ready', 'far/hoist: stopped'], '')
+    assert 1.0 <= bench.clock.now() - began < 1.5
+    assert far.stops == {'hoist': 1}
+
+
+def test_what_nobody_sees_costs_a_bridge_nothing(here: Bridge, client: Client) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    seen(here, far.name)
+    runtime: Any = here.node._runtime
+    names = [f'/n{number}/bridge' for number in range(500)]
+    found = answers(ask(here, 'pass', *names, '', '', trusted=False))
+    assert found == [['passed', name, '0', 'this bridge does not answer: its drives may still be '
+                      'running', '1'] for name in names] + [['end']]
+    assert runtime._passing._thread is None   # nothing was begun
+    assert far.stops == {'hoist': 0}
+
+
+def test_strangers_hold_up_nobody(here: Bridge, client: Client) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    hang(client, '/mute/bridge')
+    seen(here, far.name, '/mute/bridge')
+    strange = [ask(here, 'pass', '/mute/bridge', '', '', f'word{number}', trusted=False)
+               for number in range(3 * passing.STRANGERS_AT_ONCE)]
+    waiting.pause(0.1)
+    runtime: Any = here.node._runtime
+    assert len(runtime._passing._under_way) == passing.STRANGERS_AT_ONCE
+    ours = ask(here, 'pass', far.name, '', '')
+    assert answers(ours)[-2:] == [['passed', '/far/hoist', '1', 'stopped', '0'], ['end']]
+    assert not any(line.take() for line in strange)
+    for each in strange:
+        assert answers(each)[-1] == ['end']
+
+
+def test_the_same_at_the_same_time_is_passed_on_once_more_at_most(
+        here: Bridge, client: Client) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    seen(here, far.name)
+    lines = [ask(here, 'pass', far.name, '', '') for _ in range(100)]
+    for each in lines:
+        assert answers(each) == [['drives', '/far/hoist'],
+                                 ['passed', '/far/hoist', '1', 'stopped', '0'], ['end']]
+    assert 1 <= far.stops['hoist'] <= 2
+
+
+def test_drives_that_have_theirs_are_left_alone(here: Bridge, client: Client) -> None:
+    far = Far(client, '/far/bridge', 'hoist', 'belt')
+    seen(here, far.name)
+    assert answers(ask(here, 'pass', far.name, '', '/far/hoist', '/lift', '', '/far/*')) == [
+        ['drives', '/far/hoist', '/far/belt'], ['passed', '/far/belt', '1', 'stopped', '0'],
+        ['end']]
+    assert far.stops == {'hoist': 0, 'belt': 1}
+
+
+def test_a_policy_that_forbids_it_is_told(
+        here: Bridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    seen(here, far.name)
+
+    def refused(*_: Any, **__: Any) -> None:
+        raise RuntimeError('create_client: not found in allow rule, at ./src/client.c:9')
+    monkeypatch.setattr(passing, 'Stop', refused)
+    assert answers(ask(here, 'pass', far.name, '', '')) == [
+        ['drives'],
+        ['passed', '/far/bridge', '0', 'a stop cannot be passed on to this bridge (create_client: '
+         'not found in allow rule): its drives may still be running', '1'], ['end']]
+
+
+@pytest.mark.parametrize('words', [
+    ('stop', '*', *(f'x{number}*' for number in range(17))), ('stop', '*', 257 * '*'),
+    ('stop', 257 * '?'),
+    ('pass', '/far/bridge', '', '', *(f'x{number}*' for number in range(17)))])
+def test_patterns_that_take_long_are_refused(here: Bridge, words: tuple[str, ...]) -> None:
+    assert answers(ask(here, *words)) == [['no', 'too many patterns']]
