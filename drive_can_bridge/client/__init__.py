@@ -26,6 +26,7 @@ from drive_can_bridge.client.drive import (
     Drive, Drives, Enabled, NoDrive, ReadOutcome, Source, WriteOutcome,
 )
 from drive_can_bridge.clock import Clock, SteadyClock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError
 
 __all__ = ['Drive', 'DriveCanError', 'Drives', 'Enabled', 'ReadOutcome', 'WriteOutcome',
@@ -49,18 +50,17 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
     """
     clock = clock or SteadyClock()
     if params_file is not None and namespace is not None:
-        raise DriveCanError('namespace is of a running bridge, params_file goes without one')
+        raise DriveCanError(sentences.namespace_or_file())
     if params_file is None and nmt_start:
-        raise DriveCanError('nmt_start goes with params_file only: a bridge starts its nodes '
-                            'itself')
+        raise DriveCanError(sentences.nmt_start_alone())
     if params_file is not None:
         from drive_can_bridge.client.direct import DirectSource
         try:
             with slow():
                 return DirectSource(params_file, clock, nmt_start=nmt_start)
         except OSError as error:
-            raise DriveCanError(f'{error.filename or params_file}: '
-                                f'{error.strerror or error}') from error
+            raise DriveCanError(sentences.file_unreadable(
+                file=error.filename or params_file, reason=error.strerror or str(error))) from error
     from drive_can_bridge.client.bridge import BridgeSource
     from drive_can_bridge.client.local import local_way
     place = namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/')

@@ -9,6 +9,7 @@ from typing import Any
 from drive_can_bridge.client.drive import (
     Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
 from drive_can_bridge.client.way import Described, Way
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
@@ -65,7 +66,7 @@ def _number(facts: dict[str, str], key: str) -> int | None:
 
 #: parameters that are read with one call
 BLOCK = 16
-_NO_VALUE = 'no value; the log of the bridge says why'
+_NO_VALUE = sentences.no_value()
 #: s beyond its period that a diagnostic message may take
 _DIAGNOSTICS_MARGIN = 5.0
 _ENABLED = {'online': Enabled.YES, 'not armed': Enabled.YES, 'disabled': Enabled.NO,
@@ -114,12 +115,12 @@ class BridgedDrive(Drive):
     def write_refusal(self, name: str, parameter: Parameter) -> str:
         role = self.role(name)
         if parameter.writable and role is Role.CONTROL:
-            return 'use ~/enable'
+            return sentences.use_enable()
         if parameter.writable and role is Role.CYCLIC:
             own = next((each.name for each in self._directory.twins(parameter)), name)
-            return f'sent cyclically: publish ~/command/{own}'
+            return sentences.sent_cyclically(own)
         if role is Role.MAP:
-            return 'mapping parameter: not written while the bridge is active'
+            return sentences.mapping_parameter()
         return ''
 
     def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:

@@ -19,6 +19,7 @@ from drive_can_bridge.client.drive import (
     Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.directory import ParameterDirectory
@@ -30,7 +31,6 @@ from drive_can_bridge.core.requests import (
     Failure, FailureKind, is_answer, Outcome, ReadRequest, ReadValue, Request, WriteRequest,
     Written)
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import no_answer_offline, no_result
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
@@ -88,7 +88,7 @@ class BusConversation:
             while not self._opened and self._trouble is None and self.now() < end:
                 self._changed.wait(end)
             if not self._opened:
-                self._fail(BusUnavailable(f'bus {bus.name}: it does not open'))
+                self._fail(BusUnavailable(sentences.bus_not_opening(bus=bus.name)))
             self._check()
         except BaseException:
             self.close()
@@ -135,12 +135,13 @@ class BusConversation:
         """
         with self._exchange.lock:
             if not self._exchange.link.send(frame):
-                raise BusUnavailable(f'bus {self.bus.name}: {self._exchange.link.last_error}')
+                raise BusUnavailable(sentences.bus_because(
+                    bus=self.bus.name, reason=self._exchange.link.last_error))
 
     def close(self) -> None:
         """Close the bus; later requests are told so. Idempotent."""
         self._exchange.close()
-        self._fail(DriveCanError(f'bus {self.bus.name}: is closed already'))
+        self._fail(DriveCanError(sentences.bus_closed(bus=self.bus.name)))
 
     def _check(self) -> None:
         if self._trouble is not None:
@@ -163,8 +164,8 @@ class BusConversation:
             return
         for name, route in self._requests:
             if route.matches(frame):
-                self._fail(AnotherMaster(f'bus {self.bus.name}: another master talks to drive '
-                                         f'{name} ({frame}); end it first'))
+                self._fail(AnotherMaster(sentences.other_master_talks(
+                    bus=self.bus.name, drive=name, frame=frame)))
 
     def bus_opened(self, bus: str) -> None:
         """Let requests go out: the bus is there."""
@@ -173,7 +174,7 @@ class BusConversation:
 
     def bus_lost(self, bus: str, reason: str) -> None:
         """End: what the drives do now nobody knows."""
-        self._fail(BusUnavailable(f'bus {bus}: {reason}'))
+        self._fail(BusUnavailable(sentences.bus_because(bus=bus, reason=reason)))
 
     def bus_told(self, bus: str, text: str) -> None:
         """Go on: what an adapter does otherwise changes no answer."""
@@ -181,7 +182,7 @@ class BusConversation:
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """End likewise."""
         kind = BusMisconfigured if misconfigured else DriveCanError
-        self._fail(kind(f'bus {bus}: {reason}'))
+        self._fail(kind(sentences.bus_because(bus=bus, reason=reason)))
 
 
 class _Ears(DriveListener):
@@ -207,8 +208,8 @@ _ABSENT_FOR = 2.0
 #: s between looks whether a node has started, and s until there is no other look
 _START_PAUSE = 0.1
 _START_PATIENCE = 2.5
-_NO_RESULT = Failure(FailureKind.UNAVAILABLE, no_result())
-_START_HINT = 'a CANopen node that is not operational answers no PKW, --nmt-start starts it'
+_NO_RESULT = Failure(FailureKind.UNAVAILABLE, sentences.no_result())
+_START_HINT = sentences.node_not_operational()
 
 
 class DirectDrive(Drive):
@@ -250,8 +251,7 @@ class DirectDrive(Drive):
         if supervision is not None:
             outcome, = self._wait_for((supervision,))
             if isinstance(outcome, ReadValue) and outcome.raw != 0:
-                yield (f'{self.name}: {supervision.address} is not 0: the drive supervises '
-                       'telegrams once it has got one, and faults when they end')
+                yield sentences.telegrams_supervised(self.name, supervision.address)
 
     def role(self, name: str) -> Role | None:
         parameter = self.find(name)
@@ -262,9 +262,9 @@ class DirectDrive(Drive):
             return ''   # which its value is told
         owner = self._session.roles.owner(parameter)
         if owner is not None and owner[0] is Role.CONTROL:
-            return 'control word: only a running bridge sends it'
+            return sentences.bridge_sends_word()
         if owner is not None and owner[0] is Role.CYCLIC:
-            return f'setpoint {owner[1].name}: only a running bridge sends it'
+            return sentences.bridge_sends_setpoint(name=owner[1].name)
         return self._session.services.write_refusal(parameter)
 
     # -- reading ----------------------------------------------------------------------------------
@@ -324,7 +324,7 @@ class DirectDrive(Drive):
         listed = [each for each in self.parameters.values()
                   if each.readable and self._session.roles.cells(each)]
         candidates = dict.fromkeys([*wanted[:1], *listed[:TRIES], *wanted])
-        outcome: Outcome = Failure(FailureKind.OFFLINE, no_answer_offline())
+        outcome: Outcome = Failure(FailureKind.OFFLINE, sentences.no_answer_offline())
         for candidate in list(candidates)[:TRIES]:
             outcome, = self._wait_for((candidate,))
             if is_answer(outcome):
@@ -405,7 +405,7 @@ def _paired(block: Sequence[tuple[str, Parameter]], outcomes: Sequence[Outcome],
 #: s to listen for another master before the first request
 LISTEN = 1.2
 #: what to do where a bridge has a drive
-ADVICE = 'leave --params-file away to go through it'
+ADVICE = sentences.leave_file_away()
 
 
 class DirectSource:

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.complaints import hint
 from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
@@ -37,12 +38,11 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import write_not_confirmed
 from drive_can_bridge.process.signals import finish_first
 
 
 #: of a write under way when the conversation ended, and of those that were to follow
-NOT_CONFIRMED = write_not_confirmed()
+NOT_CONFIRMED = sentences.write_not_confirmed()
 ENDED_BEFORE = 'ended before'
 
 
@@ -339,8 +339,8 @@ class NoDrive(DriveCanError, KeyError):
 
     def __init__(self, name: object, known: Iterable[str]) -> None:
         names = list(known)
-        super().__init__(f'no drive {name!r}{hint(str(name), names)}; there are: '
-                         f'{", ".join(names) or "none"}')
+        super().__init__(sentences.no_drive_there(
+            repr(name), ', '.join(names) or 'none', hint(str(name), names)))
 
     __str__ = Exception.__str__     # KeyError shows it in quotes
 

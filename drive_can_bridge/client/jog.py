@@ -119,7 +119,8 @@ def find_target(graph: Graph, namespace: str | None, drive: str, name: str | Non
     bridges = find_drives(graph, place)
     short = drive.rpartition('/')[2]
     if short not in bridges:
-        raise WhichBridge(f'no drive {drive!r}; there are: {", ".join(bridges) or "none"}')
+        raise WhichBridge(sentences.no_drive_there(
+            repr(drive), ', '.join(bridges) or 'none'))
     bridge = bridges[short]
     node = f'{namespace_of(bridge)}/{short}'
     prefix = f'drives.{short}.'

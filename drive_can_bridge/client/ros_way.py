@@ -8,6 +8,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
 from drive_can_bridge.client.way import Described, Found
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import NoBridge
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.ros.client.search import find_drives, Graph
@@ -36,8 +37,7 @@ class RosWay:
             self.bridge_of = find_drives(self._graph, namespace)
         except NoBridge as error:
             self._graph.close()
-            raise NoBridge(f'{error}: start one, or name its file with --params-file to talk to '
-                           'the drives directly') from None
+            raise NoBridge(sentences.no_bridge_or_file(why=str(error))) from None
         except BaseException:
             self._graph.close()
             raise

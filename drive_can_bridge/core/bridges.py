@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern
 
@@ -14,10 +15,9 @@ class UnknownDrive(DriveCanError):
 def stand_apart(names: Sequence[str]) -> str:
     """Say why bridges do not stand together; '': they do."""
     if len({name.rpartition('/')[0] for name in names}) > 1:
-        return f'several bridges are running: {", ".join(names)}; choose one with --namespace'
+        return sentences.several_bridges(names)
     twice = next((name for name in names if names.count(name) > 1), '')
-    return twice and (f'{names.count(twice)} bridges are called {twice}: start each in a '
-                      'namespace of its own')
+    return twice and sentences.bridges_of_one_name(names.count(twice), twice)
 
 
 def must_stand_together(names: Sequence[str]) -> None:
@@ -42,8 +42,8 @@ def bridges_of(drives: Mapping[str, Iterable[str]]) -> dict[str, str]:
     for bridge, names in drives.items():
         for name in names:
             if name in found:
-                raise WhichBridge(f'{found[name]} and {bridge} have a drive {name} each: '
-                                  'start each in a namespace of its own')
+                raise WhichBridge(sentences.drive_of_two_bridges(
+                    one=found[name], other=bridge, drive=name))
             found[name] = bridge
     return found
 
@@ -69,7 +69,7 @@ def chosen_drives(words: Sequence[str], namespace: str | None,
         found = [node for node in looked[place] if matches(word, node)]
         if not found:
             there = ', '.join(node.lstrip('/') for node in looked[place])
-            raise UnknownDrive(f'no drive {word!r}; there are: {there}')
+            raise UnknownDrive(sentences.no_drive_there(drive=repr(word), there=there))
         nodes.update(dict.fromkeys(found))
     return list(nodes)
 

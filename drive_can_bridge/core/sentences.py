@@ -988,5 +988,78 @@ values_without_names = Text(
     '{count} {quantity} values and no names',
     do='have its publisher name the joints')
 
+# -- commands, views and clients: what they refuse, and what failed -------------------------------
+namespace_or_file = Text(
+    'namespace is of a running bridge, params_file goes without one',
+    do='leave one of them out')
+nmt_start_alone = Text(
+    'nmt_start goes with params_file only: a bridge starts its nodes itself',
+    do='give params_file, or leave nmt_start out')
+file_unreadable = Text('{file}: {reason}', do='give a readable file')
+no_value = Text('no value; the log of the bridge says why', do='see the log of the bridge')
+node_not_operational = Text(
+    'a CANopen node that is not operational answers no PKW, --nmt-start starts it',
+    do='give --nmt-start, or have its NMT master start it')
+leave_file_away = Text('leave --params-file away to go through it', do='leave --params-file away')
+bridge_sends_word = Text(
+    'control word: only a running bridge sends it',
+    do='use drive_can enable, disable, stop, or ~/enable')
+bridge_sends_setpoint = Text(
+    'setpoint {name}: only a running bridge sends it',
+    do='use drive_can jog, or publish it')
+bus_closed = Text('bus {bus}: is closed already', do='open it again')
+bus_because = Text('bus {bus}: {reason}', do='look at the adapter; see what the reason says')
+telegrams_supervised = Text(
+    '{drive}: {address} is not 0: the drive supervises telegrams once it has got one, and faults '
+    'when they end',
+    do='set it to 0 while you work without the bridge, or reset the fault afterwards')
+bus_not_opening = Text('bus {bus}: it does not open', do='look at the adapter and its settings')
+other_master_talks = Text(
+    'bus {bus}: another master talks to drive {drive} ({frame}); end it first',
+    do='end the other master; there must be one only')
+no_drive_there = Text(
+    'no drive {drive}{near}; there are: {there}',
+    'no drive {drive}; there are: {there}',
+    fields='drive there near',
+    do='use one of the names')
+no_bridge_or_file = Text(
+    '{why}: start one, or name its file with --params-file to talk to the drives directly',
+    do='start a bridge, or give --params-file')
+several_bridges = Text(
+    'several bridges are running: {names:, }; choose one with --namespace',
+    do='choose one with --namespace')
+bridges_of_one_name = Text(
+    '{count} bridges are called {name}: start each in a namespace of its own',
+    do='start each in a namespace of its own')
+drive_of_two_bridges = Text(
+    '{one} and {other} have a drive {drive} each: start each in a namespace of its own',
+    do='start each in a namespace of its own')
+bridge_silent_may_run = Text(
+    'may still be running: its bridge is silent',
+    do='see whether the bridge runs; make sure that the drive stands still, by other means if '
+       'need be')
+no_sample = Text(
+    'offline: no sample for {seconds:.0f} s: is its bridge {bridge} still running?',
+    do='see whether that bridge runs')
+bridge_silent = Text('its bridge {bridge} is silent', do='see whether that bridge runs')
+stopped_answering = Text('offline: it stopped answering', do='wait for what diagnostics say of it')
+bridge_silent_since = Text(
+    'bridge {name}silent since {since}: its drives may still be running; a stop may not reach '
+    'them',
+    do='make sure that its drives stand still, by other means if need be')
+no_such_value = Text('{word} is no value: write {kind}{example}', do='write a value of that kind')
+moves_the_drive = Text(
+    'moves the drive: not written here',
+    do='publish the setpoint, or use drive_can jog')
+protected = Text(
+    'protected by its profile: not written here',
+    do='use drive_can write or restore --include-protected, knowing what it does')
+no_bridge_tells = Text(
+    '{names:, }: in the graph, but no bridge tells of it: may be running',
+    do='see which process has that drive; make sure that the drive stands still')
+setpoint_of_bridge = Text('sent cyclically: a setpoint', do='publish it, or use drive_can jog')
+word_of_bridge = Text('control word: use ~/enable', do='use drive_can enable, disable, stop')
+map_of_bridge = Text('a map: not written while the bridge runs', do='use mapping configure')
+
 #: all sentences there are, by their codes
 CODES = catalogue(globals())

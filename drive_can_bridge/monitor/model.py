@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 import math
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import (
@@ -165,18 +166,17 @@ class DriveRecord:
     def _judge(self, report: Report, now: float, silent: float) -> tuple[str, Level, str, bool]:
         """Return state, level, advice, and whether it is online."""
         if silent:
-            return UNKNOWN, Level.STALE, 'may still be running: its bridge is silent', False
+            return UNKNOWN, Level.STALE, sentences.bridge_silent_may_run(), False
         told_online = report.state not in _SILENT_STATES
         # diagnostics come once a second, this topic at once
         if self._online is not None and self._online_at > self._reported_at:
             if told_online and not self._online:
-                return OFFLINE, Level.ERROR, 'offline: it stopped answering', False
+                return OFFLINE, Level.ERROR, sentences.stopped_answering(), False
             if self._online and not told_online:
                 return ONLINE, Level.OK, 'online', True
         quiet = now - max(self.responses.at, self._sampled_since or now)
         if told_online and self.rate and quiet > SAMPLES_MISSING + 3.0 / self.rate:
-            return (OFFLINE, Level.ERROR, f'offline: no sample for {quiet:.0f} s: is its bridge '
-                    f'{report.bridge} still running?', False)
+            return (OFFLINE, Level.ERROR, sentences.no_sample(quiet, report.bridge), False)
         return report.state, report.level, report.message, told_online
 
 
@@ -212,7 +212,7 @@ class _BusRecord:
         report = self._report or Report('', False, name, Level.STALE, '')
         if silent:
             return BusSnapshot(name, label, report.bridge, UNKNOWN, Level.STALE,
-                               f'its bridge {report.bridge} is silent')
+                               sentences.bridge_silent(bridge=report.bridge))
         return BusSnapshot(
             name, label, report.bridge, report.state, report.level, report.message,
             report.number('load_percent'), self._sent.value, self._received.value,

@@ -13,6 +13,7 @@ import math
 import re
 from typing import Any
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Times, UNKNOWN
@@ -136,17 +137,16 @@ def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
 
     :param clock: writes a time of day.
     """
-    lines = []
+    lines: list[str] = []
     for bridge in snapshot.bridges:
         if bridge.silent:
             name = f'{bridge.name} ' if len(snapshot.bridges) > 1 else ''
             since = clock(snapshot.at - bridge.silent)
-            lines.append(f'bridge {name}silent since {since}: its drives may still be running; '
-                         'a stop may not reach them')
+            lines.append(sentences.bridge_silent_since(name, since))
     unheard = [name for name, seconds in snapshot.unheard.items() if seconds > _UNHEARD]
     if unheard:
-        lines.append(f'{", ".join(unheard[:_NAMED])}{", " + _OTHER if unheard[_NAMED:] else ""}: '
-                     'in the graph, but no bridge tells of it: may be running')
+        lines.append(sentences.no_bridge_tells(
+            [*unheard[:_NAMED], *([_OTHER] if unheard[_NAMED:] else [])]))
     return lines
 
 

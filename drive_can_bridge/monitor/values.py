@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import math
 import re
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
 from drive_can_bridge.core.text import printable, taken_apart
@@ -17,8 +18,8 @@ _WIDTH = 8
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
 #: what the bridge uses a parameter for, and so writes itself
-_ROLES = {'cyclic': 'sent cyclically: a setpoint', 'control': 'control word: use ~/enable',
-          'map': 'a map: not written while the bridge runs'}
+_ROLES = {'cyclic': sentences.setpoint_of_bridge(), 'control': sentences.word_of_bridge(),
+          'map': sentences.map_of_bridge()}
 #: names that say what a profile cannot: setpoints, those of CiA 402 (targets) too
 _MOVING = re.compile(r'(setpoint|control_word)$|(^|_)target(_|$)')
 #: the second of them and so on; one that is stored is no setpoint, but says what such a one means
@@ -140,22 +141,23 @@ class ParameterInfo:
         except (KeyError, ValueError):
             value = math.nan
         if not math.isfinite(value):
-            raise ValueRefused(f'{printable(word)!r} is no value: write {self.kind.words}'
-                               f'{_EXAMPLES.get(self.kind, "")}')
+            raise ValueRefused(sentences.no_such_value(
+                word=repr(printable(word)), kind=self.kind.words,
+                example=_EXAMPLES.get(self.kind, '')))
         return value
 
     @property
     def refusal(self) -> str:
         """Say why a view does not write it: what moves a drive, or is protected; '' if it may."""
         if self.read_only:
-            return 'read-only'
+            return sentences.read_only()
         role = self.facts.get('role')
         if role is not None:
             return _ROLES.get(role, role)
         if _MOVING.search(self.name) or (   # also while nobody maps it
                 self.facts.get('storage') != 'eeprom' and _NUMBERED.search(self.name)):
-            return 'moves the drive: not written here'
-        return 'protected by its profile: not written here' * (
+            return sentences.moves_the_drive()
+        return sentences.protected() * (
             self.facts.get('protected') == 'true')
 
     def _number(self, fact: str, default: float) -> float:
