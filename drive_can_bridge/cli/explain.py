@@ -14,6 +14,7 @@ from pathlib import Path
 import re
 from string import Formatter
 from types import ModuleType
+from typing import NamedTuple
 
 from drive_can_bridge.cli.command import complain, FAILED, print_json, say
 from drive_can_bridge.core import complaints, sentences
@@ -23,60 +24,140 @@ from drive_can_bridge.core.text import counted, printable
 #: what the rows of a catalogue are about
 ABOUT: dict[str, ModuleType] = {'drives and buses': sentences, 'files': complaints}
 PAGE = Path('docs', 'messages.md')
+#: codes that are named, and rows that are shown, where none is the one
 _NEAREST = 5
-_HEADING = re.compile(r'# -- (.*?) -*')
+#: letters that a text has to have in common with a row
+_ENOUGH = 6
+_HEADING = re.compile(r'# -- (.*?)(?: -+)?')
 _ROW = re.compile(r'(\w+) = Text\(')
 
 _HEAD = """\
 # What the messages mean, and what to do
 
-Every status of `/diagnostics` has a key `code` ([what else it has](ros_interface.md));
-`drive_can explain CODE` shows its row of this page. In `<brackets>` stands what changes; several
-texts of a code are its forms.
+Search this page for the `code` of a status in `/diagnostics` ([what else it
+has](ros_interface.md)), or give it to `drive_can explain`, which takes a line of the log, or some
+words of one, too:
+
+```sh
+drive_can explain not_armed
+drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts"
+```
+
+In `<brackets>` stands what changes; several texts of a code are its forms. `messages.md#not_armed`
+leads to the row of that code.
 
 Made by `python -m drive_can_bridge.cli.explain`, of `core/sentences.py` and `core/complaints.py`.
 """
 _FILES = """
 # What can be wrong with a parameter file or a profile
 
-`drive_can validate` and the bridge say it with file, line and key. What to do stands in the text:
-it says what is allowed.
-
-| code | text |
-|---|---|
+`drive_can validate` and the bridge say it with file, line and key; each text says what is allowed.
 """
+_TABLE = ['', '| code | text | what to do |', '|---|---|---|']
+
+
+class _Match(NamedTuple):
+    """
+    A row that a text may be made of.
+
+    :ivar places: of the characters that it has in common with the text.
+    """
+
+    places: frozenset[int]
+    about: str
+    row: Text
 
 
 def define(parser: ArgumentParser) -> None:
     """Define the words and options of the subcommand."""
     parser.description = (
-        'Say what a code means that diagnostics, or a line of --json, has: its text, and what to '
-        'do about it.')
-    parser.epilog = 'Exit code 0: it is known. 1: it is not; the nearest ones are named.'
-    parser.add_argument('code', metavar='CODE', help='such as not_armed').completer = (  # type: ignore[attr-defined]
+        'Say what a code of diagnostics, log or --json means: its text, and what to do about it. '
+        'A line of the log, or words of one, will do, too.')
+    parser.epilog = (
+        'Exit code 0: it is known. 1: it is not; the nearest ones are named. --json: code, about, '
+        'texts (what changes in <brackets>), do.')
+    parser.add_argument('code', metavar='CODE', nargs='+', help=(  # type: ignore[attr-defined]
+        'such as not_armed, or a text')).completer = (
         lambda **_: sorted({**sentences.CODES, **complaints.CODES}))
-    parser.add_argument('--json', action='store_true', help=(
-        'a JSON document a line: code, about, texts (what changes in <brackets>), do'))
+    parser.add_argument('--json', action='store_true', help='a JSON document a line')
 
 
 def run(args: Namespace) -> int:
-    """Show the rows of a code: one of drives, one of files, or both."""
-    rows = [(about, module.CODES[args.code]) for about, module in ABOUT.items()
-            if args.code in module.CODES]
-    for about, row in rows:
+    """Show the rows of a code (one of drives, one of files, or both), or those of a text."""
+    text = ' '.join(args.code)
+    rows = rows_of(text)
+    for about, row in rows[:_NEAREST]:
         if args.json:
             print_json({'code': row.code, 'about': about, 'texts': forms(row), 'do': row.do})
         else:
             say(f'{row.code} (of {about})')
-            for text in forms(row):
-                say(f'  it says:    {text}')
+            for form in forms(row):
+                say(f'  it says:    {form}')
             say(f'  what to do: {row.do}')
+    if rows[_NEAREST:]:
+        complain(f'and {len(rows) - _NEAREST} more: give more words')
     if not rows:
         near = difflib.get_close_matches(
-            args.code, sorted({**sentences.CODES, **complaints.CODES}), _NEAREST)
-        complain(f'drive_can explain: {printable(args.code)}: no such code' + (
+            text, sorted({**sentences.CODES, **complaints.CODES}), _NEAREST)
+        complain(f'drive_can explain: {printable(text)}: no such code' + (
             f', did you mean {" or ".join(near)}?' if near else '; docs/messages.md has them all'))
     return 0 if rows else FAILED
+
+
+def rows_of(text: str) -> list[tuple[str, Text]]:
+    """Return the rows of a code, of words of a text, or of a line, and what they are about."""
+    return [(about, module.CODES[text]) for about, module in ABOUT.items()
+            if text in module.CODES] or _with_words(text) or _said_in(text)
+
+
+def _rows() -> Iterator[tuple[str, Text]]:
+    for about, module in ABOUT.items():
+        for row in module.CODES.values():
+            if row is not sentences.uncoded:
+                yield about, row
+
+
+def _with_words(text: str) -> list[tuple[str, Text]]:
+    """Return the rows in whose texts some words stand: those of few other words first."""
+    words = ' '.join(text.lower().split())
+    if len(words) < _ENOUGH:
+        return []
+    found = [(min(len(form) for form in forms(row) if words in form.lower()), about, row)
+             for about, row in _rows() if any(words in form.lower() for form in forms(row))]
+    return [(about, row) for _, about, row in sorted(found, key=lambda each: each[0])]
+
+
+def _said_in(text: str) -> list[tuple[str, Text]]:
+    """Return the rows that a line may be made of: those that have most in common with it first."""
+    matches = sorted(_matches(text), key=lambda each: -len(each.places))
+    return [(match.about, match.row) for match in matches
+            if not any(match.places < other.places for other in matches)]
+
+
+def _matches(text: str) -> Iterator[_Match]:
+    for about, row in _rows():
+        fitting = [places for form in row.texts if (places := _in_common(form, text))]
+        if fitting:
+            yield _Match(max(fitting, key=len), about, row)
+
+
+def _in_common(form: str, text: str) -> frozenset[int]:
+    """Return where the letters of a form stand in a text; nothing: it is not made of it."""
+    pieces = list(Formatter().parse(form))
+    if (sum(each.isalpha() for before, *_ in pieces for each in before) < _ENOUGH
+            or not all(before in text for before, *_ in pieces)):   # a regex takes long to say so
+        return frozenset()
+    pattern = ''
+    for before, name, spec, _ in pieces:
+        pattern += f'({re.escape(before)})'
+        if name and (spec or '').startswith('#'):
+            pattern += rf'\d+( {re.escape((spec or "")[1:])}\w*)'
+        elif name and spec != '?':
+            pattern += '.+?'
+    found = re.search(pattern, text)
+    return frozenset() if found is None else frozenset(
+        place for group in range(1, found.re.groups + 1) for place in range(*found.span(group))
+        if text[place].isalpha())
 
 
 def forms(row: Text) -> list[str]:
@@ -95,17 +176,36 @@ def _pieces(text: str) -> Iterator[str]:
 
 def page() -> str:
     """Return the text of the page."""
+    of_drives = sorted(_sections(sentences), key=lambda section: not section[0].startswith('Diag'))
+    of_files = _sections(complaints)
     lines = [_HEAD]
-    for line in inspect.getsource(sentences).splitlines():
+    for sections in (of_drives, of_files):
+        lines += [f'* [{title}](#{_slug(title)})' for title, _ in sections]
+    for sections, head, prefix in ((of_drives, '', ''), (of_files, _FILES, 'file-')):
+        lines.append(head)
+        for title, rows in sections:
+            lines += ['', f'## {title}', *_TABLE]
+            lines += [f'| <a id="{prefix}{row.code}"></a>`{row.code}` | {_cell(row)} | '
+                      f'{_escaped(row.do)} |' for row in rows]
+    return re.sub('\n{3,}', '\n\n', '\n'.join(lines)) + '\n'
+
+
+def _sections(module: ModuleType) -> list[tuple[str, list[Text]]]:
+    """Return what stands below each heading of a catalogue."""
+    sections: list[tuple[str, list[Text]]] = []
+    for line in inspect.getsource(module).splitlines():
         heading, row = _HEADING.fullmatch(line), _ROW.match(line)
         if heading:
-            title = heading[1][:1].upper() + heading[1][1:]
-            lines += ['', f'## {title}', '', '| code | text | what to do |', '|---|---|---|']
+            title = heading[1] if module is sentences else f'files: {heading[1]}'
+            sections.append((title[:1].upper() + title[1:], []))
         elif row and row[1] != sentences.uncoded.code:
-            text = sentences.CODES[row[1]]
-            lines.append(f'| `{text.code}` | {_cell(text)} | {_escaped(text.do)} |')
-    rows = [f'| `{text.code}` | {_cell(text)} |' for text in complaints.CODES.values()]
-    return '\n'.join([*lines, _FILES + '\n'.join(rows)]).replace('\n\n\n', '\n\n') + '\n'
+            sections[-1][1].append(module.CODES[row[1]])
+    return sections
+
+
+def _slug(title: str) -> str:
+    """Return what a heading is called in a link, as GitHub does."""
+    return re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
 
 
 def _cell(row: Text) -> str:

@@ -60,7 +60,7 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
                 return DirectSource(params_file, clock, nmt_start=nmt_start)
         except OSError as error:
             raise DriveCanError(sentences.file_unreadable(
-                file=error.filename or params_file, reason=error.strerror or str(error))) from error
+                error.filename or params_file, error.strerror or str(error))) from error
     from drive_can_bridge.client.bridge import BridgeSource
     from drive_can_bridge.client.local import local_way
     place = namespace if namespace is None else f'/{namespace.strip("/")}'.rstrip('/')

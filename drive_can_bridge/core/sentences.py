@@ -847,7 +847,7 @@ nameless_parameter = Text('a parameter has a name', do='give the parameter a nam
 no_such_type = Text(
     'type {number} does not exist',
     do='send one of the types of rcl_interfaces/msg/ParameterType')
-validate_names_lines = Text('drive_can validate {file} names the lines', do='run that command')
+command_names_lines = Text('{command} names the lines', do='run that command')
 active = Text('active: {drives:#drive} on {buses}', do='nothing')
 stop_frames_not_sent = Text(
     'bus {bus}: the stop frames could not all be sent: {reason}',

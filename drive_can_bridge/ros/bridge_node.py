@@ -412,7 +412,7 @@ class BridgeNode(LifecycleNode):
                 self._node_parameters.current, adapters=adapters,
                 namespace=self.get_namespace().rstrip('/'), setter=self._directory_that_sets)
         except ConfigurationError as error:
-            lines = [sentences.validate_names_lines(file=shlex.quote(file))
+            lines = [sentences.command_names_lines(f'drive_can validate {shlex.quote(file)}')
                      for file in filter(_is_wrong, self._files)][:1]
             raise ConfigurationError([*problems, *error.problems, *lines]) from None
         if problems:

@@ -3,6 +3,7 @@
 
 import json
 from pathlib import Path
+import re
 
 import pytest
 
@@ -19,9 +20,19 @@ def test_the_page_is_current() -> None:
 
 def test_the_page_has_every_code() -> None:
     text = explain.page()
-    missing = [code for code in {**sentences.CODES, **complaints.CODES}
-               if f'| `{code}` |' not in text]
+    missing = [code for prefix, module in (('', sentences), ('file-', complaints))
+               for code in module.CODES if f'<a id="{prefix}{code}"></a>`{code}` |' not in text]
     assert missing == ['uncoded'], 'which stands for the text of something else'
+    anchors = re.findall('<a id="(.*?)">', text)
+    assert len(anchors) == len(set(anchors)) == len(sentences.CODES) + len(complaints.CODES) - 1
+
+
+def test_the_contents_lead_to_headings() -> None:
+    text = explain.page()
+    slugs = [re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
+             for title in re.findall('^## (.*)$', text, re.MULTILINE)]
+    assert re.findall(r'^\* \[.*\]\(#(.*)\)$', text, re.MULTILINE) == slugs
+    assert slugs[0].startswith('diagnostics') and len(slugs) == len(set(slugs))
 
 
 def test_a_code_of_diagnostics(capsys: pytest.CaptureFixture[str]) -> None:
@@ -47,6 +58,37 @@ def test_one_with_several_forms(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.splitlines()[1:3] == [
         '  it says:    fault (<status>); only ~/enable starts the drive again',
         '  it says:    fault (<status>)']
+
+
+@pytest.mark.parametrize(('line', 'codes'), [
+    ('conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts', ['no_answer']),
+    ('lift: told to stop, but it does not answer: it may still be running',
+     ['stop_not_answered', 'may_still_be_running']),
+    ('drives missing: 12 of 15 drives online; not seen: a, b', ['drives_missing']),
+    ('a.yaml:9: drives.a.period: 0.001 s is too fast, allowed is at least 0.01 s unless '
+     'allow_fast_cycle is true', ['period_too_fast'])])
+def test_a_line_of_a_log(line: str, codes: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', '--json', line]) == 0
+    assert [json.loads(each)['code'] for each in capsys.readouterr().out.splitlines()] == codes
+
+
+def test_words_of_a_text(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', 'Still', 'braking']) == 0
+    assert capsys.readouterr().out.startswith('still_braking (of drives and buses)\n')
+    assert main(['explain', 'allowed is']) == 0
+    shown = capsys.readouterr()
+    assert shown.out.count('what to do') == 5 and 'more: give more words' in shown.err
+
+
+@pytest.mark.parametrize('about', list(explain.ABOUT))
+def test_each_text_leads_to_its_row(about: str) -> None:
+    """Whatever stands for what changes, and before it."""
+    for row in explain.ABOUT[about].CODES.values():
+        changing = re.compile(f'<({"|".join(row.fields)})>')
+        for form in explain.forms(row):
+            if sum(map(str.isalpha, changing.sub('', form))) >= 6:
+                line = f'lift: {changing.sub("3", form)}.'
+                assert (about, row) in explain.rows_of(line), line
 
 
 @pytest.mark.parametrize(('word', 'told'), [

@@ -190,7 +190,6 @@ LOOKS = {'endswith', 'find', 'index', 'partition', 'removeprefix', 'removesuffix
          'split', 'startswith'}
 #: modules that look into one all the same: what for
 OTHER_TEXTS = {
-    'cli/explain.py': 'what is explained',
     'cli/scan.py': 'a problem without its place',
     'cli/validate.py': 'a problem without its place',
     'configuration/problems.py': 'a problem with its place',
