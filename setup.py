@@ -89,6 +89,8 @@ setup(
         'panel': ['nicegui>=3,<4'],
         # pictures of drive_can decode --plot; rosdep brings it
         'plot': ['matplotlib'],
+        # captures of Wireshark in drive_can decode; rosdep brings it
+        'wireshark': ['scapy>=2.5'],
         'test': [
             # No rosdep keys for some of them: the tests run without them, only fewer, or slower.
             'argcomplete',
@@ -100,6 +102,7 @@ setup(
             'mypy',
             'pytest',
             'pytest-timeout',
+            'scapy>=2.5',
             'setuptools',
             'uc2canopen==0.2.3',
         ],

@@ -82,7 +82,7 @@ EXTERNAL: dict[str, set[str]] = {
     'profiles': {'canopen'},
     'transport': {'can', 'serial'},
     # its file formats; and only where a picture is drawn
-    'trace': {'can', 'matplotlib'},
+    'trace': {'can', 'matplotlib', 'scapy'},
     # yaml: only to tell which nodes a parameter file names when none of them is ours
     'ros': {*ROS_PACKAGES, 'yaml'},
     'ros.messages': ROS_PACKAGES,

@@ -33,9 +33,10 @@ ROSDEP_KEYS = {
     'pyserial': 'python3-serial',
     'argcomplete': 'python3-argcomplete',
     'matplotlib': 'python3-matplotlib',
+    'scapy': 'python3-scapy',
 }
 #: extras of which rosdep knows all, and those of which it knows nothing
-WITH_KEYS, WITHOUT_KEYS = ('completion', 'plot'), ('eds', 'panel')
+WITH_KEYS, WITHOUT_KEYS = ('completion', 'plot', 'wireshark'), ('eds', 'panel')
 
 
 @pytest.fixture

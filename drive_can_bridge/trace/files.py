@@ -40,6 +40,7 @@ from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.trace.blf import read_blf
+from drive_can_bridge.trace.captures import BEGINNINGS, read_capture
 from drive_can_bridge.trace.peak import PeakLines
 from drive_can_bridge.trace.vector import of_vector
 from drive_can_bridge.transport.tap import message_of, record_of
@@ -247,7 +248,7 @@ _TEXT_READERS: dict[str, Any] = {
     '.asc': can.ASCReader, '.csv': can.CSVReader, '.trc': can.TRCReader}
 #: by which number the tools of a format call what python-can calls 0; else they agree
 _FIRST = {'.asc': 1}
-_BINARY_READERS = ('.blf', '.db', '.mf4')
+_BINARY_READERS = ('.blf', '.db', '.mf4', '.pcap', '.pcapng')
 _WRITERS: dict[str, Callable[[Path], Any]] = {
     '.asc': lambda path: can.ASCWriter(open_text(path)),
     '.blf': lambda path: can.BLFWriter(open_binary(path)),
@@ -289,7 +290,16 @@ _HEADS = {
     '.blf': _Head(re.compile(b'LOGG'), 'this is no .blf trace of Vector'),
     '.db': _Head(re.compile(b'SQLite format 3'), 'this is no .db trace of python-can'),
     '.mf4': _Head(re.compile(b'MDF '), 'this is no .mf4 trace (ASAM MDF 4)'),
+    '.pcap': _Head(re.compile(BEGINNINGS), 'this is no capture of Wireshark'),
+    '.pcapng': _Head(re.compile(BEGINNINGS), 'this is no capture of Wireshark'),
 }
+#: first lines of texts that have a suffix of ours, and what makes a trace of them that is read
+_STRANGERS = (
+    (re.compile(r'\W*\*{3}BUSMASTER'), 'this is a .log of BUSMASTER, which editcap (of Wireshark) '
+     'turns into a .pcapng: editcap FILE.log FILE.pcapng'),
+    (re.compile(r'Time Stamp,ID,Extended,'), 'this is a .csv of SavvyCAN (GVRET), which SavvyCAN '
+     'saves as a .log of candump'),
+)
 #: kinds of entries that are passed over and named
 _PASSED_MAX = 6
 #: lines before the first frame that are kept, to go on reading behind a damaged line
@@ -326,19 +336,22 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
         return
     with _open_text(path, packed) as stream:
         try:
-            if suffix in _CANDUMP:
-                yield from _candump_records(stream, complain)
+            begin = list(itertools.islice(stream, 1))
+            while begin and not begin[-1].strip() and len(begin) < _HEADER_MAX:
+                begin += itertools.islice(stream, 1)
+            if not begin or not begin[-1].strip():
+                return
+            stranger = next((told for pattern, told in _STRANGERS if pattern.match(begin[-1])), '')
+            head = _HEADS.get(suffix)
+            lines = itertools.chain(begin, stream)
+            if stranger:
+                complain(stranger)
+            elif head is None:
+                yield from _candump_records(lines, complain)
+            elif head.pattern.match(begin[-1].encode()):
+                yield from _text_records(suffix, lines, complain)
             else:
-                head = _HEADS[suffix]
-                begin = list(itertools.islice(stream, 1))
-                while begin and not begin[-1].strip() and len(begin) < _HEADER_MAX:
-                    begin += itertools.islice(stream, 1)
-                if not begin or not begin[-1].strip():
-                    return
-                if not head.pattern.match(begin[-1].encode()):
-                    complain(head.otherwise)
-                    return
-                yield from _text_records(suffix, itertools.chain(begin, stream), complain)
+                complain(head.otherwise)
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
             complain(f'the rest cannot be unpacked: {error}')
 
@@ -376,7 +389,7 @@ def _open_text(path: Path, packed: bool) -> TextIO:
     return path.open(encoding='utf-8-sig', errors='replace')
 
 
-def _candump_records(stream: TextIO, complain: Complain) -> Iterator[Record]:
+def _candump_records(stream: Iterable[str], complain: Complain) -> Iterator[Record]:
     parse = parse_line
     number = 0
     record: Record | None = None
@@ -512,14 +525,25 @@ def _tell_passed(passed: Counter[str], complain: Complain) -> None:
 def _blf_records(path: Path, complain: Complain) -> Iterator[Record]:
     passed: Counter[str] = Counter()
     with path.open('rb') as file:
-        for number, record in enumerate(read_blf(file, complain, passed), 1):
-            try:
-                record = checked(record)
-            except ValueError as error:
-                complain(f'entry {number}: {error}')
-            else:
-                yield record
+        yield from _possible(read_blf(file, complain, passed), complain)
     _tell_passed(passed, complain)
+
+
+def _capture_records(path: Path, complain: Complain) -> Iterator[Record]:
+    passed: Counter[str] = Counter()
+    yield from _possible(read_capture(path, complain, passed), complain)
+    _tell_passed(passed, complain)
+
+
+def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]:
+    """Yield the entries that are possible; tell of the others."""
+    for number, record in enumerate(records, 1):
+        try:
+            record = checked(record)
+        except ValueError as error:
+            complain(f'entry {number}: {error}')
+        else:
+            yield record
 
 
 def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
@@ -612,7 +636,8 @@ def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
 
 
 _BINARY_RECORDS: dict[str, Callable[[Path, Complain], Iterator[Record]]] = {
-    '.blf': _blf_records, '.db': _database_records, '.mf4': _measured_records}
+    '.blf': _blf_records, '.db': _database_records, '.mf4': _measured_records,
+    '.pcap': _capture_records, '.pcapng': _capture_records}
 
 
 def _kind_by_length(data: bytes) -> RecordKind:

@@ -358,13 +358,13 @@ def test_what_is_to_be_sent_is_no_frame_yet(tmp_path: Path) -> None:
     ('a.trc', 'Time;ID;Data\n0.5;1F3;05\n', 'of PEAK: its first line is neither a comment'),
     ('a.trc', '\n\nsome text\n', 'of PEAK: its first line is neither a comment'),
     ('a.asc', '<xml/>\n', 'of Vector: it begins with neither "date" nor "base"'),
-    ('a.csv', 'Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n166064000,0000021A,false,Rx,0,1,FE,\n',
+    ('a.csv', '"Time";"Identifier (hex)";"Format";"Data (hex)"\n"00:00:01";"7F1";"Std";"05 "\n',
      'of python-can: its first line is not "timestamp,arbitration_id,…"'),
     ('a.blf', 'a text', 'of Vector'), ('a.db', 'a text', 'of python-can'),
     ('a.mf4', 'a text', '(ASAM MDF 4)')])
 def test_a_file_of_another_kind_is_refused_in_words(
         name: str, content: str, told: str, tmp_path: Path) -> None:
-    """One of them is SavvyCAN's (GVRET .csv)."""
+    """One of them is IXXAT's."""
     (tmp_path / name).write_text(content)
     complaints: list[str] = []
     assert list(read_records(tmp_path / name, complaints.append)) == []
