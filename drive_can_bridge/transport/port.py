@@ -10,9 +10,7 @@ Whatever python-can's adapters throw becomes one of two errors here:
 from collections.abc import Callable, Sequence
 import inspect
 from pathlib import Path
-import select
 import socket
-import struct
 from typing import Any
 
 import can
@@ -39,6 +37,7 @@ from drive_can_bridge.transport.failures import (
 )
 from drive_can_bridge.transport.foreign_clock import ForeignClock
 from drive_can_bridge.transport.gateway import Gateway
+from drive_can_bridge.transport.raw_socket import ERROR, EXTENDED, NO_DATA, RawSocket
 from drive_can_bridge.transport.serial_writer import Below, watched
 
 # The kernel's time stamp of a frame is believed if it is that much older than now at most, or if
@@ -103,6 +102,9 @@ class Port(EndPoint):
         self._writer = None if self._below is None else self._below.writer
         self._answers = None if self._below is None else self._below.answers
         self._socket = RawSocket.below(bus)
+        # where the kernel filters as well: SocketCAN's frames need no message of python-can
+        self._direct = self._socket if (
+            host_stamps and getattr(bus, '_is_filtered', False)) else None
         # it waits by select(); other adapters poll, or set time-outs of a serial port
         self.punctual = isinstance(getattr(bus, 'socket', None), socket.socket)
         self._lost = False
@@ -114,6 +116,8 @@ class Port(EndPoint):
 
     def receive(self, timeout: float) -> Frame | None:
         """Wait for a frame. See the base class."""
+        if self._direct is not None and self.witness is None:
+            return self._receive_directly(self._direct, timeout)
         began = self._now()
         try:
             message, filtered = self._receive(timeout)
@@ -140,7 +144,7 @@ class Port(EndPoint):
         if self.witness is not None:
             self.witness(message)
         if message.is_error_frame:
-            self._error_frame(message)
+            self._error_frame(message.arbitration_id, bytes(message.data))
             return None
         if self._marks_own and not message.is_rx:
             return None
@@ -152,13 +156,39 @@ class Port(EndPoint):
             return None
         data = bytes(message.data)
         highest = EXTENDED_IDENTIFIER_MAX if message.is_extended_id else STANDARD_IDENTIFIER_MAX
-        if (len(data) != message.dlc or len(data) > _LENGTH_MAX
+        # the kernel tells of the nine ways to say eight (ISO 11898-1); elsewhere a digit is wrong
+        length = min(message.dlc, _LENGTH_MAX) if self.host_stamps else message.dlc
+        if (len(data) != length or len(data) > _LENGTH_MAX
                 or not 0 <= message.arbitration_id <= highest):
             self._malformed()
             return None
         self._malformed_in_row = 0
         frame = Frame(message.arbitration_id, data, message.is_extended_id)
         return frame if self._echo is None or self._is_new(self._echo, frame) else None
+
+    def _receive_directly(self, raw: RawSocket, timeout: float) -> Frame | None:
+        """Wait for a frame of SocketCAN; what becomes of it is as above."""
+        try:
+            received = raw.receive(timeout)
+        except (OSError, ValueError) as error:      # ValueError: somebody has closed it
+            self._lost = True
+            raise BusUnavailable(f'receive: {in_words(error)}') from error
+        now = self._now()
+        if received is None:
+            self._earliest = now
+            return None
+        identifier, data, stamp = received
+        self.age = self._believed(1e-9 * (self._stamp() - stamp), now)
+        self._earliest = now - self.age     # they come in order
+        if identifier & NO_DATA:
+            if identifier & ERROR:
+                self._error_frame(identifier & EXTENDED_IDENTIFIER_MAX, data)
+            else:
+                self.rejected_frames += 1
+            return None
+        extended = identifier >= EXTENDED
+        return Frame(identifier & (EXTENDED_IDENTIFIER_MAX if extended else
+                                   STANDARD_IDENTIFIER_MAX), data, extended)
 
     def _is_new(self, echo: Echo, frame: Frame) -> bool:
         """Look whether a frame is not one of ours that came back."""
@@ -174,7 +204,10 @@ class Port(EndPoint):
     def _age_of(self, stamp: float, now: float) -> float:
         if self._foreign is not None:
             return self._foreign.age(stamp, now, waited=self._earliest > self._taken_at)
-        age = 1e-9 * self._stamp() - stamp
+        return self._believed(1e-9 * self._stamp() - stamp, now)
+
+    def _believed(self, age: float, now: float) -> float:
+        """Return the age that the kernel's stamp makes; 0 where a clock was set."""
         return age if 0.0 < age < max(_STAMP_AGE_MAX, now - self._earliest) else 0.0
 
     def _returned_early(self, now: float) -> None:
@@ -217,6 +250,9 @@ class Port(EndPoint):
 
     def send(self, frame: Frame, timeout: float) -> None:
         """Hand a frame to the adapter. See the base class."""
+        if self._direct is not None:
+            self._send_directly(self._direct, frame, timeout)
+            return
         message = can.Message(arbitration_id=frame.identifier, data=frame.data,
                               is_extended_id=frame.extended)
         if self._echo is not None:
@@ -249,6 +285,17 @@ class Port(EndPoint):
                 raise TransportError('send: transmit queue full') from error
             self._lost = True
             raise BusUnavailable(f'send: {with_cause(error)}') from error
+
+    def _send_directly(self, raw: RawSocket, frame: Frame, timeout: float) -> None:
+        try:
+            sent = raw.send(frame, timeout)
+        except (OSError, ValueError) as error:
+            if not is_full_queue(error):
+                self._lost = True
+                raise BusUnavailable(f'send: {in_words(error)}') from error
+            sent = False
+        if not sent:
+            raise TransportError('send: transmit queue full')
 
     def shorten_queue(self, frames: int) -> None:
         """Let about so many frames wait in the kernel at most, where that can be set."""
@@ -314,14 +361,14 @@ class Port(EndPoint):
         if isinstance(line, bytearray):
             line.clear()
 
-    def _error_frame(self, message: can.Message) -> None:
+    def _error_frame(self, classes: int, data: bytes) -> None:
         self.error_frames += 1
         if self.error_witness is not None:
-            self.error_witness(message.arbitration_id, bytes(message.data))
+            self.error_witness(classes, data)
         if not self._kernel_errors:
             self.last_error = BusError('error frame', None, ADVICE_DISTURBED)
             return
-        error = decode_error_frame(message.arbitration_id, bytes(message.data))
+        error = decode_error_frame(classes, data)
         if error.advice:
             self.last_error = error
         if error.state is not None:
@@ -456,60 +503,3 @@ def _takes(adapter: type, keyword: str) -> bool:
     parameters = inspect.signature(adapter.__init__).parameters  # type: ignore[misc]
     return keyword in parameters or any(
         parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
-
-
-# linux/socket.h; Python has no name for it
-_SO_MEMINFO = 55
-# linux/sock_diag.h: nine counters, the last of which is SK_MEMINFO_DROPS
-_MEMORY = struct.Struct('9I')
-_DROPS = 8
-#: bytes that the kernel charges for one waiting frame (768 up to Linux 6.2, 960 since)
-FRAME_CHARGE = 960
-
-
-class RawSocket:
-    """
-    The socket below python-can's SocketCAN: how long its queues are, and what they have lost.
-
-    A frame that was sent waits in the kernel until the controller has brought it to the bus, and
-    stays there while no other node acknowledges it: nobody can take it back. So the queue is kept
-    as short as the kernel lets it be, and a frame for which there is no room is not sent at all.
-    """
-
-    def __init__(self, raw: socket.socket) -> None:
-        self._socket = raw
-        self._readable_memory = True
-
-    @classmethod
-    def below(cls, bus: can.BusABC) -> 'RawSocket | None':
-        """Return the socket of a bus; None: there is none of this kind below it."""
-        raw: Any = getattr(bus, 'socket', None)
-        family = getattr(socket, 'AF_CAN', None)
-        if family is None or not isinstance(raw, socket.socket) or raw.family != family:
-            return None
-        return cls(raw)
-
-    def shorten_queue(self, frames: int) -> None:
-        """
-        Let the socket count as full when about so many frames wait.
-
-        The kernel keeps at least 4.5 kB, half of which fills it: three frames.
-        """
-        # it doubles the number, and a socket is writable while less than half of that waits
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, frames * FRAME_CHARGE)
-
-    def has_room(self, timeout: float) -> bool:
-        """Wait until a frame could be sent; False after ``timeout`` s."""
-        return bool(select.select([], [self._socket], [], timeout)[1])
-
-    @property
-    def overflowed_frames(self) -> int:
-        """Frames that found the receive queue full; 0 where the kernel does not tell (< 4.12)."""
-        if not self._readable_memory:
-            return 0
-        try:
-            memory = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY.size)
-        except OSError:
-            self._readable_memory = False
-            return 0
-        return int(_MEMORY.unpack(memory)[_DROPS]) if len(memory) == _MEMORY.size else 0
