@@ -11,8 +11,8 @@ import pytest
 from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.canopen.pdos import Checks
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
 
 STANDS = BEGINNING / 10_000
