@@ -308,7 +308,7 @@ def _objects(text: str) -> frozenset[tuple[int, int | None]]:
         match = _OBJECT.fullmatch(part.strip())
         if match is None:
             raise ValueRefused(f"'{part.strip()}' is no object; write 6007h or 1800h.05h")
-        index, subindex = int(match[1], 16), match[2] and int(match[2], 16)
+        index, subindex = int(match[1], 16), int(match[2], 16) if match[2] else None
         if index in (CONTROL_WORD, STATUS_WORD):
             raise ValueRefused(f'{index:04X}h: without it there is no drive')
         found.add((index, subindex))

@@ -205,10 +205,14 @@ class Cia402Session(Session):
         self._limits.stop()
         self._stop.forget()
         self._course.stop()
-        if self._rules.may_run and self.stage is not Stage.IDLE and not self.exchange.cycling:
+        found = self._bring_up.moving
+        if self.stage is not Stage.IDLE and not self.exchange.cycling and (
+                self._rules.may_run or found is State.OPERATION_ENABLED):
             # it has acknowledged its stop by SDO, and nobody has seen it disabled since
             for happened in Happened.RUN_LEFT, Happened.STOP_LEFT, Happened.SILENT:
                 self.duty.channel(CYCLE, happened)
+        elif self.stage is not Stage.IDLE and found is not None:
+            self.report.warn(sentences.still_in_state(found.value), may_run=True)
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
             self.exchange.cycling or owes or self._bring_up.watch.slot is not None)
