@@ -245,8 +245,9 @@ def test_a_servo_as_configured() -> None:
 
 @pytest.mark.parametrize(('axes', 'told'), [
     ({}, []),
-    ({0x6841: 0x0250}, ['there are 2 axes behind this node (6841h is 0250h): the bridge drives the '
-                        'first (6040h), and leaves the others alone']),
+    ({0x6841: 0x0250}, [
+        'there are 2 axes behind this node (6841h is 0250h): the bridge drives the first (6040h), '
+        'and leaves the others alone']),
     ({0x6841: 0x0250, 0x7041: 0x1237, 0x8041: 0x0250}, [
         'there are 3 axes behind this node (6841h is 0250h, 7041h is 1237h): the bridge drives '
         'the first (6040h), and leaves the others alone'])])
