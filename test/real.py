@@ -7,10 +7,12 @@ what DDS does, signals, buses of the kernel, threads that wait for a time of thi
 Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
 say so; otherwise the test has the mark ``real``. They run one after the other: in ``make test``
 those of :data:`CHOSEN`, each executable and each fact about the machine once; in ``.ci/run`` the
-others, too, which have the mark ``ci``. As a program it prints the files of all.
+others, too, which have the mark ``ci``. As a program it prints the files of all; with the
+word ``executables`` the stories of those.
 """
 
 from pathlib import Path
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -24,9 +26,8 @@ FIXTURES = {
     'test/security/': {'run'},
 }
 
-#: what make test runs -> what it shows
-CHOSEN = {
-    # executables
+#: what make test runs of executables -> what it shows
+EXECUTABLES = {
     'test/system/test_system_families.py::test_run_write_and_stop[datamodel_extended]':
         'bridge, simulator and a client over DDS: it runs, is written to, and is stopped',
     'test/demo/test_demo_command.py::test_it_prints_a_line_per_drive_and_stops_them_neutral':
@@ -45,7 +46,10 @@ CHOSEN = {
         'a trajectory of ros2_control',
     'test/system/test_system_parameters.py::test_as_a_user_starts_them':
         'drive_can read and write, directly and through a bridge',
-    # the machine
+}
+
+#: what make test runs of the machine -> what it shows
+MACHINE = {
     'test/system/test_system_signals.py::test_while_active':
         'signals end a bridge in order',
     'test/system/test_system_signals.py::test_process_that_stood_still':
@@ -63,6 +67,7 @@ CHOSEN = {
     'test/simulation/test_simulated_slcan.py::test_client_in_another_process':
         'python-can in another process at a pseudo-terminal',
 }
+CHOSEN = {**EXECUTABLES, **MACHINE}
 
 
 def mark(item: 'pytest.Item') -> None:
@@ -90,4 +95,4 @@ def files(everything: bool) -> list[str]:
 
 
 if __name__ == '__main__':
-    print(*files(everything=True), sep='\n')
+    print(*(EXECUTABLES if 'executables' in sys.argv else files(everything=True)), sep='\n')

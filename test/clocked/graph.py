@@ -724,6 +724,13 @@ class Timer(Destroyable):
         """Note that it was served."""
         self.next_call += 1e-9 * self._period
 
+    def call_timer_with_info(self) -> dict[str, int]:
+        """Do that; return when it was due, and when it is, which versions of rclpy ask since 9."""
+        due = round(1e9 * self.next_call)
+        self.call_timer()
+        return {'expected_call_time': due,
+                'actual_call_time': round(1e9 * self.graph.clock.now())}
+
     def get_timer_period(self) -> int:
         """Return the period in ns."""
         return self._period

@@ -453,6 +453,14 @@ class Managed(LifecycleNode):
     on_error = on_activate = on_configure
 
 
+def can_configure(node: Managed) -> bool:
+    """Try it; some versions of rclpy raise where that is illegal, others have a return code."""
+    try:
+        return bool(node.trigger_configure() is not TransitionCallbackReturn.ERROR)
+    except RCLError:
+        return False
+
+
 def test_lifecycle(place: Place) -> None:
     node = place.node('managed', Managed)
     events: list[TransitionEvent] = []
@@ -489,8 +497,7 @@ def test_lifecycle(place: Place) -> None:
     found = place.ask(GetAvailableStates, '/managed/get_available_states')
     assert [(each.id, each.label) for each in found.available_states][-2:] == [
         (14, 'deactivating'), (15, 'errorprocessing')]
-    with pytest.raises(RCLError):
-        node.trigger_configure()            # not from here either
+    assert not can_configure(node)          # not from here either
     assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
     assert state() == (4, 'finalized')
 
@@ -545,8 +552,10 @@ def test_after_the_context_has_gone(place: Place) -> None:
                 lambda: node.create_publisher(Float64, 'other', 10),
                 lambda: node.create_service(Trigger, 'stop', print), client.service_is_ready,
                 node.get_node_names, lambda: node.count_publishers('speed')):
-        with pytest.raises(RCLError):
+        with pytest.raises((RCLError, InvalidHandle)):
             use()
+    if client not in node.clients:  # some versions of rclpy destroy nodes with their context
+        return
     assert not client.call_async(Trigger.Request()).done()
     assert client.handle.take_response(Trigger.Response) == (None, None)
     assert node.resolve_topic_name('speed') == '/speed'

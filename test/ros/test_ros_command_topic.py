@@ -146,6 +146,29 @@ def test_age(skew: int) -> None:
     assert came(5000) == (1, [])
 
 
+def test_stamped_when_it_is_taken() -> None:
+    """As rmw_cyclonedds 2.2.2 does it: what waits counts as come at the last look."""
+    taken = Taken(Float64)
+    # padded to four bytes: two octets of options say by how much (OMG DDS-XTypes 1.3, 7.6.3.1.2)
+    data = bytes.fromhex('000100000000000000002440')
+    start = 20_000_000 * MS
+
+    def comes(at: int, published: int) -> tuple[int, list[float]]:
+        taken.used.clear()
+        taken.late.clear()
+        taken.subscription.put(data, start + published * MS, start + at * MS + 1000)
+        taken.take(start + at * MS)
+        return len(taken.used), taken.late
+    assert comes(0, -2) == (1, [])
+    for at in range(20, 2000, 20):      # looked at every 20 ms, published 2 ms before
+        assert comes(at, at - 2) == (1, [])
+    # it waited here for 0.4 s, in which nobody looked: nothing is known against it
+    assert comes(2400, 2020) == (1, [])
+    # it was on its way as long: the look before would have found it
+    assert comes(2420, 2021) == (0, [pytest.approx(0.377, abs=0.001)])
+    assert comes(2440, 2438) == (1, [])
+
+
 def test_of_two_commanders_the_one_whose_clock_is_behind_can_only_stop() -> None:
     taken = Taken(Float64)
     taken.subscription.publishers = 2

@@ -13,6 +13,7 @@ from drive_can_bridge.core.sentences import profiles_not_read, profiles_not_ther
 from drive_can_bridge.process.fast_dds import Middleware, RELEASES, running
 from drive_can_bridge.resources import config_file
 from drive_can_bridge.ros.main import set_up_fast_dds
+from drive_can_bridge.ros.middleware import Audience
 
 VARIABLES = [release.variable for release in RELEASES.values()]
 #: prints how many bytes services take of the allocator; what is resident says less: memory that
@@ -79,6 +80,32 @@ def test_clients_need_no_home(home: dict[str, str]) -> None:
     run = subprocess.run([sys.executable, '-c', CLIENT], capture_output=True, text=True,
                          check=False, env={**environment, **home})
     assert (run.returncode, run.stderr) == (0, '')
+
+
+class _Publisher:
+    """Counts who subscribes as a middleware does, and how often it was asked."""
+
+    def __init__(self) -> None:
+        self.subscribers, self.asked = 0, 0
+
+    def get_subscription_count(self) -> int:
+        self.asked += 1
+        return self.subscribers
+
+
+@pytest.mark.parametrize('remembered', [10.0, 20.0], ids=['Cyclone DDS', 'Fast DDS'])
+def test_who_was_killed_counts_until_the_middleware_says_otherwise(remembered: float) -> None:
+    """Seen with rmw_cyclonedds 2.2.2 and rmw_fastrtps 8.4.3: that many s after a SIGKILL."""
+    publisher = _Publisher()
+    audience = Audience(publisher)  # type: ignore[arg-type]
+    assert not audience.listens(0.0)
+    publisher.subscribers = 1
+    assert not audience.listens(0.05)           # looked up every 0.1 s
+    cycles = round(remembered / 0.005)
+    assert all(audience.listens(0.1 + 0.005 * cycle) for cycle in range(cycles))
+    publisher.subscribers = 0
+    assert not audience.listens(0.2 + remembered)
+    assert publisher.asked <= 10.0 * remembered + 4
 
 
 def test_profiles_of_somebody_else_are_left_alone(middleware: Middleware) -> None:
