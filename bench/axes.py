@@ -18,8 +18,8 @@ UPLOAD, UPLOADED, DOWNLOADED = 0x40, 0x43, 0x60
 STATES = {0x06: 0x0231, 0x07: 0x0233, 0x0F: 0x1237}
 #: of an axis that has just got power
 READY = 0x0250
-#: 6041h, and 6502h with all modes
-OBJECTS = {0x6041: READY, 0x6502: 0x3FF}
+#: 6041h, 6061h in csp, and 6502h with all modes
+OBJECTS = {0x6041: READY, 0x6061: 8, 0x6502: 0x3FF}
 
 
 class Axes(Drives):
@@ -40,7 +40,12 @@ class Axes(Drives):
         if kind == RPDO:
             self._told[station] = struct.unpack_from('<Hi', data)
             self._round.append(station)
-            self.asked(station)
+            now = self.asked(station)
+            if self._told[station][0] & 0xF == 0xF:
+                self._enabled.add(station)
+            elif station in self._enabled:
+                self._enabled.discard(station)
+                self._stops.append(now)
         elif kind == SDO_REQUEST:
             command, index, subindex = struct.unpack_from('<BHB', data)
             value = OBJECTS.get(index, 0) if command == UPLOAD else 0

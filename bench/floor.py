@@ -23,7 +23,7 @@ from std_msgs.msg import Float64
 from topics import DOUBLES, INTEGERS, TYPES
 from unix_bus import INTERFACE, register
 
-from drive_can_bridge.ros.middleware import set_up_fast_dds
+from drive_can_bridge.ros.main import set_up_fast_dds
 from drive_can_bridge.ros.prepared import PreparedMessage
 
 CYCLIC = 0x001FFFF0

@@ -15,7 +15,7 @@ import sys
 
 from child import HERE
 
-from drive_can_bridge.ros.middleware import set_up_fast_dds
+from drive_can_bridge.ros.main import set_up_fast_dds
 
 _LIBRARIES = ('rcl', 'rcutils', 'rosidl_runtime_c', *(
     f'{package}__rosidl_{part}' for package in ('rcl_interfaces', 'std_msgs')

@@ -107,6 +107,23 @@ def diy_figures(found: dict[str, Any]) -> list[Figure]:
     ]
 
 
+def gateway_figures(found: dict[str, Any]) -> list[Figure]:
+    """Judge an axis behind a gateway on the loopback."""
+    shares = {name: found[name]['missed'] / max(1, found[name]['exchanges'])
+              for name in ('tuned', 'not tuned')}
+    return [
+        Figure('exchanges missed behind a gateway, one axis every 20 ms',
+               f'{100 * shares["tuned"]:.1f} %', f'without tcp_tune '
+               f'{100 * shares["not tuned"]:.1f} %', 100 * shares['tuned'], 3.0),
+        Figure('the same, `tcp_tune: false`', f'{100 * shares["not tuned"]:.1f} %', '',
+               100 * shares['not tuned'], 30.0, at_least=True),
+        Figure('call of a stop to its frame behind the gateway, worst',
+               f'{1e3 * max(found["stops"], default=math.inf):.1f} ms of {len(found["stops"])} '
+               f'(median {1e3 * median(found["stops"]):.1f}; {len(found["failures"])} failed)',
+               '', 1e3 * max(found['stops'], default=math.inf), 50.0),
+    ]
+
+
 def sweep_figures(found: dict[int, Any]) -> list[Figure]:
     """Against the node of an ordinary user, by the number of drives."""
     return [Figure(f'{name.split(",")[0]}, {number} drives', *rest)
@@ -323,7 +340,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'ordinary': lambda found: exchange_figures(found, 'all of it at ordinary priority', 1.5),
     'axes': axes_figures, 'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
-    'flood': flood_figures, 'stop': stop_figures, 'hand': hand_figures, 'monitor': monitor_figures,
+    'flood': flood_figures, 'stop': stop_figures, 'gateway': gateway_figures,
+    'hand': hand_figures, 'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
     'drives': drives_figures, 'decode': decode_figures,
     'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,

@@ -73,6 +73,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False, commands=20.0), duration),
         'stop': lambda: scenarios.stop(
             Load(8, 0.01, subscribed=False, control=True, stuck=True), pace.stops, 10000.0, 64),
+        'gateway': lambda: scenarios.gateway(
+            Load(1, 0.02, subscribed=False, servo=True), duration, pace.rounds),
         # a stop without a name would reach every bridge of this machine
         'hand': lambda: own_network.run(lambda: scenarios.by_hand(
             Load(8, 0.01, subscribed=False, control=True), pace.commands)),

@@ -57,6 +57,7 @@ class Load:
     :param buses: among which the drives are shared out.
     :param settings: parameters of each drive that a backup has, none beside another.
     :param servo: the drives are axes of CiA 402 in csp.
+    :param tuned: behind a gateway, with or without ``tcp_tune``; None: on a bus of their own.
     :param joints: Hz of the message with all joints; 0: there is none; None: drives have no joint.
     """
 
@@ -71,6 +72,7 @@ class Load:
     buses: int = 1
     settings: int = 0
     servo: bool = False
+    tuned: bool | None = None
     joints: float | None = None
 
     @property
@@ -91,18 +93,20 @@ class Bus:
         self._load = load
         self.buses = [f'bus{number}' for number in range(load.buses)]
         self.channel = self._folder / self.buses[0]
-        self.file = self.file_of(self.buses, 'drive_can_bridge')
         self.drives = [stack.enter_context(child(
             'axes.py' if load.servo else 'drives.py', self._folder / bus, *pace))
                        for bus in self.buses]
+        #: where the gateway of each bus listens
+        self.ports = {} if load.tuned is None else {bus: stack.enter_context(child(
+            'gateway.py', self._folder / bus)).ready for bus in self.buses}
+        self.file = self.file_of(self.buses, 'drive_can_bridge')
 
     def file_of(self, buses: Sequence[str], name: str) -> Path:
         """Write a parameter file for these buses and a bridge of this name."""
         load = self._load
         lines = [f'/**/{name}:', '  ros__parameters:', '    buses:']
         for bus in buses:
-            lines += [f'      {bus}:', f'        interface: {INTERFACE}',
-                      f'        channel: {self._folder / bus}', '        bitrate: 1000000',
+            lines += [f'      {bus}:', *self._place(bus), '        bitrate: 1000000',
                       f'        trace_seconds: {load.trace}',
                       f'        trace_directory: {self._folder}']
         lines += [f'    joint_state_rate: {load.joints or 0.0}', '    drives:']
@@ -137,6 +141,14 @@ class Bus:
         file = self._folder / f'{name}.yaml'
         file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
         return file
+
+    def _place(self, bus: str) -> tuple[str, ...]:
+        """Return where a bus is: its keys."""
+        if bus not in self.ports:
+            return (f'        interface: {INTERFACE}', f'        channel: {self._folder / bus}')
+        return ('        interface: socketcand', '        channel: can0',
+                '        host: 127.0.0.1', f'        port: {self.ports[bus]}',
+                f'        tcp_tune: {str(self._load.tuned).lower()}')
 
     def files_each(self) -> list[tuple[object, ...]]:
         """Return the arguments of a bridge for each bus, as ``bridge_per_bus.launch.py`` does."""
@@ -443,6 +455,29 @@ def stop(load: Load, calls: int, commands: float, under_way: int) -> dict[str, A
                                       default=float('inf')) for called in answer['called']],
                     'failures': answer['failures'], 'sleeper': sleeper.ask('errors')}
             found['calls'] = caller.ask('calm')
+    return found
+
+
+def gateway(load: Load, duration: float, calls: int) -> dict[str, Any]:
+    """Measure an axis behind a gateway, with and without ``tcp_tune``, and its stops with it."""
+    found: dict[str, Any] = {}
+    for name, tuned in (('tuned', True), ('not tuned', False)):
+        with ExitStack() as stack:
+            each = replace(load, tuned=tuned)
+            bus = Bus(stack, each)
+            with bridge_under(each, bus) as bridge:
+                time.sleep(duration)
+                result = bridge.result()
+                found[name] = {key: result[key] for key in (
+                    'exchanges', 'missed', 'period_errors')}
+                if tuned:
+                    with child('stopper.py') as stopper:
+                        bus.drives[0].ask('clear')
+                        answer = stopper.ask(f'stop {calls}')
+                        stops = bus.drives[0].ask('stops')
+                    found['stops'] = [min((at - called for at in stops if at > called),
+                                          default=math.inf) for called in answer['called']]
+                    found['failures'] = answer['failures']
     return found
 
 

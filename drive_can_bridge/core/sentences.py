@@ -20,6 +20,10 @@ class Absence(Enum):
     ANSWERS = 'something: power and cable are in order'
 
 
+def _milliseconds(late: float) -> str:
+    return f'{1e3 * late:.{int(1e3 * late < 1.0)}f}'
+
+
 def _by_name(raws: Mapping[str, int | None]) -> str:
     return ', '.join(f'{name} {"unknown" if raw is None else f"{raw:04X}h"}'
                      for name, raw in raws.items())
@@ -715,6 +719,12 @@ frames_overflowed = Text(
 frames_not_sent = Text(
     '{frames} frames not sent: {why}',
     do='look at cable, termination and bit rate')
+adapter_keeps = Text(
+    '{adapter} keeps what it has received for up to {latency} ms, and the shortest period is '
+    '{period} ms: {remedy}',
+    latency=lambda seconds: f'{1e3 * seconds:g}',
+    period=lambda seconds: f'{1e3 * seconds:g}',
+    do='run that command, for good by a udev rule (docs/adapters.md), or choose longer periods')
 bus_load_high = Text(
     'bus load {percent:.0f} %: raise the period of some drives or the bit rate',
     do='raise the period of some drives or the bit rate')
@@ -787,8 +797,23 @@ frames_rejected = Text(
     do='check for a second station with the same number')
 answer_late = Text(
     'answer {seconds} ms after its period: the computer or the drive is too slow',
-    seconds=lambda late: f'{1e3 * late:.{int(1e3 * late < 1.0)}f}',
+    seconds=_milliseconds,
     do='choose a longer period, or see what else the computer does')
+answers_late = Text(
+    'answer {seconds} ms after its period, and so are those of all drives of bus {bus}: what they '
+    'have in common is too slow, the adapter ({adapter}) or the computer',
+    seconds=_milliseconds,
+    do='see what docs/adapters.md says of the adapter, and what else the computer does; or choose '
+       'a longer period')
+answer_kept = Text(
+    'answer {seconds} ms after its period: the adapter ({adapter}) keeps what it has received for '
+    'up to {latency} ms: {remedy}',
+    'answer {seconds} ms after its period: the adapter ({adapter}) keeps what it has received for '
+    'up to {latency} ms: choose a longer period',
+    fields='seconds adapter latency remedy',
+    seconds=_milliseconds,
+    latency=lambda seconds: f'{1e3 * seconds:g}',
+    do='run that command, for good by a udev rule (docs/adapters.md), or choose a longer period')
 
 # -- a setpoint held by hand (drive_can jog) ------------------------------------------------------
 

@@ -18,6 +18,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
+from drive_can_bridge.core.lateness import Answers, Lateness
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
@@ -31,6 +32,7 @@ from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import with_outlook
+from drive_can_bridge.transport.known_adapters import traits_of
 
 #: s after the activation that a drive may take to be seen
 GRACE = 5.0
@@ -123,10 +125,15 @@ class Report:
 
 
 class BusReporter:
-    """Reports on one bus; remembers the counts of the last report."""
+    """
+    Reports on one bus; remembers the counts of the last report.
 
-    def __init__(self, exchange: BusExchange) -> None:
+    :param period: s, the shortest of its drives.
+    """
+
+    def __init__(self, exchange: BusExchange, period: float = math.inf) -> None:
         self._exchange = exchange
+        self._period = period
         self._bits = self._failures = 0
         self._counts = Counts()
         self._reported_at = math.nan
@@ -174,6 +181,13 @@ class BusReporter:
         elif self._load > LOAD_WARNING:
             level = DiagnosticStatus.WARN
             message = sentences.bus_load_high(self._load)
+        traits = traits_of(exchange.bus)
+        kept = traits is not None and bool(traits.remedy)
+        if traits is not None and kept and level == DiagnosticStatus.OK and (
+                self._period <= traits.latency):
+            level = DiagnosticStatus.WARN
+            message = sentences.adapter_keeps(
+                traits.title, traits.latency, self._period, traits.remedy)
         return Report(f'bus {exchange.bus.name}', level, message, {
             'state': state,
             'code': message.code,
@@ -185,6 +199,8 @@ class BusReporter:
             'bus_off_count': str(counts.bus_off),
             'reconnections': str(link.reconnections),
             'send_failures': str(failures),
+            **({'adapter_latency_ms': f'{1e3 * traits.latency:g}'}
+               if traits is not None and kept else {}),
         })
 
 
@@ -192,11 +208,13 @@ class DriveReporter:
     """
     Reports on one drive; remembers the counts of the last report.
 
+    :param lateness: of the answers of all drives of its bus.
     :ivar inactive: the message while the bridge is inactive.
     """
 
-    def __init__(self, drive: DriveNode) -> None:
+    def __init__(self, drive: DriveNode, lateness: Lateness | None = None) -> None:
         self._drive = drive
+        self._lateness = lateness or Lateness()
         self._rejected = self._late = 0
         self._latencies = 0, 0.0        # how many, and their sum
         self._requests = 0
@@ -296,7 +314,8 @@ class DriveReporter:
             told.append(sentences.frames_rejected(rejected, drive.rejected_text))
         late, self._late = session.statistics.late - self._late, session.statistics.late
         if late:
-            told.append(sentences.answer_late(session.statistics.late_by))
+            bus = drive.exchange.bus
+            told.append(self._lateness.told(bus.name, _answers(drive), traits_of(bus)))
         return told
 
     def _slowness(self) -> Sentence:
@@ -330,6 +349,12 @@ class DriveReporter:
                 wanted.append(sentences.neutral_to(
                     neutral=neutral, topic=name, name=parameter.name))
         return sentences.not_armed(wanted)
+
+
+def _answers(drive: DriveNode) -> Answers:
+    session = drive.session
+    return Answers(session.statistics.late, session.statistics.late_by,
+                   session.configuration.period, session.online)
 
 
 class StatusMessage:
@@ -373,8 +398,14 @@ class Diagnostics:
         self._bus_of.update({f'drive {drive.name}': drive.drive.bus for drive in drives})
         self._prefix = node.get_fully_qualified_name().lstrip('/')
         self._publisher = publisher(node, DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
-        self.buses = [BusReporter(exchange) for exchange in exchanges]
-        self.drives = [DriveReporter(drive) for drive in drives]
+        self._drives_of = {exchange.bus.name: [
+            drive for drive in drives if drive.drive.bus == exchange.bus.name]
+            for exchange in exchanges}
+        self._lateness = {bus: Lateness() for bus in self._drives_of}
+        self.buses = [BusReporter(exchange, min(
+            (drive.drive.period for drive in self._drives_of[exchange.bus.name]),
+            default=math.inf)) for exchange in exchanges]
+        self.drives = [DriveReporter(drive, self._lateness[drive.drive.bus]) for drive in drives]
         self._lock = clock.lock()   # the last message comes from another thread
         self._message = DiagnosticArray()
         self._statuses: dict[str, StatusMessage] = {}
@@ -405,6 +436,8 @@ class Diagnostics:
 
     def reports(self, now: float) -> list[Report]:
         """Return all reports, buses first."""
+        for bus, lateness in self._lateness.items():
+            lateness.look({drive.name: _answers(drive) for drive in self._drives_of[bus]})
         reporters: list[BusReporter | DriveReporter] = [*self.buses, *self.drives]
         return [reporter.report(now) for reporter in reporters]
 

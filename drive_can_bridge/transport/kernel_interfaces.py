@@ -91,20 +91,30 @@ def name_of(index: int) -> str:
         return ''
 
 
+def has_can() -> bool:
+    """Tell whether this kernel knows CAN."""
+    try:
+        socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
+    except (OSError, AttributeError):
+        return False
+    return True
+
+
 def why_lost(name: str, index: int) -> str:
     """
     Say what has become of an interface that does not work; '': nothing that can be seen.
 
     :param index: its number when it worked; 0: it never has.
     """
-    now = index_of(name)
-    if not now:
+    if not has_can():
+        return ''
+    if not index_of(name):
         other = name_of(index) if index else ''
         if other:
             return (f'interface {name} is called {other} now: write it as channel, or '
                     f'"ip link set {other} down", "ip link set {other} name {name}"')
         if index:
-            return f'interface {name} was deleted'
+            return f'interface {name} is gone: unplugged, or deleted'
         names = ', '.join(each.name for each in kernel_interfaces())
         return f'there is no interface {name}; CAN interfaces here: {names or "none"}'
     found = kernel_interface(name)

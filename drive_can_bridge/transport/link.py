@@ -25,11 +25,12 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
-from drive_can_bridge.transport.bus_identity import adapter_of, device_of, is_absent
+from drive_can_bridge.transport.bus_identity import device_of, is_absent
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
-from drive_can_bridge.transport.failures import gone, in_words
+from drive_can_bridge.transport.failures import in_words
 from drive_can_bridge.transport.port import open_port
+from drive_can_bridge.transport.whereabouts import Whereabouts
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
 RECEIVE_TIMEOUT = 0.02
@@ -138,6 +139,7 @@ class Link:
         self.bus = bus
         self._keep_time = keep_time
         self._open = opener or (lambda: open_port(bus, clock, routes, stations=stations))
+        self._whereabouts = Whereabouts(bus)
         self._clock = clock
         self._now = clock.now
         self.error_witness: Callable[[int, bytes], None] | None = None
@@ -307,6 +309,7 @@ class Link:
                 if port is None or self._ended():
                     return
                 self.taken = False
+                self._whereabouts.opened()
                 port.error_witness = self.error_witness
                 port.tell = self._tell_once
                 frame = port.receive(RECEIVE_TIMEOUT)
@@ -327,7 +330,7 @@ class Link:
                 if self._ended():
                     return
                 self.taken = error.taken
-                reason = gone(adapter_of(self.bus)) if opened and self._gone() else in_words(error)
+                reason = self._whereabouts.reason(error, absent=opened and self._gone())
                 self.last_error = reason
                 self._close_port()
                 self._report(reason)

@@ -37,6 +37,7 @@ from drive_can_bridge.transport.failures import (
 )
 from drive_can_bridge.transport.foreign_clock import ForeignClock
 from drive_can_bridge.transport.gateway import Gateway
+from drive_can_bridge.transport.kernel_interfaces import why_lost
 from drive_can_bridge.transport.raw_socket import ERROR, EXTENDED, NO_DATA, RawSocket
 from drive_can_bridge.transport.serial_writer import Below, watched
 
@@ -443,7 +444,9 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         text = f'{where}: {reason}'
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
-        if is_absence(error) and is_absent(bus):
+        if bus.interface == 'socketcan':
+            text = why_lost(str(bus.channel), 0) or text
+        elif is_absence(error) and is_absent(bus):
             text = f'adapter {adapter_of(bus)} is not there: check its plug and its name'
         raise BusUnavailable(text) from error
     try:
@@ -454,7 +457,8 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
             _check_carrier(str(bus.channel))
     except BusUnavailable as error:
         port.close()
-        raise BusUnavailable(f'{where}: {in_words(error)}') from error
+        why = why_lost(str(bus.channel), 0) if bus.interface == 'socketcan' else ''
+        raise BusUnavailable(why or f'{where}: {in_words(error)}') from error
     return port
 
 

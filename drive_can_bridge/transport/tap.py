@@ -15,9 +15,10 @@ from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
 from drive_can_bridge.core.frame import Record, RecordKind
-from drive_can_bridge.transport.bus_identity import adapter_of, is_absent
-from drive_can_bridge.transport.failures import gone, in_words, with_outlook
+from drive_can_bridge.transport.bus_identity import is_absent
+from drive_can_bridge.transport.failures import in_words, with_outlook
 from drive_can_bridge.transport.port import open_port, Port
+from drive_can_bridge.transport.whereabouts import Whereabouts
 
 #: entries that may wait to be taken; beyond, they are lost and counted
 QUEUE_MAX = 200_000
@@ -68,6 +69,7 @@ class Tap:
     def __init__(self, bus: BusConfiguration, label: str, records: Mailbox[Record],
                  complain: Callable[[str], None], clock: Clock) -> None:
         self.bus = bus
+        self._whereabouts = Whereabouts(bus)
         self._clock = clock
         self.label = label
         self.lost = 0
@@ -93,6 +95,7 @@ class Tap:
 
     def _open(self) -> Port:
         port = open_port(self.bus, self._clock)
+        self._whereabouts.opened()
         port.witness = partial(self._take, port)
         return port
 
@@ -120,7 +123,7 @@ class Tap:
             except BusUnavailable as error:
                 self.was_down = True
                 if self._port is not None:
-                    reason = gone(adapter_of(self.bus)) if is_absent(self.bus) else in_words(error)
+                    reason = self._whereabouts.reason(error, absent=is_absent(self.bus))
                     self._complain(f'bus {self.bus.name}: '
                                    f'{with_outlook(reason, self.bus.reconnect_period)}')
                 self._close_port()

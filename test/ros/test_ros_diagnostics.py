@@ -13,8 +13,10 @@ from saying import says
 from waiting import clock
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.ros import diagnostics
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
 from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
@@ -207,6 +209,34 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
     client.wait_logged('conveyor: answer 4 ms after its period')
     status = client.diagnostics(DRIVE, lambda drive: int(drive['late_answers']) >= 1)
     assert int(status['frames_rejected']) == 0
+
+
+def test_an_adapter_that_keeps_what_it_has_received(bridge: StartBridge,
+                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    one = bridge(by_hand())
+    one.online()
+    exchange, (drive,) = one.node.exchanges['main'], one.node.drives.values()
+    command = 'echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer'
+    monkeypatch.setattr(diagnostics, 'traits_of', lambda bus: AdapterTraits(
+        'LAWICEL CANUSB', 0.016, command))
+    bus = BusReporter(exchange, 0.01)
+    report = bus.report(clock().now())
+    assert (report.level, report.message) == (DiagnosticStatus.WARN, says(
+        'adapter_keeps', adapter='LAWICEL CANUSB', latency=0.016, period=0.01, remedy=command))
+    assert report.facts['adapter_latency_ms'] == '16'
+    assert BusReporter(exchange, 0.02).report(clock().now()).level == DiagnosticStatus.OK
+    reporter = DriveReporter(drive)
+    reporter.report(clock().now())
+    with drive.exchange.lock:
+        drive.session.report.unasked(NOTHING, 0.0001, math.inf)
+    period = drive.session.configuration.period
+    expected = 'answer_kept' if period + 0.0001 <= 0.021 else 'answer_late'
+    assert expected in str(codes_of(reporter.report(clock().now()).message))
+
+
+def codes_of(message: Sentence) -> list[str]:
+    """Return the codes of a sentence, or of all that it is put together of."""
+    return [each.code for each in message.fields.get('parts', [message])]
 
 
 def test_a_bus_that_is_not_there_yet(bridge: StartBridge, client: Client,

@@ -39,12 +39,17 @@ def test_one_without_a_bit_rate_needs_one() -> None:
 
 def test_what_has_become_of_one(monkeypatch: MonkeyPatch) -> None:
     """As user-mode Linux 6.1 shows it: down, renamed, deleted."""
+    monkeypatch.setattr(kernel_interfaces, 'has_can', lambda: False)
+
     def shows(*interfaces: KernelInterface) -> None:
         monkeypatch.setattr(kernel_interfaces, 'kernel_interfaces', lambda: list(interfaces))
         monkeypatch.setattr(kernel_interfaces, 'index_of', {
             each.name: each.number for each in interfaces}.get)
         monkeypatch.setattr(kernel_interfaces, 'name_of', lambda index: {
             each.number: each.name for each in interfaces}.get(index, ''))
+    shows()
+    assert why_lost('can0', 0) == ''    # the kernel has no CAN, which its error says
+    monkeypatch.setattr(kernel_interfaces, 'has_can', lambda: True)
     shows(CAN, VCAN)
     assert why_lost('can0', 3) == ''
     shows(CAN._replace(up=False), VCAN)
@@ -54,7 +59,7 @@ def test_what_has_become_of_one(monkeypatch: MonkeyPatch) -> None:
         'interface can0 is called left now: write it as channel, or "ip link set left down", '
         '"ip link set left name can0"')
     shows(VCAN)
-    assert why_lost('can0', 3) == 'interface can0 was deleted'
+    assert why_lost('can0', 3) == 'interface can0 is gone: unplugged, or deleted'
     assert why_lost('can0', 0) == 'there is no interface can0; CAN interfaces here: vcan0'
     shows()
     assert why_lost('can0', 0) == 'there is no interface can0; CAN interfaces here: none'
