@@ -141,8 +141,10 @@ ROWS: tuple[Row, ...] = (
         'keeps its bit rate; acknowledges settings only', 'none is needed', BYTES,
         uart=True, line_bits=1.6),
     Row('serial', "python-can's own format over a serial line: Arduino sketches", 'serial',
-        '/dev/ttyUSB0', "bit rate and listen-only are the other end's; has no check sum",
-        '`baudrate:` as the other end has it', BYTES, uart=True, line_bits=1.3),
+        '/dev/ttyUSB0', "bit rate and listen-only are the other end's; has no check sum; before "
+        '4.6 python-can takes every identifier for one of 29 bits',
+        '`baudrate:` as the other end has it; python-can 4.6 for 11-bit drives', BYTES,
+        uart=True, line_bits=1.3),
     Row('bluetooth', 'serial ports over Bluetooth', 'slcan', '/dev/rfcomm0',
         'answers come in bursts, tens of ms late', 'a cable; else a `period` of 0.1 and more',
         'not at all', latency=0.05),

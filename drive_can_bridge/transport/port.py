@@ -46,6 +46,8 @@ from drive_can_bridge.transport.serial_writer import Below, watched
 _STAMP_AGE_MAX = 0.1
 # So many returns without a frame in so many s, although it was to wait: the other end has gone.
 _EARLY_MAX, _EARLY_TIME = 1000, 0.1
+# In so many, where it is known that no byte has come meanwhile: also on a busy machine.
+_EARLY_SILENCE = 1.0
 # So many frames may be confirmed at once: what a terminal keeps.
 _UNCONFIRMED_MAX = 4096
 # Looks at what a serial adapter has to say of the commands that opened it, and s for each.
@@ -226,7 +228,8 @@ class Port(EndPoint):
         self._early += 1
         if self._early < _EARLY_MAX:
             return
-        if now - self._early_since <= _EARLY_TIME:
+        if now - self._early_since <= (
+                _EARLY_TIME if self._below is None else _EARLY_SILENCE):
             self._lost = True
             raise BusUnavailable('receive: the adapter has nothing, and does not wait: its other '
                                  'end has closed')

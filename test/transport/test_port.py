@@ -248,6 +248,15 @@ def test_adapter_that_does_not_wait_has_lost_its_other_end() -> None:
         early.looks(1)
 
 
+def test_it_has_on_a_busy_machine_too_where_bytes_are_counted() -> None:
+    """As python-can's seeedstudio, when it is unplugged."""
+    early = Early(0.0005)
+    early.port._below = Below(None, None, b'', None)
+    early.looks(999)
+    with pytest.raises(BusUnavailable, match='its other end has closed'):
+        early.looks(1)
+
+
 def test_status_events_are_no_lost_bus() -> None:
     """pcan, kvaser, ixxat return early for what is no frame: some dozens in a row."""
     early = Early(0.0002)
