@@ -44,11 +44,12 @@ INTERNAL: dict[str, set[str]] = {
     'ros.messages': {'', 'core'},
     'ros.recognition': {''},
     'ros.client': {'', 'clock', 'core', 'process', 'ros.rcl', 'ros.recognition'},
-    'ros.rcl': {''},
+    'ros.rcl': {'', 'core'},
     'ros.monitor': {
         '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
     'ros.demo': {
-        '', 'core', 'configuration', 'process', 'simulation', 'monitor', 'ros', 'ros.monitor'},
+        '', 'core', 'configuration', 'process', 'simulation', 'monitor', 'ros', 'ros.monitor',
+        'ros.rcl'},
     'demo': {'', 'process'},
     'client.drive': {'', 'core', 'process'},
     'client.way': {'', 'core'},

@@ -659,6 +659,17 @@ requests_hold_up = Text(
     'a request that the middleware takes long to read, or an answer to a caller that it has not '
     'found yet, holds up the whole process: rclpy takes and sends them ({reason})',
     do='report it, with the version of rclpy')
+requests_by_executor = Text(
+    'an executor of rclpy takes the requests of all services, one after the other and with the '
+    'interpreter held, and sends their answers: a stop waits for what it is at ({reason})',
+    do='report it, with the version of rclpy')
+commands_by_executor = Text(
+    'commands and samples go by the public interface of rclpy, which costs more of the processor '
+    '({reason})',
+    do='report it, with the version of rclpy')
+rclpy_lacks = Text(
+    'this rclpy has no {names}: no bridge is possible with it',
+    do='use the rclpy of Jazzy or of Kilted')
 client_by_rclpy = Text(
     'bridges are asked more slowly: this rclpy is used by its public interface ({reason})',
     do='report it, with the version of rclpy')

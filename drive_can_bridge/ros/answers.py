@@ -18,7 +18,7 @@ from rclpy.service import Service
 
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core import sentences
-from drive_can_bridge.ros.middleware import GONE
+from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
 from drive_can_bridge.ros.rcl.unfit import Unfit
 

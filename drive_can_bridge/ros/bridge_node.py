@@ -25,15 +25,11 @@ from pathlib import Path
 import shlex
 from typing import Any
 
-from rcl_interfaces.msg import (
-    Parameter as ParameterMessage, ParameterDescriptor, SetParametersResult,
-)
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.context import Context
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.parameter_service import ParameterService
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.time_source import CLOCK_TOPIC
@@ -45,8 +41,7 @@ from drive_can_bridge.configuration.parameter_file import directory_that_sets, u
 from drive_can_bridge.configuration.problems import report
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
-from drive_can_bridge.core.directory import NAME_SHOWN
-from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core.errors import ConfigurationError, DriveCanError
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.memory import reserve
@@ -57,6 +52,12 @@ from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import COMMANDS
 from drive_can_bridge.ros.log import Log
+from drive_can_bridge.ros.rcl import nodes, outgoing, waiting
+from drive_can_bridge.ros.rcl.extension import look_for
+from drive_can_bridge.ros.rcl.incoming import why_not_by_hand
+from drive_can_bridge.ros.rcl.nodes import (
+    AnsweringParameterServices, overrides, set_read_only, Transitions)
+from drive_can_bridge.ros.rcl.relay import Relay
 from drive_can_bridge.ros.rcl.services import RclServices
 from drive_can_bridge.ros.rcl.unfit import Unfit
 from drive_can_bridge.ros.recognition import (
@@ -100,13 +101,13 @@ class NodeParameters:
                 read_only=True), ignore_override=True)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
-        self._services = _Services(node, self._prepare)
+        self._services = AnsweringParameterServices(node, self._prepare)
 
     @property
     def overrides(self) -> dict[str, Any]:
         """What parameter files and command line say, by dotted name."""
         return {name: parameter.value
-                for name, parameter in self._node._parameter_overrides.items()}
+                for name, parameter in overrides(self._node).items()}
 
     @property
     def current(self) -> dict[str, Any]:
@@ -162,7 +163,7 @@ class NodeParameters:
 
     def get(self, request: Any, response: Any) -> Any:
         """Do what ``get_parameters`` does, for who came another way. In the executor's thread."""
-        return self._services._get_parameters_callback(request, response)
+        return self._services.get(request, response)
 
     def announce(self, name: str, value: Any) -> None:
         """Change a read-only parameter: what the bridge itself has found out."""
@@ -170,10 +171,7 @@ class NodeParameters:
             return
         self._announcing = True
         try:
-            # the descriptor is handed in again because that is how rclpy leaves it read-only for
-            # everybody else
-            self._node._set_parameters_atomically_common(
-                [Parameter(name, value=value)], {name: self._node.describe_parameter(name)})
+            set_read_only(self._node, name, value)
         finally:
             self._announcing = False
 
@@ -195,47 +193,6 @@ class NodeParameters:
             self._changed(parameter.name, parameter.value)
 
 
-class _Services(ParameterService):
-    """
-    The parameter services of rclpy, which answer whatever the type of a value is said to be.
-
-    There, a type that does not exist ends the callback, and the client waits for ever.
-
-    :param prepare: is told the names of parameters that are asked for.
-    """
-
-    def __init__(self, node: Node, prepare: Callable[[Sequence[str]], None]) -> None:
-        super().__init__(node)
-        self._prepare = prepare
-
-    def _get_parameters_callback(self, request: Any, response: Any) -> Any:
-        self._prepare(request.names)
-        return super()._get_parameters_callback(request, response)
-
-    def _set_parameters_callback(self, request: Any, response: Any) -> Any:
-        response.results = [self._set([message]) for message in request.parameters]
-        return response
-
-    def _set_parameters_atomically_callback(self, request: Any, response: Any) -> Any:
-        response.result = self._set(request.parameters)
-        return response
-
-    def _set(self, messages: list[ParameterMessage]) -> SetParametersResult:
-        parameters = []
-        for message in messages:
-            try:
-                parameters.append(Parameter.from_parameter_msg(message))
-            except ValueError:
-                reason: str = sentences.no_such_type(message.value.type)
-                if len(messages) > 1:
-                    reason = f'{printable(message.name, NAME_SHOWN)}: {reason}'
-                return SetParametersResult(successful=False, reason=reason)
-        try:
-            return self._get_node().set_parameters_atomically(parameters)
-        except ParameterNotDeclaredException as error:
-            return SetParametersResult(successful=False, reason=printable(str(error)))
-
-
 class BridgeNode(LifecycleNode):
     """
     The managed node.
@@ -254,13 +211,25 @@ class BridgeNode(LifecycleNode):
                  open_bus: Callable[[BusConfiguration], EndPoint] | None = None,
                  files: Sequence[str] = (),
                  **options: Any) -> None:
+        try:
+            nodes.look()
+        except Unfit as error:
+            raise DriveCanError(sentences.rclpy_lacks(str(error))) from None
         self._stamps = Stamps(self.get_clock, lambda text: self.log.warning(text), clock)
         super().__init__(NODE_NAME, context=context, enable_logger_service=True,
                          start_parameter_services=False, **options)  # NodeParameters has them
         self._steady = clock      # the node has a clock of its own: ROS time
         self.log = Log(self.get_logger(), clock)
         voice = self.log.speaker('')
-        rcl = _rcl_services(self.services, self.log.warning)
+        try:
+            nodes.look_at(self)
+        except Unfit as error:
+            self.destroy_node()
+            raise DriveCanError(sentences.rclpy_lacks(str(error))) from None
+        rcl, why_relayed = _rcl_services(self.services, self.context, self.log.warning)
+        if why_relayed or why_not_by_hand():
+            spinner.part()
+        self._relayed = bool(why_relayed)
         self._answers = Answers(rcl, voice.warn, clock)
         self._requests = Requests(rcl, voice.warning, voice.error, self.context, clock)
         self._open_bus = open_bus
@@ -271,22 +240,24 @@ class BridgeNode(LifecycleNode):
         self._files = list(files)
         self._transition_lock = clock.lock()
         self._control_threads: dict[str, ServiceThread] = {}     # by bus
-        self._parameter_thread = self._service_thread('parameters')
-        self._own_thread = self._service_thread('requests of the bridge')
+        self._parameter_thread = self._service_thread('parameters', spinner.of_drives)
+        self._own_thread = self._service_thread('requests of the bridge', spinner)
         self._own = ExecutorServices(self._own_thread, spinner)
-        self._own.adopt(self.services)
         self._ending = False
+        _guard_transitions(self, self.log.warning, self._transition_lock,
+                           lambda: sentences.being_stopped() if self._ending else '')
+        self._own.adopt(self.services)
         self._leaving: list[DriveNode] = []
         self._runtime: BridgeRuntime | None = None
         self._node_parameters = NodeParameters(self, self._parameter_changed,
                                                self._parameter_refusal, self._made_parameter)
-        _guard_transitions(self, self.log.warning, self._transition_lock,
-                           lambda: sentences.being_stopped() if self._ending else '')
         spinner.executor.add_node(self)
 
-    def _service_thread(self, name: str, *options: Any, **more: Any) -> ServiceThread:
+    def _service_thread(self, name: str, spinner: ExecutorThread, *options: Any,
+                        **more: Any) -> ServiceThread:
         return ServiceThread(name, self.context, self.log.error, self._steady, *options,
-                             send=self._answers.send, take=self._requests.take, **more)
+                             send=self._answers.send, take=self._requests.take,
+                             relay=Relay(spinner.later) if self._relayed else None, **more)
 
     def create_service(self, *arguments: Any, **options: Any) -> Service:
         """Create a service whose requests and answers hold up nobody else."""
@@ -447,7 +418,7 @@ class BridgeNode(LifecycleNode):
         """Return what serves the stops of a bus: one that hangs holds up those of no other."""
         if bus not in self._control_threads:
             self._control_threads[bus] = self._service_thread(
-                f'control {bus}', _prepare_control, share=1.0)
+                f'control {bus}', self._spinner.of_drives, _prepare_control, share=1.0)
         return self._control_threads[bus]
 
     def _activate(self) -> None:
@@ -543,16 +514,33 @@ def _prepare_control() -> None:
     reserve()
 
 
-def _rcl_services(services: Iterable[Service], warn: Callable[[str], None]) -> RclServices | None:
-    """Return the way of requests and answers past rclpy; None, and a warning: there is none."""
+def _rcl_services(services: Iterable[Service], context: Context,
+                  warn: Callable[[str], None]) -> tuple[RclServices | None, str]:
+    """
+    Choose how requests are taken, and answers sent, by what this rclpy has.
+
+    What is not the best way is warned of.
+
+    :return: the way past rclpy, or None; and why not even a wait set is of use, but only the
+        executor; '': it is.
+    """
+    for reason in why_not_by_hand(), outgoing.why_not_straight():
+        if reason:
+            warn(sentences.commands_by_executor(reason))
     try:
-        rcl = RclServices()
-        for service in services:
-            rcl.check(service)
+        waiting.look(context)
+        try:
+            rcl = RclServices()
+            for service in services:
+                rcl.check(service)
+            return rcl, ''
+        except Unfit as error:
+            look_for(['Service.service_take_request'])
+            warn(sentences.requests_hold_up(str(error)))
     except Unfit as error:
-        warn(sentences.requests_hold_up(str(error)))
-        return None
-    return rcl
+        warn(sentences.requests_by_executor(str(error)))
+        return None, str(error)
+    return None, ''
 
 
 def _gone(drive: DriveNode) -> bool:
@@ -587,15 +575,13 @@ def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: L
     :param lock: is held during a transition.
     :param refusal: why none is possible any more; '' otherwise.
     """
-    service = node._service_change_state
-    change_state = service.callback
-    machine = node._state_machine
+    transitions = Transitions(node)
 
-    def guarded(request: Any, response: Any) -> Any:
+    def guarded(change_state: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
         number, label = request.transition.id, request.transition.label
         with lock:
             # of a request with both, rclpy takes the label
-            possible = {known: name for known, name, *_ in machine.available_transitions}
+            possible = transitions.possible
             why = refusal()
             if not why and (label not in possible.values() if label else number not in possible):
                 why = sentences.possible_are(list(possible.values()) or ['none'])
@@ -605,8 +591,8 @@ def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: L
                 except RuntimeError as error:
                     why = printable(' '.join(str(error).split()))
             warn(sentences.transition_impossible(
-                printable(label) or f'number {number}', machine.current_state[1], why))
+                printable(label) or f'number {number}', transitions.state, why))
             response.success = False
             return response
 
-    service.callback = guarded
+    transitions.guard(guarded)

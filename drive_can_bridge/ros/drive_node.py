@@ -35,9 +35,10 @@ from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.log import FEW, Log
-from drive_can_bridge.ros.middleware import GONE, latched_quality, publisher, quality_overrides
+from drive_can_bridge.ros.middleware import latched_quality, publisher, quality_overrides
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
+from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import (
@@ -116,7 +117,7 @@ class DriveNode(DriveListener):
 
     def serve(self) -> None:
         """Begin to serve: the exchange knows of the drive from now on."""
-        self._spinner.executor.add_node(self.node)
+        self._spinner.of_drives.executor.add_node(self.node)
         for services in self._services:
             services.serve()
 
@@ -168,7 +169,7 @@ class DriveNode(DriveListener):
     def destroy(self) -> None:
         """Take the drive out of the graph. The exchange must be closed."""
         self._spinner.leaves()
-        self._spinner.executor.remove_node(self.node)
+        self._spinner.of_drives.executor.remove_node(self.node)
         self.commands.destroy()
         for services in self._services:
             services.destroy()

@@ -33,9 +33,10 @@ from drive_can_bridge.exchange.exchange import PeriodicTask
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joint_reader import Column, JointMessage, JointReader, QUANTITIES
 from drive_can_bridge.ros.log import Log
-from drive_can_bridge.ros.middleware import Audience, GONE, publisher, state_quality
+from drive_can_bridge.ros.middleware import Audience, publisher, state_quality
 from drive_can_bridge.ros.polled_topics import PolledTopics, Warn
 from drive_can_bridge.ros.prepared import Number, PreparedMessage
+from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.stamps import NO_STAMP, Stamps
 
 STATES = '~/joint_states'

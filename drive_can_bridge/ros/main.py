@@ -68,7 +68,7 @@ def _load_rcl() -> None:
     a pipe by then is read by nobody. What else may be wrong is told by who needs it.
     """
     with suppress(Exception):
-        import rclpy.impl.implementation_singleton  # noqa: F401
+        import drive_can_bridge.ros.rcl.extension  # noqa: F401
 
 
 def _code_of(work: Callable[[], int]) -> int:

@@ -1,22 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""
-What is asked of the middleware: quality of service of each kind of topic.
-
-And what rclpy raises when the thing that is used, or its context, is there no more: ``GONE``.
-"""
+"""What is asked of the middleware: quality of service of each kind of topic."""
 
 from typing import Any
 
-from rclpy.exceptions import InvalidHandle
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-RCLError = rclpy_implementation.RCLError
-GONE = (InvalidHandle, RCLError)
+from drive_can_bridge.ros.rcl.nodes import overrides
+
 #: s between two looks at who subscribes
 COUNT_PERIOD = 0.1
 #: the default policies, and that which makes a topic a latched one
@@ -60,14 +54,14 @@ def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:
     start; almost nobody overrides.
     """
     prefix = f'qos_overrides.{node.resolve_topic_name(topic)}.'
-    if any(name.startswith(prefix) for name in node._parameter_overrides):
+    if any(name.startswith(prefix) for name in overrides(node)):
         return QoSOverridingOptions(policy_kinds=_OVERRIDABLE)
     return None
 
 
 def quality_overrides(node: Node) -> list[NodeParameter]:
     """Return what a node's parameters say about the quality of any topic."""
-    return [parameter for name, parameter in node._parameter_overrides.items()
+    return [parameter for name, parameter in overrides(node).items()
             if name.startswith('qos_overrides.')]
 
 

@@ -19,20 +19,18 @@ import math
 import struct
 from typing import Any, Protocol
 
-from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, qos_policy_name_from_kind
 from rclpy.serialization import deserialize_message
-from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64, Int64
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_age import Age, ALONE, CommandAges
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.ros.middleware import command_quality, GONE, overriding
+from drive_can_bridge.ros.middleware import command_quality, overriding
+from drive_can_bridge.ros.rcl.extension import GONE
+from drive_can_bridge.ros.rcl.incoming import Incoming, subscribe
 
 #: messages that are taken at once where everything is kept, and that are thrown away at once: more
 #: than any middleware keeps (Fast DDS: 5000), since what is left would pass for fresh
@@ -76,12 +74,12 @@ class CommandTopic:
     :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
-    def __init__(self, subscription: Subscription, *, use: Callable[[Any, float], None],
+    def __init__(self, incoming: Incoming, *, use: Callable[[Any, float], None],
                  old: Callable[[Any], None], aged: Callable[[Age, float], None],
                  unreadable: Callable[[str], None],
                  read: Callable[[bytes], Any] | None = None) -> None:
-        self.subscription = subscription
-        self.handle: Any = subscription.handle
+        self.incoming = incoming
+        self.subscription = subscription = incoming.subscription
         self._type: Any = subscription.msg_type
         # more than can wait came meanwhile: that is for the next time
         quality = subscription.qos_profile
@@ -105,16 +103,16 @@ class CommandTopic:
         :param look: what the clocks show.
         :raises InvalidHandle: the node is being destroyed.
         """
-        take, alone = self.handle.take_message, None
+        take, alone = self.incoming.take, None
         self._ages.look(*look)
         for count in range(self._depth):
-            taken = take(self._type, True)
+            taken = take()
             if taken is None:
                 return
             data, info = taken
             publisher = _gid(info)
             if publisher is None:
-                if count == 0 and self.handle.get_publisher_count() == 1:
+                if count == 0 and self.incoming.publishers() == 1:
                     alone = ALONE
                 publisher = alone
             age, seconds = self._ages.judge(
@@ -135,7 +133,7 @@ class CommandTopic:
         """Throw away what waits, but for what it may stop; return how many commands that were."""
         self._ages.look(*look)
         for count in range(self._waiting_max):
-            taken = self.handle.take_message(self._type, True)
+            taken = self.incoming.take()
             if taken is None:
                 return count
             self._take_old(taken[0])
@@ -165,48 +163,11 @@ def _gid(info: dict[str, Any]) -> bytes | None:
     return data if any(data) else None
 
 
-class PolledGroup(CallbackGroup):
-    """Entities of this group are taken by hand; an executor never waits for them."""
-
-    def can_execute(self, entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
-
-
 class Warn(Protocol):
     """Takes the topic of a warning, and its text; ``once``: no need to repeat it."""
 
     def __call__(self, topic: str, text: str, *, once: bool = False) -> None:
         """Log it, or not."""
-
-
-class PolledEvent:
-    """
-    An event of a subscription for which nobody waits. To be destroyed before the subscription.
-
-    :param tell: takes the status when there is news.
-    """
-
-    def __init__(self, subscription: Subscription, kind: Any,
-                 tell: Callable[[Any], None]) -> None:
-        self._handle = rclpy_implementation.EventHandle(subscription.handle, kind)
-        self._tell = tell
-
-    def look(self) -> None:
-        """Tell what happened since the last look, if anything did."""
-        with self._handle:
-            status = self._handle.take_event()
-        if status is not None and status.total_count_change > 0:
-            self._tell(status)
-
-    def destroy(self) -> None:
-        """Let go of the subscription."""
-        self._handle.destroy_when_not_in_use()
 
 
 class PolledTopics:
@@ -223,11 +184,9 @@ class PolledTopics:
         self._node = node
         self._warn = warn
         self._refuse = refuse
-        self._group = PolledGroup()
         self._topics: list[CommandTopic] = []
         self._published: list[CommandTopic] = []  # by somebody, as far as known
         self._count_at = -math.inf
-        self._events: list[PolledEvent] = []
         self._look_at = -math.inf
         self._ahead = self._compare_clocks()[1]
 
@@ -249,13 +208,8 @@ class PolledTopics:
         def incompatible(status: Any) -> None:
             self._warn(f'quality {name}', sentences.publisher_incompatible(
                 name, qos_policy_name_from_kind(status.last_policy_kind)))
-        subscription = node.create_subscription(
-            message_type, topic, _never, command_quality(), callback_group=self._group,
-            qos_overriding_options=overriding(node, topic),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False))
-        self._events.append(PolledEvent(
-            subscription, QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
-            incompatible))
+        incoming = subscribe(node, message_type, topic, command_quality(),
+                             overriding(node, topic), incompatible)
 
         def aged(age: Age, seconds: float) -> None:
             if age is Age.LATE:
@@ -271,7 +225,7 @@ class PolledTopics:
         def unreadable(reason: str) -> None:
             self._refuse(f'unreadable {name}',
                          sentences.command_unreadable(topic=name, reason=printable(reason)))
-        self._topics.append(CommandTopic(subscription, use=take, old=old, aged=aged,
+        self._topics.append(CommandTopic(incoming, use=take, old=old, aged=aged,
                                          unreadable=unreadable, read=read))
 
     @property
@@ -291,14 +245,14 @@ class PolledTopics:
             for topic in self._topics:  # some may have come from a publisher that is gone by now
                 topic.take(now, look)
             self._published = [topic for topic in self._topics
-                               if topic.handle.get_publisher_count()]
+                               if topic.incoming.publishers()]
             for topic in self._topics:
                 if topic not in self._published:
                     topic.forget()
             if now >= self._look_at:
                 self._look_at = now + EVENT_PERIOD
-                for event in self._events:
-                    event.look()
+                for topic in self._topics:
+                    topic.incoming.look()
         except GONE:  # the node is being destroyed
             pass
 
@@ -325,9 +279,8 @@ class PolledTopics:
 
     def destroy(self) -> None:
         """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
-        events, self._events = self._events, []
-        for event in events:
-            event.destroy()
+        for topic in self._topics:
+            topic.incoming.let_go()
 
     def unsubscribe(self) -> None:
         """Take the subscriptions out of a node that stays."""
@@ -335,7 +288,3 @@ class PolledTopics:
         self._published.clear()
         while self._topics:
             self._node.destroy_subscription(self._topics.pop().subscription)
-
-
-def _never(_: Any) -> None:
-    raise RuntimeError('command subscriptions are taken by the exchange, not by an executor')

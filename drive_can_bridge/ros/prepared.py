@@ -18,6 +18,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 
 from drive_can_bridge.core.parameters import ValueKind
+from drive_can_bridge.ros.rcl.outgoing import publish_bytes
 
 #: by struct code: a number whose bytes all differ, and from all others that are likely
 _MARKERS = {
@@ -103,9 +104,7 @@ class PreparedMessage:
     __slots__ = ('_pack', '_parts', '_publish')
 
     def __init__(self, publisher: Publisher, layout: Layout) -> None:
-        # the way to the handle through ``Publisher.publish`` costs more than the handing over; a
-        # destroyed publisher raises RCLError
-        self._publish: Callable[[bytes], None] = publisher.handle.publish_raw
+        self._publish = publish_bytes(publisher)
         codes, parts = layout.order, []
         for constant, code in zip(layout.constants, layout.codes):
             for before in (constant, *[b''] * (int(code[:-1] or 1) - 1)):

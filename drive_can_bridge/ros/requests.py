@@ -20,8 +20,8 @@ from rclpy.service import Service
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.sentences import (
     request_hangs, request_hung, request_unreadable, requests_hold_up)
-from drive_can_bridge.ros.middleware import GONE, RCLError
-from drive_can_bridge.ros.rcl.services import RclServices
+from drive_can_bridge.ros.rcl.extension import GONE, RCLError
+from drive_can_bridge.ros.rcl.services import RclServices, take_by_rclpy
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
 #: s after which others are not kept waiting for a request to be read
@@ -32,13 +32,6 @@ GoOn = Callable[[bool], None]
 #: takes a service, and whoever goes on without the one that takes its request if that takes long;
 #: returns the request, and who asked; None: there is none
 Take = Callable[[Service, GoOn], tuple[Any, Any] | None]
-
-
-def take_by_rclpy(service: Service, _: GoOn) -> tuple[Any, Any] | None:
-    """Take a request, with the interpreter held."""
-    kind: Any = service.srv_type
-    request, header = service.handle.service_take_request(kind.Request)
-    return None if header is None else (request, header)
 
 
 def full_name(service: Service) -> str:
@@ -104,7 +97,7 @@ class Requests:
                 except Unfit as error:
                     self._rcl = None
                     self._warn(requests_hold_up(str(error)))
-            return take_by_rclpy(service, go_on)
+            return take_by_rclpy(service)
         except RCLError as error:
             if self._context.ok():
                 self._error(request_unreadable(full_name(service), str(error)))

@@ -15,7 +15,7 @@ coroutine, the one that answers goes on with it.
 
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
-from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from inspect import isawaitable
 import math
@@ -27,7 +27,6 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
@@ -36,9 +35,12 @@ from std_srvs.srv import SetBool, Trigger
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
-from drive_can_bridge.ros.middleware import GONE
-from drive_can_bridge.ros.polled_topics import PolledGroup
-from drive_can_bridge.ros.requests import full_name, Take, take_by_rclpy
+from drive_can_bridge.ros.rcl.extension import GONE
+from drive_can_bridge.ros.rcl.incoming import PolledGroup
+from drive_can_bridge.ros.rcl.relay import Relay
+from drive_can_bridge.ros.rcl.services import take_by_rclpy
+from drive_can_bridge.ros.rcl.waiting import Sleeping, Waiting
+from drive_can_bridge.ros.requests import full_name, Take
 
 #: s between two failures: one that comes at once again must not take the machine
 ERROR_PAUSE = 0.05
@@ -83,11 +85,21 @@ class ExecutorThread:
         self._stopping = False
         self._left_at = -math.inf
         self._ending = threading.Lock()
+        self._name = name
         self._thread = clock.worker(self._run, name)
+        #: the one that drives are in
+        self.of_drives = self
 
     def start(self) -> None:
         """Start to serve."""
         self._thread.start()
+        if self.of_drives is not self:
+            self.of_drives.start()
+
+    def part(self) -> None:
+        """Have drives in one of their own, before this starts: no transition holds it up."""
+        self.of_drives = ExecutorThread(f'{self._name} of drives', self._report,
+                                        self.executor.context, self._clock)
 
     def later(self, job: Callable[..., object], *arguments: Any) -> None:
         """Have something done in this thread soon. From any thread; once it stops, nothing is."""
@@ -97,7 +109,7 @@ class ExecutorThread:
 
     def leaves(self) -> None:
         """Record that a drive leaves: what was to be served next may be gone. From any thread."""
-        self._left_at = self._clock.now()
+        self._left_at = self.of_drives._left_at = self._clock.now()
 
     def stop(self) -> None:
         """Stop to serve and wait for the callback that is running."""
@@ -107,6 +119,8 @@ class ExecutorThread:
             self._stopping = True
         self._thread.join(5.0)
         self.executor.shutdown(timeout_sec=1.0)
+        if self.of_drives is not self:
+            self.of_drives.stop()
 
     def _end(self) -> None:
         self._stopping = True
@@ -214,8 +228,9 @@ class _Taker:
     :ivar without: the service that it is taking a request of since, and others do without.
     """
 
-    def __init__(self, context: Context) -> None:
-        self.guard = rclpy_implementation.GuardCondition(context.handle)
+    def __init__(self, waiting: Waiting | Sleeping) -> None:
+        self.waiting = waiting
+        self.wake = waiting.wake    # has it look what there is to do
         self.changed = self.superseded = False
         self.without: Service | None = None
 
@@ -223,14 +238,6 @@ class _Taker:
         """Have it look what is served."""
         self.changed = True
         self.wake()
-
-    def wake(self) -> None:
-        """Have it look what there is to do."""
-        try:
-            with self.guard:
-                self.guard.trigger_guard_condition()
-        except GONE:  # stopped
-            pass
 
 
 class ServiceThread:
@@ -244,11 +251,14 @@ class ServiceThread:
     :param share: of the processor's time that each of its two threads may use; 1: all of it.
     :param send: sends an answer.
     :param take: takes a request; where that takes long another thread serves all other services.
+    :param relay: has an executor take the requests, and send the answers; None: this does.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None], clock: Clock,
                  prepare_thread: Callable[[], object] = lambda: None, *, share: float = MODEST,
-                 send: Send = Service.send_response, take: Take = take_by_rclpy) -> None:
+                 send: Send = Service.send_response,
+                 take: Take = lambda service, _: take_by_rclpy(service),
+                 relay: Relay | None = None) -> None:
         self._name = name
         self._clock = clock
         self._send_response = send
@@ -261,7 +271,8 @@ class ServiceThread:
         self._stopped_threads: Counter[Service] = Counter()
         self._jobs: Mailbox[Callable[[], None] | None] = Mailbox(clock)
         self._begun: deque[Callable[[], None]] = deque()
-        self._taker = _Taker(context)
+        self._relay = relay
+        self._taker = self._new_taker()
         self._superseded: set[_Taker] = set()
         self._ending = False
         self._threads: list[Worker] = []
@@ -280,6 +291,8 @@ class ServiceThread:
                 self._clock.worker(self._answer_all, f'{self._name}, answering')]
             for thread in self._threads:
                 thread.start()
+        if self._relay is not None:
+            self._relay.serve(service, partial(self._relayed, service, callback), answered)
         self._taker.change()
 
     def later(self, job: Callable[[], None]) -> None:
@@ -295,6 +308,8 @@ class ServiceThread:
         """Stop to serve them; they may be destroyed then."""
         for service in services:
             self._served.pop(service, None)
+            if self._relay is not None:
+                service.callback_group = PolledGroup()
         self._taker.change()
 
     def stop(self) -> None:
@@ -305,7 +320,18 @@ class ServiceThread:
         for thread in self._threads:
             thread.join(STOP_PATIENCE)
         self._threads.clear()
-        self._taker.guard.destroy_when_not_in_use()
+        self._taker.waiting.close()
+
+    def _new_taker(self) -> _Taker:
+        return _Taker(Waiting(self._context) if self._relay is None
+                      else Sleeping(self._clock.wake_event()))
+
+    def _relayed(self, service: Service, callback: Callback, request: Any,
+                 answer: Callable[[Any], None]) -> None:
+        """Begin what the executor has taken."""
+        kind = service.srv_type
+        self.begin(partial(callback, request, lambda message: answer(
+            response_to(kind, request, message) if isinstance(message, Exception) else message)))
 
     # -- the thread that takes --------------------------------------------------------------------
 
@@ -322,7 +348,7 @@ class ServiceThread:
                     kind=type(error).__name__, text=str(error)))
                 self._clock.wait(self._clock.now() + ERROR_PAUSE)
         if taker.superseded:
-            taker.guard.destroy_when_not_in_use()
+            taker.waiting.close()
             self._superseded.discard(taker)
             self._taker.change()
 
@@ -332,32 +358,15 @@ class ServiceThread:
     def _take_while_unchanged(self, taker: _Taker, throttle: CpuThrottle) -> None:
         """Take what comes until something else is to be served."""
         taker.changed = False
-        context_handle: Any = self._context.handle
         without = {other.without for other in self._superseded.copy()}
-        with ExitStack() as held:
-            present: dict[int, Service] = {}
-            for service in list(self._served):
-                if service in without:
-                    continue
-                try:
-                    held.enter_context(service.handle)
-                except InvalidHandle:   # destroyed meanwhile
-                    continue
-                present[service.handle.pointer] = service
-            held.enter_context(taker.guard)
-            held.enter_context(context_handle)
-            waiting = rclpy_implementation.WaitSet(0, 1, 0, 0, len(present), 0, context_handle)
-            handles = [service.handle for service in present.values()]
+        with taker.waiting.held([] if self._relay is not None else [
+                service for service in list(self._served) if service not in without]) as wait:
             while not taker.changed and self._goes_on(taker):
-                waiting.clear_entities()
-                waiting.add_guard_condition(taker.guard)
-                for handle in handles:
-                    waiting.add_service(handle)
-                waiting.wait(-1)
+                ready = wait()
                 while self._begun:
                     self._begun.popleft()()
-                for pointer in waiting.get_ready_entities('service'):
-                    self._take(taker, present[pointer])
+                for service in ready:
+                    self._take(taker, service)
                 throttle.keep()
 
     def _take(self, taker: _Taker, service: Service) -> None:
@@ -380,7 +389,7 @@ class ServiceThread:
         :raises RuntimeError: no thread can be started.
         """
         if not taker.superseded:
-            successor = _Taker(self._context)
+            successor = self._new_taker()
             thread = self._clock.worker(partial(self._take_all, successor), self._name)
             taker.superseded, taker.without = True, service
             self._superseded.add(taker)
@@ -466,17 +475,19 @@ class ExecutorServices:
         """Begin to serve services."""
         for service in services:
             service.callback_group = PolledGroup()
-            self._thread.serve(service, partial(self._spinner.later, self._serve, service))
+            kind: Any = service.srv_type
+            self._thread.serve(service, partial(
+                self._spinner.later, self._serve, service.callback, kind.Response))
 
     def leave(self, service: Service, then: Callable[[], object]) -> None:
         """Stop to serve one; what follows happens when its answers have been sent."""
         self._thread.forget([service])
         self._thread.later(partial(self._spinner.later, then))
 
-    def _serve(self, service: Service, request: Any, answer: Answer) -> None:
-        kind: Any = service.srv_type
+    def _serve(self, callback: Callable[[Any, Any], Any], kind: Callable[[], Any], request: Any,
+               answer: Answer) -> None:
         try:
-            response = service.callback(request, kind.Response())
+            response = callback(request, kind())
         except Exception as error:
             answer(error)
             raise

@@ -10,6 +10,7 @@ from bridges import Bridge, LIFT, parameters, StartBridge
 from clients import Client, ClientContext, LATCHED, wait_until
 from clocks import REAL
 import pytest
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
 from saying import says
@@ -19,8 +20,8 @@ from world import World
 
 from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.answers import Answers, WAITING_MAX
-from drive_can_bridge.ros.polled_topics import PolledGroup
 from drive_can_bridge.ros.rcl import services as rcl_module
+from drive_can_bridge.ros.rcl.incoming import PolledGroup
 from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
 from drive_can_bridge.ros.rcl.unfit import Unfit
 from drive_can_bridge.ros.requests import Requests
@@ -210,11 +211,11 @@ def _caller(client: Client, _client_context: ClientContext, answers: Answers) ->
 
 
 def _no_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_module.rclpy_implementation, '__file__', '/no/such.so')
+    monkeypatch.setattr(rclpy_implementation, '__file__', '/no/such.so')
 
 
 def _no_function(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rcl_module.rclpy_implementation, '__file__', 'libc.so.6')
+    monkeypatch.setattr(rclpy_implementation, '__file__', 'libc.so.6')
 
 
 def _no_capsule(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,8 +235,9 @@ def test_rclpy_takes_and_answers_where_anything_is_other_than_expected(
         client: Client, _client_context: ClientContext, told: list[str],
         monkeypatch: pytest.MonkeyPatch, unfit: Callable[[pytest.MonkeyPatch], None]) -> None:
     unfit(monkeypatch)
-    rcl = bridge_node._rcl_services(list(client.node.services), told.append)
-    assert rcl is None
+    rcl, why_relayed = bridge_node._rcl_services(
+        list(client.node.services), client.node.context, told.append)
+    assert rcl is None and not why_relayed
     line, = told
     assert line == says('requests_hold_up')
     with sending(rcl, told) as answers, \

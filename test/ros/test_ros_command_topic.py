@@ -14,6 +14,7 @@ from std_msgs.msg import Bool, Float64, Int64
 from drive_can_bridge.core.command_age import Age
 from drive_can_bridge.ros import polled_topics
 from drive_can_bridge.ros.polled_topics import CommandTopic
+from drive_can_bridge.ros.rcl.incoming import by_hand
 
 MS = 1_000_000
 
@@ -53,7 +54,7 @@ class Taken:
         self.begun: list[Age] = []
         self.unreadable: list[str] = []
         self.topic = CommandTopic(
-            self.subscription, use=lambda message, _: self.used.append(message),  # type: ignore
+            by_hand(self.subscription), use=lambda message, _: self.used.append(message),
             old=self.old.append, aged=self._aged, unreadable=self.unreadable.append)
 
     def _aged(self, age: Age, seconds: float) -> None:
@@ -217,7 +218,7 @@ def test_where_everything_is_kept_everything_is_thrown_away() -> None:
     taken = Taken(Float64)
     taken.subscription.qos_profile = QoSProfile(history=HistoryPolicy.KEEP_ALL)
     topic = CommandTopic(
-        taken.subscription, use=lambda message, _: taken.used.append(message),  # type: ignore
+        by_hand(taken.subscription), use=lambda message, _: taken.used.append(message),
         old=taken.old.append, aged=taken._aged, unreadable=taken.unreadable.append)
     for value in range(2500):
         taken.subscription.put(serialize_message(Float64(data=float(value))))

@@ -13,7 +13,7 @@ from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
 from waiting import clock
 
-from drive_can_bridge.ros.polled_topics import PolledGroup
+from drive_can_bridge.ros.rcl.incoming import PolledGroup
 from drive_can_bridge.ros.threads import (
     Answer, CoroutineServices, ExecutorThread, Question, ServiceThread)
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import rclpy
 from rclpy.executors import ExternalShutdownException
 
-from drive_can_bridge.ros.middleware import GONE
+from drive_can_bridge.ros.rcl.extension import GONE
 
 
 @contextmanager

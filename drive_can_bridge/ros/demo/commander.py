@@ -25,8 +25,8 @@ from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfig
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.monitor.snapshot import read_status, Report
 from drive_can_bridge.process.beginning import let_signals_in
-from drive_can_bridge.ros.middleware import GONE
 from drive_can_bridge.ros.monitor.client import statuses
+from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.values import TOPIC_TYPES
 from drive_can_bridge.simulation.quantities import quantity_of
 

@@ -26,14 +26,13 @@ from operator import is_
 import struct
 from typing import Any, NamedTuple
 
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
 from drive_can_bridge.ros.rcl import escaped
+from drive_can_bridge.ros.rcl.extension import extension, RCLError
 from drive_can_bridge.ros.rcl.layout import cut, ENTRIES_MAX, Layout, layout_of
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
-RCLError = rclpy_implementation.RCLError
 #: rcl/types.h
 RCL_RET_OK, RCL_RET_TIMEOUT, RCL_RET_SERVICE_TAKE_FAILED = 0, 2, 601
 #: rcutils/error_handling.h: RCUTILS_ERROR_MESSAGE_MAX_LENGTH
@@ -141,7 +140,7 @@ class RclServices:
     def __init__(self) -> None:
         try:
             # finds them in what this library needs, which is the rcl that rclpy uses
-            rcl = self._library = ctypes.CDLL(rclpy_implementation.__file__)
+            rcl = self._library = ctypes.CDLL(extension.__file__)
             self._take = rcl.rcl_take_request_with_info
             self._send = rcl.rcl_send_response
             self._get_error = _GET_ERROR(('rcutils_get_error_string', rcl))
@@ -318,3 +317,11 @@ def _crowd(message: Any) -> tuple[str, Sequence[Any]]:
             and all(map(is_, entries, repeat(entries[0])))):
         return fields[0], entries
     return '', ()
+
+
+def take_by_rclpy(service: Service) -> tuple[Any, Any] | None:
+    """Take a request as the executors of rclpy do: with the interpreter held."""
+    kind: Any = service.srv_type
+    handle: Any = service.handle
+    request, header = handle.service_take_request(kind.Request)
+    return None if header is None else (request, header)

@@ -1,0 +1,142 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What is private in the Python part of rclpy, of nodes: there is no other way to any of it.
+
+So a bridge says at its start what is missing (:func:`look`, and :func:`look_at` its node), and
+does not begin.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from rcl_interfaces.msg import Parameter as ParameterMessage, SetParametersResult
+from rclpy.exceptions import ParameterNotDeclaredException
+from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
+
+from drive_can_bridge.core.directory import NAME_SHOWN
+from drive_can_bridge.core.sentences import no_such_type
+from drive_can_bridge.core.text import printable
+from drive_can_bridge.ros.rcl.unfit import Unfit
+
+#: by class: what it has, and what only its objects have
+_OF_CLASSES: tuple[tuple[type, tuple[str, ...]], ...] = (
+    (Node, ('_set_parameters_atomically_common',)),
+    (ParameterService, ('_get_node', '_get_parameters_callback', '_set_parameters_callback',
+                        '_set_parameters_atomically_callback')))
+_OF_NODES = '_parameter_overrides', '_service_change_state', '_state_machine'
+
+
+def look() -> None:
+    """
+    See that there is what this takes, before there is a node.
+
+    :raises Unfit: it is not; it says what.
+    """
+    _complain([f'{kind.__name__}.{name}' for kind, names in _OF_CLASSES for name in names
+               if not hasattr(kind, name)])
+
+
+def look_at(node: LifecycleNode) -> None:
+    """
+    See that a node has what this takes.
+
+    :raises Unfit: it does not; it says what.
+    """
+    _complain([f'LifecycleNode.{name}' for name in _OF_NODES if not hasattr(node, name)])
+
+
+def _complain(missing: Sequence[str]) -> None:
+    if missing:
+        raise Unfit(', '.join(missing))
+
+
+def overrides(node: Node) -> Mapping[str, Parameter]:
+    """Return what parameter files and command line say of a node, declared or not."""
+    found: Mapping[str, Parameter] = node._parameter_overrides
+    return found
+
+
+def set_read_only(node: Node, name: str, value: Any) -> None:
+    """
+    Change a parameter that is read-only for everybody else.
+
+    The descriptor is handed in again because that is how rclpy leaves it read-only.
+    """
+    node._set_parameters_atomically_common(
+        [Parameter(name, value=value)], {name: node.describe_parameter(name)})
+
+
+class Transitions:
+    """The transitions of a managed node, before rcl is asked for one."""
+
+    def __init__(self, node: LifecycleNode) -> None:
+        self._machine = node._state_machine
+        self._service = node._service_change_state
+
+    @property
+    def possible(self) -> dict[int, str]:
+        """Number and label of each that is possible now."""
+        return {number: label for number, label, *_ in self._machine.available_transitions}
+
+    @property
+    def state(self) -> str:
+        """Label of the state."""
+        return str(self._machine.current_state[1])
+
+    def guard(self, guarded: Callable[[Callable[[Any, Any], Any], Any, Any], Any]) -> None:
+        """
+        Have something else answer requests.
+
+        :param guarded: takes what rclpy does, request and response.
+        """
+        change_state = self._service.callback
+        self._service.callback = lambda request, response: guarded(
+            change_state, request, response)
+
+
+class AnsweringParameterServices(ParameterService):
+    """
+    The parameter services of rclpy, which answer whatever the type of a value is said to be.
+
+    There, a type that does not exist ends the callback, and the client waits for ever.
+
+    :param prepare: is told the names of parameters that are asked for.
+    """
+
+    def __init__(self, node: Node, prepare: Callable[[Sequence[str]], None]) -> None:
+        super().__init__(node)
+        self._prepare = prepare
+
+    def get(self, request: Any, response: Any) -> Any:
+        """Do what ``get_parameters`` does, for who came another way."""
+        return self._get_parameters_callback(request, response)
+
+    def _get_parameters_callback(self, request: Any, response: Any) -> Any:
+        self._prepare(request.names)
+        return super()._get_parameters_callback(request, response)
+
+    def _set_parameters_callback(self, request: Any, response: Any) -> Any:
+        response.results = [self._set([message]) for message in request.parameters]
+        return response
+
+    def _set_parameters_atomically_callback(self, request: Any, response: Any) -> Any:
+        response.result = self._set(request.parameters)
+        return response
+
+    def _set(self, messages: list[ParameterMessage]) -> SetParametersResult:
+        parameters = []
+        for message in messages:
+            try:
+                parameters.append(Parameter.from_parameter_msg(message))
+            except ValueError:
+                reason: str = no_such_type(message.value.type)
+                if len(messages) > 1:
+                    reason = f'{printable(message.name, NAME_SHOWN)}: {reason}'
+                return SetParametersResult(successful=False, reason=reason)
+        try:
+            return self._get_node().set_parameters_atomically(parameters)
+        except ParameterNotDeclaredException as error:
+            return SetParametersResult(successful=False, reason=printable(str(error)))
