@@ -213,13 +213,39 @@ def hand_figures(found: dict[str, Any]) -> list[Figure]:
              'stop done': '`drive_can stop`, Enter to its end',
              'read': '`drive_can read` of one value', 'write': '`drive_can write` of one value'}
     goals = {'stop': 1 / 25, 'stop done': 1 / 15, 'read': 1 / 12, 'write': 1 / 12}
-    figures = [Figure(text, f'{median(found[name]["ours"]):.3f} s',
-                      f'bare client {median(found[name]["bare"]):.2f} s',
-                      median(found[name]['ours']) / median(found[name]['bare']), goals[name])
-               for name, text in names.items()]
+    other_goals = {'stop': 1 / 40, 'stop done': 1 / 20, 'read': 1 / 15, 'write': 1 / 15}
+    figures = [Figure(text, _spread(found[name]['ours']), f'{who} {_spread(found[name][key])}',
+                      median(found[name]['ours']) / median(found[name][key]), goal)
+               for name, text in names.items()
+               for key, who, goal in (('bare', 'bare client', goals[name]),
+                                      ('other', 'the other build', other_goals[name]))
+               if key in found[name]]
     stop, floor = median(found['stop']['ours']), median(found['floor'])
     return [*figures, Figure(f'{names["stop"]}, beside a Python that starts', f'{stop:.3f} s',
-                             f"`python3 -c 'import socket'` {floor:.3f} s", stop / floor, 1.5)]
+                             f"`python3 -c 'import socket'` {_spread(found['floor'])}",
+                             stop / floor, 1.5)]
+
+
+def _spread(samples: list[float]) -> str:
+    return f'{median(samples):.3f} ({min(samples):.3f}–{max(samples):.3f}) s'
+
+
+def hung_hand_figures(found: dict[str, Any]) -> list[Figure]:
+    """Stop where one of two bridges is suspended."""
+    named = f'named {found["named"]} times of {len(found["done"])}'
+    return [
+        Figure('`drive_can stop`, one of two bridges suspended: stop frame of the other',
+               _spread(found['stop']), '', median(found['stop']), 0.1),
+        Figure('the same, to its end: who hangs is named', _spread(found['done']), named,
+               median(found['done']), 1.2)]
+
+
+def busy_hand_figures(found: dict[str, Any]) -> list[Figure]:
+    """Stop at low priority on a busy computer."""
+    return [Figure(f'`nice drive_can stop` beside {found["loops"]} busy loops, to its end',
+                   _spread(found['done']),
+                   f'{found["failed"]} of {len(found["done"])} were not answered well',
+                   max(found['done']) if not found['failed'] else math.inf, 1.0)]
 
 
 def backup_figures(found: dict[str, Any]) -> list[Figure]:
@@ -341,7 +367,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'axes': axes_figures, 'diy': diy_figures, 'sweep': sweep_figures, 'buses': buses_figures,
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'gateway': gateway_figures,
-    'hand': hand_figures, 'monitor': monitor_figures,
+    'hand': hand_figures, 'hand hung': hung_hand_figures, 'hand busy': busy_hand_figures,
+    'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
     'drives': drives_figures, 'decode': decode_figures,
     'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,

@@ -38,7 +38,7 @@ class Pace:
 
     calls: int = 300
     stops: int = 200
-    commands: int = 9
+    commands: int = 10
     rounds: int = 40
     turns: int = 4
     backups: int = 5
@@ -77,7 +77,11 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(1, 0.02, subscribed=False, servo=True), duration, pace.rounds),
         # a stop without a name would reach every bridge of this machine
         'hand': lambda: own_network.run(lambda: scenarios.by_hand(
+            Load(8, 0.01, subscribed=False, control=True), pace.commands, options.beside)),
+        'hand hung': lambda: own_network.run(lambda: scenarios.one_hangs(
             Load(8, 0.01, subscribed=False, control=True), pace.commands)),
+        'hand busy': lambda: own_network.run(lambda: scenarios.busy_hand(
+            Load(8, 0.01, subscribed=False, control=True), 3 * pace.commands, 8)),
         'backup': lambda: scenarios.backup(
             Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(
@@ -161,6 +165,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--memory-duration', type=float, default=60.0, help='s')
     parser.add_argument('--frames', type=int, default=1_000_000, help='of a trace to decode')
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
+    parser.add_argument('--beside', metavar='PYTHON', default='', help=(
+        'of another build (its .venv/bin/python), whose commands `hand` measures as well'))
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
     parser.add_argument('--sweep-plot', type=Path,

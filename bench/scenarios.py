@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import math
 import os
 from pathlib import Path
+import signal
 import statistics
 import subprocess
 import sys
@@ -481,11 +482,15 @@ def gateway(load: Load, duration: float, calls: int) -> dict[str, Any]:
     return found
 
 
-def by_hand(load: Load, rounds: int) -> dict[str, Any]:
-    """Measure commands that a person types, from Enter, beside a client that calls one service."""
-    ours, bare = [sys.executable, '-m', 'drive_can_bridge.cli.start'], [
-        sys.executable, str(HERE / 'bare_client.py')]
-    found: dict[str, Any] = {name: {'ours': [], 'bare': []} for name in (
+def by_hand(load: Load, rounds: int, other: str = '') -> dict[str, Any]:
+    """
+    Measure commands that a person types, from Enter, beside a client that calls one service.
+
+    :param other: the Python of another build, whose commands are measured as well; '': none.
+    """
+    bare = [sys.executable, str(HERE / 'bare_client.py')]
+    who = {'ours': DRIVE_CAN, **({'other': (other, *DRIVE_CAN[1:])} if other else {})}
+    found: dict[str, Any] = {name: {each: [] for each in (*who, 'bare')} for name in (
         'stop', 'stop done', 'read', 'write')}
     found['floor'] = []
     with ExitStack() as stack:
@@ -493,25 +498,78 @@ def by_hand(load: Load, rounds: int) -> dict[str, Any]:
         with bridge_under(load, bus), child('stopper.py') as stopper:
             for number in range(rounds):
                 value = str(1.0 + number / 100)
-                for who, words in (('ours', [
-                        [*ours, 'stop'], [*ours, 'read', 'drive0', 'ramp_time'],
-                        [*ours, 'write', 'drive0', f'ramp_time={value}']]),
-                        ('bare', [[*bare, 'stop'], [*bare, 'read'], [*bare, 'write', value]])):
+                turn = [(name, [[*command, 'stop'], [*command, 'read', 'drive0', 'ramp_time'],
+                                [*command, 'write', 'drive0', f'ramp_time={value}']])
+                        for name, command in who.items()]
+                turn.append(('bare', [[*bare, 'stop'], [*bare, 'read'], [*bare, 'write', value]]))
+                for each, commands in turn[::1 - 2 * (number % 2)]:
                     if not stopper.ask('enable'):
                         raise SystemExit('the drive was not enabled')
                     bus.drives[0].ask('clear')
-                    if who == 'bare':   # as much Python as nobody does without
+                    if each == 'bare':   # as much Python as nobody does without
                         begun = time.monotonic()
-                        subprocess.run([sys.executable, '-c', 'import socket'], check=True)
+                        _typed([sys.executable, '-c', 'import socket'])
                         found['floor'].append(time.monotonic() - begun)
-                    for name, command in zip(('stop', 'read', 'write'), words):
+                    for name, command in zip(('stop', 'read', 'write'), commands):
                         begun = time.monotonic()
-                        subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
+                        _typed(command)
                         elapsed = time.monotonic() - begun
                         if name == 'stop':
-                            found['stop done'][who].append(elapsed)
+                            found['stop done'][each].append(elapsed)
                             elapsed = min(bus.drives[0].ask('stops'), default=math.inf) - begun
-                        found[name][who].append(elapsed)
+                        found[name][each].append(elapsed)
+    return found
+
+
+def _typed(command: Sequence[str]) -> tuple[int, str]:
+    """Run a command as a shell does, nowhere near these sources."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          check=False, cwd='/')
+    return done.returncode, done.stdout
+
+
+def one_hangs(load: Load, rounds: int) -> dict[str, Any]:
+    """Measure a stop where one of two bridges is suspended: the other's drives, and the end."""
+    found: dict[str, Any] = {'stop': [], 'done': [], 'named': 0}
+    with ExitStack() as stack:
+        bus = Bus(stack, replace(load, drives=2 * load.drives, buses=2))
+        with (bridge_under(replace(load, drives=2 * load.drives, buses=2), bus,
+                           *bus.files_each()) as bridges, child('stopper.py') as stopper):
+            hung = bridges.processes[1].process
+            for _ in range(rounds):
+                if not stopper.ask('enable'):
+                    raise SystemExit('the drive was not enabled')
+                bus.drives[0].ask('clear')
+                hung.send_signal(signal.SIGSTOP)
+                try:
+                    time.sleep(0.1)
+                    begun = time.monotonic()
+                    _, told = _typed([*DRIVE_CAN, 'stop'])
+                    found['done'].append(time.monotonic() - begun)
+                finally:
+                    hung.send_signal(signal.SIGCONT)
+                found['stop'].append(min(bus.drives[0].ask('stops'), default=math.inf) - begun)
+                found['named'] += 'drive_can_bridge_bus1: NOT STOPPED' in told
+                time.sleep(SETTLE)
+    return found
+
+
+def busy_hand(load: Load, commands: int, loops: int) -> dict[str, Any]:
+    """Measure stops that a person types at low priority, beside so many processes that compute."""
+    found: dict[str, Any] = {'done': [], 'failed': 0, 'loops': loops}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        stack.enter_context(bridge_under(load, bus))
+        for _ in range(loops):
+            loop = subprocess.Popen(    # in another terminal
+                [sys.executable, '-c', 'while True: pass'], start_new_session=True)
+            stack.callback(loop.wait)
+            stack.callback(loop.kill)
+        for _ in range(commands):
+            begun = time.monotonic()
+            code, _ = _typed(['nice', '-n', '10', *DRIVE_CAN, 'stop'])
+            found['done'].append(time.monotonic() - begun)
+            found['failed'] += code != 0
     return found
 
 

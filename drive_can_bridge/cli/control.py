@@ -200,8 +200,10 @@ class _RosStop:
         there = ', '.join(node.lstrip('/') for node in dict.fromkeys(drives)) or 'none'
         told += [Answer(word, False, f'no such drive; there are: {there}') for word in args.words
                  if known and not any(matches(word, node) for node in nodes)]
-        if not known and not told:
-            told.append(Answer('', False, nobody(args.namespace), bridge=True))
+        own = any(each.domain in (None, local.domain) for each in local.present)
+        if not known and (not told or not own and stop is not None):
+            # those of other domains may be all that there are, or discovery was too slow
+            told.append(Answer('', bool(told), nobody(args.namespace), bridge=True))
         return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
                         for name in known]
 

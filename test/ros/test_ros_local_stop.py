@@ -69,6 +69,18 @@ def test_other_domains_are_stopped_too_unless_something_is_named(
     assert locally.asked == [['stop', '*', 'lift']]
 
 
+def test_where_only_other_domains_have_bridges_it_is_said_that_this_one_has_none(
+        bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = bridge(parameters(lift=LIFT), arguments=('-r', '__ns:=/b'))
+    there.online()
+    domain = there.context.get_domain_id()
+    locally(there)
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain + 1))
+    assert run('stop') == (0, [
+        f'[domain {domain}] b/lift: ready',
+        f'no configured bridge is running (ROS domain {domain + 1})'], '')
+
+
 def test_one_that_hangs_is_named_after_a_second(
         bridge: StartBridge, run: Run, locally: Lines, bench: Any) -> None:
     one = bridge(parameters(lift=LIFT))

@@ -8,6 +8,8 @@ from by_hand import Line, Lines, no_ros, Run
 from clients import Client, LATCHED, wait_until
 from graph_builders import answer, hang, offer
 import pytest
+from rcl_interfaces.msg import ParameterEvent
+import rclpy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 import waiting
@@ -92,13 +94,19 @@ def test_one_of_another_host_that_hangs_is_named_and_the_others_are_stopped(
         bench: Any) -> None:
     far = Far(client, '/far/bridge', 'hoist')
     hang(client, '/mute/bridge')
+    belt = rclpy.create_node('belt', namespace='/mute', context=client.node.context,
+                             enable_rosout=False, start_parameter_services=False)
+    belt.create_service(Trigger, '~/quick_stop', lambda _, response: response)  # nobody spins it
+    belt.create_publisher(ParameterEvent, '~/response', 10)
     seen(here, far.name, '/mute/bridge')
     locally(here)
     no_ros(monkeypatch)
     began = bench.clock.now()
     assert run('stop') == (1, [
         'mute/bridge: NOT STOPPED: this bridge does not answer: its drives may still be running',
+        'mute/belt: NOT STOPPED: no answer yet: may still be running',
         'lift: ready', 'far/hoist: stopped'], '')
+    belt.destroy_node()
     assert 1.0 <= bench.clock.now() - began < 1.5
     assert far.stops == {'hoist': 1}
 

@@ -103,7 +103,7 @@ class Stop:
     :param words: names, patterns or full names of the drives; none: all.
     :param expected: bridges that are there, whether they are in the graph or not.
     :param only: the bridges that are meant; None: all.
-    :param patience: s that a bridge has to answer; None: a few.
+    :param patience: s that a bridge has to answer, and its drives with it; None: a few.
     """
 
     def __init__(self, client_node: Seeing, namespace: str | None, words: Sequence[str],
@@ -113,6 +113,8 @@ class Stop:
         check_is_valid_srv_type(Trigger)    # takes its time, while the graph is being discovered
         self._words = words
         self._search = Search(client_node, namespace, expected, only=only, patience=patience)
+        #: drives of a bridge that has not answered are not waited for either
+        self._hurried = patience is not None
         self._drives: dict[str, _Stopping] = {}
         self._elsewhere: set[str] = set()
 
@@ -134,7 +136,8 @@ class Stop:
         for drive in self._drives.values():
             drive.look(now)
         return ((self._search.settled or self._search.over(now))
-                and all(drive.answer for drive in self._drives.values()))
+                and all(drive.answer or self._hurried and node not in self.drives
+                        for node, drive in self._drives.items()))
 
     def _seen(self) -> list[str]:
         """Return drives that are new in the graph, in the namespaces of bridges."""
