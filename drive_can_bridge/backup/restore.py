@@ -25,12 +25,12 @@ from drive_can_bridge.backup.document import (
     Backup, Head, in_order, is_command, is_setting, is_whole, mode_bits, ModeBits, modes_of,
     raw_in_file)
 from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
 from drive_can_bridge.core.requests import Failure, FailureKind
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.core.text import printable, value_text
 
 #: s that a drive which has gone away is waited for, so that it is not left in a mode
@@ -39,9 +39,8 @@ _PATIENCE_STEP = 0.5
 #: times that a step afterwards is written to a drive of which nothing is heard, for its cells may
 #: wear, and to one that is there and does not answer it
 _ATTEMPTS = 3
-_NO_PARAMETER = Failure(FailureKind.INVALID, uncoded('the drive has no such parameter'))
-_NO_BITS = Failure(
-    FailureKind.INVALID, uncoded('cannot be read, so its other bits cannot be kept'))
+_NO_PARAMETER = Failure(FailureKind.INVALID, sentences.drive_has_not())
+_NO_BITS = Failure(FailureKind.INVALID, sentences.other_bits_lost())
 
 
 class LeftAlone(Enum):
@@ -325,8 +324,8 @@ class FailedStep:
 
 
 _NOT_ATTEMPTED = {
-    StepKind.AFTER: Failure(FailureKind.INVALID, uncoded('not set back')),
-    StepKind.STORE: Failure(FailureKind.INVALID, uncoded('not written'))}
+    StepKind.AFTER: Failure(FailureKind.INVALID, sentences.not_set_back()),
+    StepKind.STORE: Failure(FailureKind.INVALID, sentences.not_written())}
 _FOLLOWS = {
     StepKind.BEFORE: 'No setting was written',
     StepKind.AFTER: 'Look at it by hand: the drive may still be in the mode in which settings '
@@ -479,7 +478,7 @@ class Restorer:
         except KeyboardInterrupt:
             self._interrupted = True
             # the write under way is known before this is raised
-            outcome = heard[0] if heard else WriteOutcome(name, False, reason='interrupted')
+            outcome = heard[0] if heard else WriteOutcome(name, False, reason=sentences.interrupted())
         except DriveCanError:
             if heard and name not in self._result.written:
                 self._result.unconfirmed.append(name)
@@ -663,7 +662,7 @@ class Restorer:
         if self._lost:
             self._result.wrong += [
                 NotAsInFile(change.name, change.value, None,
-                            self._reasons.get(change.name, 'the drive answers no more'))
+                            self._reasons.get(change.name, sentences.answers_no_more()))
                 for change in self._plan.changes if change.name not in self._result.written]
             return
         self._result.wrong += self._plan.absent
@@ -681,7 +680,7 @@ class Restorer:
 
 
 def _failure(outcome: ReadOutcome | WriteOutcome) -> Failure:
-    return Failure(outcome.kind or FailureKind.INVALID, uncoded(outcome.reason))
+    return Failure(outcome.kind or FailureKind.INVALID, sentences.uncoded(outcome.reason))
 
 
 def _is(outcome: ReadOutcome, word: int) -> bool:

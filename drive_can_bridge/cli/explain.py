@@ -14,7 +14,6 @@ from pathlib import Path
 import re
 from string import Formatter
 from types import ModuleType
-from typing import NamedTuple
 
 from drive_can_bridge.cli.command import complain, FAILED, print_json, say
 from drive_can_bridge.core import complaints, sentences
@@ -26,7 +25,7 @@ ABOUT: dict[str, ModuleType] = {'drives and buses': sentences, 'files': complain
 PAGE = Path('docs', 'messages.md')
 #: codes that are named, and rows that are shown, where none is the one
 _NEAREST = 5
-#: letters that a text has to have in common with a row
+#: letters that are enough to look for
 _ENOUGH = 6
 _HEADING = re.compile(r'# -- (.*?)(?: -+)?')
 _ROW = re.compile(r'(\w+) = Text\(')
@@ -54,18 +53,6 @@ _FILES = """
 `drive_can validate` and the bridge say it with file, line and key; each text says what is allowed.
 """
 _TABLE = ['', '| code | text | what to do |', '|---|---|---|']
-
-
-class _Match(NamedTuple):
-    """
-    A row that a text may be made of.
-
-    :ivar places: of the characters that it has in common with the text.
-    """
-
-    places: frozenset[int]
-    about: str
-    row: Text
 
 
 def define(parser: ArgumentParser) -> None:
@@ -129,35 +116,9 @@ def _with_words(text: str) -> list[tuple[str, Text]]:
 
 def _said_in(text: str) -> list[tuple[str, Text]]:
     """Return the rows that a line may be made of: those that have most in common with it first."""
-    matches = sorted(_matches(text), key=lambda each: -len(each.places))
-    return [(match.about, match.row) for match in matches
-            if not any(match.places < other.places for other in matches)]
-
-
-def _matches(text: str) -> Iterator[_Match]:
-    for about, row in _rows():
-        fitting = [places for form in row.texts if (places := _in_common(form, text))]
-        if fitting:
-            yield _Match(max(fitting, key=len), about, row)
-
-
-def _in_common(form: str, text: str) -> frozenset[int]:
-    """Return where the letters of a form stand in a text; nothing: it is not made of it."""
-    pieces = list(Formatter().parse(form))
-    if (sum(each.isalpha() for before, *_ in pieces for each in before) < _ENOUGH
-            or not all(before in text for before, *_ in pieces)):   # a regex takes long to say so
-        return frozenset()
-    pattern = ''
-    for before, name, spec, _ in pieces:
-        pattern += f'({re.escape(before)})'
-        if name and (spec or '').startswith('#'):
-            pattern += rf'\d+( {re.escape((spec or "")[1:])}\w*)'
-        elif name and spec != '?':
-            pattern += '.+?'
-    found = re.search(pattern, text)
-    return frozenset() if found is None else frozenset(
-        place for group in range(1, found.re.groups + 1) for place in range(*found.span(group))
-        if text[place].isalpha())
+    fitting = [(places, about, row) for about, row in _rows() if (places := row.places(text))]
+    return [(about, row) for places, about, row in sorted(fitting, key=lambda each: -len(each[0]))
+            if not any(places < others for others, *_ in fitting)]
 
 
 def forms(row: Text) -> list[str]:

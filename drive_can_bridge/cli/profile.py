@@ -246,7 +246,8 @@ def _size(checked: Checked) -> str:
 
 
 def _problem(problem: Problem) -> dict[str, Any]:
-    return {'line': problem.line, 'key': problem.key, 'message': problem.message}
+    return {'line': problem.line, 'key': problem.key, 'message': problem.message,
+            'code': problem.message.code}
 
 
 # -- import ---------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core.sentences import code_of
 from drive_can_bridge.core.text import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
@@ -108,7 +109,7 @@ def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
         'subindex': parameter.subindex if parameter else None,
         'storage': parameter.storage.value if parameter and parameter.storage else None,
         'description': parameter.description if parameter else '',
-        'reason': outcome.reason}
+        'reason': outcome.reason, 'code': code_of(outcome.reason)}
 
 
 def _shown(outcome: ReadOutcome) -> str:

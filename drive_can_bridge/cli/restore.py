@@ -16,6 +16,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.text import counted, printable, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
@@ -216,7 +217,7 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
 def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreResult,
             interrupted: Interruption) -> int:
     wrong = {each.name: each for each in result.wrong}
-    why = 'was enabled meanwhile' if result.enabled else 'interrupted'
+    why = sentences.enabled_meanwhile() if result.enabled else sentences.interrupted()
     if args.json:
         # what nothing was compared after is told by what was written
         early = str(result.trouble or ('' if result.stopped is None else why))
@@ -272,7 +273,7 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
 
 def _reason(wrong: NotAsInFile, result: RestoreResult) -> str:
     ignored = wrong.found is not None and wrong.name in result.written
-    return wrong.reason or ('acknowledged, and not taken' if ignored else '')
+    return wrong.reason or (sentences.acknowledged_not_taken() if ignored else '')
 
 
 def _is_volatile(drive: Drive, parameter: Parameter) -> bool:
@@ -284,7 +285,7 @@ def _is_volatile(drive: Drive, parameter: Parameter) -> bool:
 def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wanted: Value,
                    reason: str) -> None:
     print_json({'drive': drive.name, 'parameter': name, 'ok': ok, 'found': found,
-                'wanted': wanted, 'reason': reason})
+                'wanted': wanted, 'reason': reason, 'code': sentences.code_of(reason)})
 
 
 def _with_unit(drive: Drive, name: str, value: Value) -> str:

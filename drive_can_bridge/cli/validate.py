@@ -27,7 +27,7 @@ def define(parser: ArgumentParser) -> None:
     parser.add_argument('--json', action='store_true', help=(
         'a JSON document a line: drive, bus, interface, channel, protocol, station, profile, '
         'period, request, response, load_percent; or level (warning, error), file, line, key, '
-        'message'))
+        'message, code'))
 
 
 def run(args: Namespace) -> int:
@@ -89,7 +89,8 @@ def _place(level: str, problem: str) -> dict[str, Any]:
     file, line, key = where.get('file', ''), where.get('line'), where.get('key', '')
     before = str(Problem(file, line or 0, key, NOTHING))
     return {'level': level, 'file': file or None, 'line': line if file else None,
-            'key': key or None, 'message': problem.removeprefix(before)}
+            'key': key or None, 'message': problem.removeprefix(before),
+            'code': problem.code if isinstance(problem, Sentence) else ''}
 
 
 def _names(parameters: tuple[Parameter, ...]) -> str:

@@ -12,6 +12,7 @@ from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutc
 from drive_can_bridge.configuration.scalars import read_scalar
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.core.requests import FailureKind
+from drive_can_bridge.core.sentences import code_of
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
@@ -158,7 +159,7 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
         if args.json:
             print_json({'drive': drive.name, 'name': outcome.name,
                         'value': _shown(parameter, wanted[outcome.name]), 'ok': outcome.ok,
-                        'reason': outcome.reason})
+                        'reason': outcome.reason, 'code': code_of(outcome.reason)})
             continue
         result = outcome.reason or 'written'
         refused = not outcome.ok and outcome.trouble is None

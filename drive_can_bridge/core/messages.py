@@ -21,6 +21,7 @@ A sentence that gives the reason of another one has it among its fields, code an
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from itertools import cycle
+import re
 from string import Formatter
 from typing import Any
 
@@ -57,6 +58,9 @@ class Sentence(str):
 
 #: what a way to write a number is made of; anything else joins
 _NUMBERS = '.,0123456789Xgf'
+
+#: letters that a text with something else in it has in common with one of a row
+_ENOUGH = 6
 
 #: where there is nothing to be said
 NOTHING = Sentence()
@@ -106,6 +110,40 @@ class Text:
                    if name in self.optional):
                 return Sentence(variant.write(fields), self.code, fields, variant.kind, self)
         return Sentence(self._last.write(fields), self.code, fields, self._last.kind, self)
+
+    def places(self, text: str, *, whole: bool = False) -> frozenset[int]:
+        """
+        Return where the letters of this row stand in a text; nothing: it is not made of it.
+
+        :param whole: nothing else is to stand there.
+        """
+        return max((_places(each, text, whole) for each in self.texts), key=len)
+
+
+def code_of(text: str, rows: Iterable[Text]) -> str:
+    """Return the code of the row that a mere text is of, as it comes through ROS; '': of none."""
+    fitting = sorted((len(row.places(text, whole=True)), row.code) for row in rows)
+    *_, (next_best, _), (best, code) = fitting
+    return code if best > next_best else ''
+
+
+def _places(form: str, text: str, whole: bool) -> frozenset[int]:
+    pieces = list(Formatter().parse(form))
+    letters = sum(each.isalpha() for before, *_ in pieces for each in before)
+    if letters < (1 if whole and len(pieces) == 1 and pieces[0][1] is None else _ENOUGH) or (
+            not all(before in text for before, *_ in pieces)):      # a regex takes long to say so
+        return frozenset()
+    pattern = ''
+    for before, name, spec, _ in pieces:
+        pattern += f'({re.escape(before)})'
+        if name and (spec or '').startswith('#'):
+            pattern += rf'\d+( {re.escape((spec or "")[1:])}\w*)'
+        elif name and spec != '?':
+            pattern += '.+?'
+    found = (re.fullmatch if whole else re.search)(pattern, text)
+    return frozenset() if found is None else frozenset(
+        place for group in range(1, found.re.groups + 1) for place in range(*found.span(group))
+        if text[place].isalpha())
 
 
 class _Variant:

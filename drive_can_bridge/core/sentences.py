@@ -9,7 +9,8 @@ docs/messages.md is made of them.
 from collections.abc import Mapping
 from enum import Enum
 
-from drive_can_bridge.core.messages import catalogue, Text
+from drive_can_bridge.core import messages
+from drive_can_bridge.core.messages import catalogue, Sentence, Text
 
 
 class Absence(Enum):
@@ -1097,5 +1098,28 @@ setpoint_of_bridge = Text('sent cyclically: a setpoint', do='publish it, or use 
 word_of_bridge = Text('control word: use ~/enable', do='use drive_can enable, disable, stop')
 map_of_bridge = Text('a map: not written while the bridge runs', do='use mapping configure')
 
+# -- a restore: why a setting is not as in the file -----------------------------------------------
+drive_has_not = Text('the drive has no such parameter', do='nothing; its firmware is another one')
+other_bits_lost = Text(
+    'cannot be read, so its other bits cannot be kept',
+    do='see why the drive does not answer, then restore again')
+not_set_back = Text('not set back', do='set the mode back by hand, then restore again')
+not_written = Text('not written', do='restore again when the reason of the others is gone')
+interrupted = Text('interrupted', do='restore again: only what differs is written')
+enabled_meanwhile = Text('was enabled meanwhile', do='disable the drive, then restore again')
+answers_no_more = Text(
+    'the drive answers no more',
+    do='see what it does after that write; power it up again, then restore again')
+acknowledged_not_taken = Text(
+    'acknowledged, and not taken',
+    do='see in the manual in which state or mode the drive takes it (section restore of a profile)')
+
 #: all sentences there are, by their codes
 CODES = catalogue(globals())
+
+
+def code_of(text: str) -> str:
+    """Return the code of a text for people, also of one that came through ROS; '': it has none."""
+    if isinstance(text, Sentence) and text.row not in (None, uncoded):
+        return text.code
+    return messages.code_of(text, CODES.values()) if text else ''

@@ -109,11 +109,11 @@ class TestRestore:
         monkeypatch.setattr(DirectDrive, 'put', ending)
         said = command('restore', str(file), '--yes', '--json')
         assert said.code == (1 if why else 128 + signal.SIGINT)
-        reason = why or 'interrupted'
+        reason, code = why or 'interrupted', '' if why else 'interrupted'
         assert [each for each in said.documents if 'ok' in each] == [
             {'drive': 'conveyor', 'parameter': name, 'ok': not unwritten,
              'found': None if unwritten else wanted, 'wanted': wanted,
-             'reason': reason if unwritten else ''}
+             'reason': reason if unwritten else '', 'code': code if unwritten else ''}
             for name, wanted, unwritten in (
                 ('ramp_time', 2.5, False), ('maximum_speed', 900.0, True),
                 ('brake_enabled', True, True))]

@@ -245,6 +245,15 @@ def test_which_looks_are_found(line: str) -> None:
     assert [at for at, _ in looks_into_texts(ast.parse(line))] == [1]
 
 
+@pytest.mark.parametrize(('text', 'code'), [
+    (sentences.no_answer(0.1, 3), 'no_answer'), ('no answer in 0.1 s, 3 attempts', 'no_answer'),
+    ('busy', 'busy'), ('homed', 'homed'), ('', ''), ('what nobody says', ''),
+    ('interrupted', ''),        # of two commands
+    (sentences.interrupted(), 'interrupted'), (sentences.uncoded('bus down'), 'bus_down')])
+def test_the_code_of_a_text_that_came_through_ros(text: str, code: str) -> None:
+    assert sentences.code_of(text) == code
+
+
 def test_a_kind_is_that_of_the_form_and_a_sentence_gets_further_fields() -> None:
     said = sentences.no_heartbeat(0.1)
     assert said.kind is Absence.NO_HEARTBEAT and said.also(answers=True).kind is Absence.ANSWERS
