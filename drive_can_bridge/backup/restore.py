@@ -478,7 +478,8 @@ class Restorer:
         except KeyboardInterrupt:
             self._interrupted = True
             # the write under way is known before this is raised
-            outcome = heard[0] if heard else WriteOutcome(name, False, reason=sentences.interrupted())
+            outcome = heard[0] if heard else WriteOutcome(
+                name, False, reason=sentences.interrupted())
         except DriveCanError:
             if heard and name not in self._result.written:
                 self._result.unconfirmed.append(name)

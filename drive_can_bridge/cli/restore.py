@@ -220,7 +220,9 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     why = sentences.enabled_meanwhile() if result.enabled else sentences.interrupted()
     if args.json:
         # what nothing was compared after is told by what was written
-        early = str(result.trouble or ('' if result.stopped is None else why))
+        early = '' if result.stopped is None else why
+        if result.trouble is not None:
+            early = result.trouble.sentence
         for change in plan.changes:
             if change.name in result.unconfirmed:
                 _print_outcome(drive, change.name, False, None, change.value, NOT_CONFIRMED)

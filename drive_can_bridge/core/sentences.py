@@ -1112,14 +1112,14 @@ answers_no_more = Text(
     do='see what it does after that write; power it up again, then restore again')
 acknowledged_not_taken = Text(
     'acknowledged, and not taken',
-    do='see in the manual in which state or mode the drive takes it (section restore of a profile)')
+    do='see in the manual in which state or mode the drive takes it (restore: of a profile)')
 
 #: all sentences there are, by their codes
 CODES = catalogue(globals())
 
 
 def code_of(text: str) -> str:
-    """Return the code of a text for people, also of one that came through ROS; '': it has none."""
+    """Return the code of a text for people, also where it came through ROS; '': it has none."""
     if isinstance(text, Sentence) and text.row not in (None, uncoded):
         return text.code
     return messages.code_of(text, CODES.values()) if text else ''
