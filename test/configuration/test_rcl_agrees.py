@@ -75,9 +75,11 @@ REFUSED = [
     '    "": 1\n', '    ? [a]\n    : 1\n', 'x:\n', 'x:\n  a: 1\n',
     'x y:\n  ros__parameters: {a: 1}\n', '//x:\n  ros__parameters: {a: 1}\n',
     '/x/:\n  ros__parameters: {a: 1}\n', 'x:\n  ros__parameters: 5\n', 'ros__parameters: {a: 1}\n',
-    'x:\n  ros__parameters: {a: [1, x]}\n', '  a: {ros__parameters: {b: 1}}\n',
+    'x:\n  ros__parameters: {a: [1, x]}\n',
     '    a: b: c\n', '    a: "open\n', '  \ta: 1\n', '    a: @x\n',
 ]
+#: refused by us and by rcl 9.2.8 (Jazzy); passed over by rcl 10.1.3 (Kilted), which nobody means
+PASSED_OVER = ['  a: {ros__parameters: {b: 1}}\n']
 GARBLED = [
     '    a: {}\n    b: 1\n', '    a: {b: {}, c: 1}\n', '    a: 1\n    a: x\n',
     '    a: 1\n    a: {b: 2}\n', '    a: "x\\0y"\n', '    a: [{a: 1}]\n',
@@ -93,7 +95,7 @@ def rcl(tmp_path_factory: pytest.TempPathFactory, programs: None) -> dict[str, A
     """Return what rcl reads from every document; None where it refuses."""
     pytest.importorskip('rclpy')
     folder = tmp_path_factory.mktemp('documents')
-    documents = [*TAKEN, *REFUSED, *GARBLED]
+    documents = [*TAKEN, *REFUSED, *PASSED_OVER, *GARBLED]
     paths = []
     for number, document in enumerate(documents):
         path = folder / f'{number}.yaml'
@@ -133,6 +135,12 @@ def test_both_read_the_same(tmp_path: Path, rcl: dict[str, Any], document: str) 
 @pytest.mark.parametrize('document', REFUSED)
 def test_both_refuse(tmp_path: Path, rcl: dict[str, Any], document: str) -> None:
     assert rcl[document] is None
+    assert ours(tmp_path, document)[1] != []
+
+
+@pytest.mark.parametrize('document', PASSED_OVER)
+def test_nothing_is_passed_over(tmp_path: Path, rcl: dict[str, Any], document: str) -> None:
+    assert not [name for name in rcl[document] or () if name.endswith('b')]
     assert ours(tmp_path, document)[1] != []
 
 
