@@ -153,8 +153,8 @@ ROWS: tuple[Row, ...] = (
         'stamps of the other computer; no more of an error than its class; a gateway that ends is '
         'told; the bridge speaks its protocol itself, because python-can waits without a limit',
         '`tcp_tune: true` is the default (without it every second frame is 40 ms late)',
-        'the protocol by the source of socketcand 6dd5d33; fakes of it, and one on a real vcan0, '
-        'in CI', options=(('host', '10.0.0.5'), ('port', 29536))),
+        'the protocol by the source of socketcand 6dd5d33; fakes of it, and one over TCP at speed '
+        '(bench)', options=(('host', '10.0.0.5'), ('port', 29536))),
     Row('udp_multicast', 'frames in UDP multicast: no hardware', 'udp_multicast', '239.74.163.2',
         "nobody acknowledges, frames may be lost or doubled; needs the module msgpack; one's own "
         'frames are told by the address', 'only to try things; never for a motor', SOURCE),
