@@ -17,7 +17,7 @@ from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.process.local_stop import Answer
 from drive_can_bridge.process.local_way import (
     END, Line, NO, PATIENCE, Rubbish, value_of, value_text)
-from drive_can_bridge.process.orders import CONTROL_TIMEOUT, unoffered
+from drive_can_bridge.process.orders import CONTROL_TIMEOUT, unanswered, unoffered
 from drive_can_bridge.process.presence import (
     bridges, in_namespace, own_domain, Present, switched_on)
 
@@ -334,7 +334,7 @@ class LocalWays:
         asked: dict[_Bridge, list[str]] = {}
         for node in nodes:
             asked.setdefault(self._at[node], []).append(node)
-        answers = {node: Answer(node, False, 'no answer') for node in nodes}
+        answers = {node: Answer(node, False, 'no answer: its bridge has gone') for node in nodes}
         waiting = []
         for bridge, names in asked.items():
             try:
@@ -348,6 +348,8 @@ class LocalWays:
                 for kind, name, *words in bridge.answers(until):
                     answers[name] = (unoffered(name, order) if kind == 'unoffered'
                                      else Answer(name, words[0] == '1', words[2]))
+            except TimeoutError:
+                answers.update((node, unanswered(node, CONTROL_TIMEOUT)) for node in asked[bridge])
             except (OSError, *_SENSELESS):
                 continue
         return [answers[node] for node in nodes]

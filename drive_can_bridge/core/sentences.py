@@ -808,7 +808,7 @@ frames_rejected = Text(
     '{frames} frames rejected, the last: {last}; check for a second station with the same number',
     do='check for a second station with the same number')
 answer_late = Text(
-    'answer {seconds} ms after its period: the computer or the drive is too slow',
+    'answer {seconds} ms after its period: the computer, the adapter or the drive is too slow',
     seconds=_milliseconds,
     do='choose a longer period, or see what else the computer does')
 answers_late = Text(
@@ -826,6 +826,26 @@ answer_kept = Text(
     seconds=_milliseconds,
     latency=lambda seconds: f'{1e3 * seconds:g}',
     do='run that command, for good by a udev rule (docs/adapters.md), or choose a longer period')
+more_missed_would_hold = Text(
+    'answered again {gap:.2g} s after its last answer: if the computer or the adapter is slow, '
+    'missed_limit: {limit} would have held (a drive that is gone is lost after {seconds:.2g} s '
+    'then)',
+    do='raise missed_limit, or see what else the computer does')
+longer_period_would_hold = Text(
+    'it answered {late:.2g} s after its period: period: {period:g} would have held',
+    do='raise period, or see what else the computer does')
+longer_timeout_would_hold = Text(
+    'its heartbeat is back, {gap:.2g} s after the last: if the computer or the adapter is slow, '
+    'heartbeat_timeout: {timeout:g} would have held',
+    do='raise heartbeat_timeout, or see what else the computer does')
+longer_beat_would_hold = Text(
+    'the drive missed the heartbeat of the bridge, which was {gap:.2g} s without one: '
+    'bridge_heartbeat: {interval:g} would have held',
+    do='raise bridge_heartbeat, or see what else the computer does')
+beats_were_sent = Text(
+    'the drive missed the heartbeat of the bridge, although that was never {gap:.2g} s without '
+    'one: look at bus load and adapter, and at what the drive watches (1016h)',
+    do='look at bus load and adapter; see how long 1016h of the drive waits, and for whom')
 
 # -- a setpoint held by hand (drive_can jog) ------------------------------------------------------
 
@@ -988,14 +1008,14 @@ ros_does_not_start = Text(
     'ROS does not start: {why}',
     do='correct what it says of ROS_DOMAIN_ID, RMW_IMPLEMENTATION or the installation')
 silent_and_holds = Text(
-    '{name}: {how}, and holds its drives',
+    '{name}: {how}, and holds its drives (the computer may be busy)',
     do='see whether that process hangs; end it and start the bridge again')
 several_not_all_answer = Text(
     'several bridges are running: {names:, }, and not every one answers: {silent:, }',
     do='choose one with --namespace; see why the others do not answer')
 node_unanswering = Text(
-    '{node} does not answer for {timeout:g} s',
-    do='see whether the bridge hangs')
+    '{node} does not answer for {timeout:g} s (the computer may be busy)',
+    do='see what else the computer does, and whether the bridge hangs')
 no_such_service = Text(
     '{node} does not offer {service}',
     do='see whether it is a drive of a bridge, and of this version')

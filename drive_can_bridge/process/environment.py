@@ -63,11 +63,20 @@ def export_command() -> str:
     return f'export {" ".join(settings)}' if settings else ''
 
 
-def nobody(namespace: str | None, silent: Sequence[str] = ()) -> str:
-    """Say that there is no bridge, or none that answers."""
+#: why somebody may not have answered yet
+BUSY = 'the computer may be busy'
+
+
+def nobody(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
+    """
+    Say that there is no bridge, or none that answers.
+
+    :param silent: those that do not answer.
+    :param waited: for so many s.
+    """
     where = '' if namespace is None else f' in namespace {namespace or "/"}'
     domain = os.environ.get(DOMAIN_ID) or '0'
     if silent:
         return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
-                f'{"does" if len(silent) == 1 else "do"} not')
+                f'{"does" if len(silent) == 1 else "do"} not, for {waited:.0f} s ({BUSY})')
     return f'no configured bridge is running{where} (ROS domain {domain})'

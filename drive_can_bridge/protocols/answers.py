@@ -13,6 +13,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook
+from drive_can_bridge.protocols.slack import Slack
 
 
 class Answers:
@@ -23,15 +24,19 @@ class Answers:
     :param advice: what to look at then.
     :param in_turn: not each cycle asks this drive: the one that asks it settles the one before.
     :param timer: says when cycles are due, where others are in step; None: one of its own.
+    :param period_max: the longest period that is allowed for this drive.
     :ivar session: of the drive.
     :ivar book: counts the cycles, and the answers.
+    :ivar slack: says what would have held.
     :ivar due: when the answer counts as missed; infinity: with the next cycle, or there is none.
     :ivar heeded: an answer to a cycle shows that what the drive was told by it has arrived.
     """
 
     def __init__(self, session: Session, *, silence: str, advice: str = '',
-                 in_turn: bool = False, timer: CycleTimer | None = None) -> None:
+                 in_turn: bool = False, timer: CycleTimer | None = None,
+                 period_max: float = math.inf) -> None:
         self.session = session
+        self.slack = Slack(session.configuration, session.report, period_max)
         self.book = ExchangeBook(session.configuration, session.statistics, timer)
         self.heeded = True
         self._silent = sentences.silent(silence, advice)
@@ -71,6 +76,10 @@ class Answers:
         late = self.book.late(received_at)
         if late is not None or not self.book.take_stale():
             self.session.report.unasked(sentences.unasked(what), late, now)
+        if self.slack.since < math.inf:
+            self.slack.came(received_at)
+        elif late and self.session.online:
+            self.slack.late(late)
         self._heed()
         return False
 
@@ -80,8 +89,12 @@ class Answers:
         missed = not book.awaiting
         book.answered(received_at)
         book.heard(received_at)
+        if self.slack.since < math.inf:
+            self.slack.came(received_at)
         if missed:
             self.session.report.unasked(NOTHING, book.overdue, received_at)
+            if book.overdue > 0.0 and self.session.online:
+                self.slack.late(book.overdue)
         self._heed()
 
     @property
@@ -120,6 +133,8 @@ class Answers:
             too_many = book.missed()
             if session.stage is not Stage.STOPPING:
                 limit = session.configuration.missed_limit
+                if too_many and session.online:
+                    self.slack.lost(book.answered_at)
                 session.exchange_missed(
                     sentences.silent_for_cycles(self._silence, limit) if too_many else NOTHING,
                     now)

@@ -123,6 +123,7 @@ class ExchangeBook:
     :param timer: says when they are due; None: one of its own.
     :ivar timer: when the next one is due.
     :ivar began_at: when the last one began.
+    :ivar answered_at: when an answer came last.
     :ivar missed_in_row: how many went unanswered since the last answer.
     :ivar awaiting: the answer to a cycle has not come yet.
     :ivar overdue: how late the last answer was, in s.
@@ -132,13 +133,13 @@ class ExchangeBook:
 
     __slots__ = (
         '_asked', '_came', '_given_up', '_heard_at', '_horizon', '_kept', '_limit', '_period',
-        '_runs', '_since', '_statistics', '_steady', 'awaiting', 'began_at', 'missed_in_row',
-        'overdue', 'stale', 'stop_shown', 'timer')
+        '_runs', '_since', '_statistics', '_steady', 'answered_at', 'awaiting', 'began_at',
+        'missed_in_row', 'overdue', 'stale', 'stop_shown', 'timer')
 
     def __init__(self, drive: DriveConfiguration, statistics: DriveStatistics,
                  timer: CycleTimer | None = None) -> None:
         self.timer = timer or CycleTimer(drive.period)
-        self.began_at = -math.inf
+        self.began_at = self.answered_at = -math.inf
         self.missed_in_row = 0
         self.awaiting = False
         self.stale = 0
@@ -261,6 +262,7 @@ class ExchangeBook:
         """Record the answer that completes an exchange."""
         self.awaiting = False
         self.missed_in_row = 0
+        self.answered_at = received_at
         statistics = self._statistics
         statistics.exchanges += 1
         latency = received_at - self.began_at

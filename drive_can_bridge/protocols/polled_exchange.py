@@ -19,6 +19,7 @@ from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.exchange_book import ExchangeBook
+from drive_can_bridge.protocols.slack import Slack
 
 #: s by which sums of times are wrong
 TOLERANCE = 1e-6
@@ -116,6 +117,7 @@ class PolledExchange:
 
     :ivar timer: when the next round is due.
     :ivar reading: a round is under way.
+    :ivar slack: says what would have held.
     :ivar received_at: when the last answer was received.
     """
 
@@ -123,6 +125,7 @@ class PolledExchange:
         self._session, self._rounds = session, rounds
         self._channel = channel
         self._book = ExchangeBook(session.configuration, session.statistics)
+        self.slack = Slack(session.configuration, session.report)
         self._void = False  # this round began before the process stood still
         self.timer = self._book.timer
         self.reading = False
@@ -172,6 +175,7 @@ class PolledExchange:
             self._miss(now)
             return
         self.forget()
+        self.slack.came(self.received_at)
         fresh = not session.online
         if fresh:
             if not self._rounds.present:
@@ -189,4 +193,7 @@ class PolledExchange:
 
     def _miss(self, now: float) -> None:
         session, limit = self._session, self._session.configuration.missed_limit
-        session.exchange_missed(sentences.no_round(limit) if self._book.missed() else NOTHING, now)
+        too_many = self._book.missed()
+        if too_many and session.online:
+            self.slack.lost(self._book.answered_at)
+        session.exchange_missed(sentences.no_round(limit) if too_many else NOTHING, now)

@@ -45,7 +45,7 @@ STORIES = [*(TESTS / 'configuration').glob('test_*.py'),
      'an exchange takes 31 ms, the period is 20 ms: the drive is slow; choose a longer period or '
      'a shorter cyclic_response'),
     (sentences.answer_late(0.0004),
-     'answer 0.4 ms after its period: the computer or the drive is too slow'),
+     'answer 0.4 ms after its period: the computer, the adapter or the drive is too slow'),
     (sentences.refused_by_drive(2, 'error 2: limit exceeded'),
      'refused by the drive: error 2: limit exceeded'),
     (complaints.wrong_type(value='maybe', kind='a string', allowed='true or false'),

@@ -2,6 +2,7 @@
 """The cycles of a family that has no more to say than it must: one frame each way."""
 
 import math
+from typing import Any
 
 from builders import CONTROL, drive, SPEED, WORD
 import pytest
@@ -10,7 +11,8 @@ from saying import says
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.drive_services import DriveServices, RequestServer
-from drive_can_bridge.core.events import AnswerLate, FrameRejected, StationFound, StationLost
+from drive_can_bridge.core.events import (
+    AnswerLate, FrameRejected, Noted, StationFound, StationLost)
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.session import Session, Stage
@@ -46,8 +48,8 @@ class Silent:
 class Plain(Session):
     """As docs/architecture.md has it, and an answer that holds the status word."""
 
-    def __init__(self, period: float) -> None:
-        configuration = drive(control=CONTROL, request=(WORD, SPEED), period=period)
+    def __init__(self, period: float, **options: Any) -> None:
+        configuration = drive(control=CONTROL, request=(WORD, SPEED), period=period, **options)
         super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
         server: RequestServer = Silent()
         self.services = DriveServices(self, server)
@@ -98,8 +100,8 @@ class Plain(Session):
 class Talk:
     """What is said, as times and payloads in hex."""
 
-    def __init__(self, period: float = 0.02) -> None:
-        self.session = Plain(period)
+    def __init__(self, period: float = 0.02, **options: Any) -> None:
+        self.session = Plain(period, **options)
         self.exchange = self.session.exchange
         self.session.bus_up(9.0)
         self.session.activate(10.0)
@@ -130,7 +132,8 @@ def test_once_a_period_as_long_as_it_answers() -> None:
     assert talk.session.offline_advice == says('silent', what='no answer', look_at='the plug')
     assert talk.at(10.1) == ['0000'], 'which is how it is found again'
     talk.answer(10.101)
-    assert talk.session.take_events() == [StationFound()]
+    assert talk.session.take_events() == [
+        Noted(says('more_missed_would_hold', limit=6), warning=True), StationFound()]
 
 
 def test_what_nobody_waits_for() -> None:
@@ -144,7 +147,9 @@ def test_what_nobody_waits_for() -> None:
     talk.at(10.04)
     talk.answer(10.041)
     talk.answer(10.042)
-    assert talk.session.take_events() == [AnswerLate(pytest.approx(0.001))], 'one of them was late'
+    assert talk.session.take_events() == [
+        AnswerLate(pytest.approx(0.001)), Noted(says('longer_period_would_hold'), warning=True),
+    ], 'one of them was late'
 
 
 def test_what_stops_a_drive_is_brought_forward() -> None:
@@ -223,3 +228,58 @@ def test_the_answer_to_the_last_cycle_is_waited_for_where_the_drive_ran(answered
         assert talk.session.stopped
     told = [event for event in talk.session.take_events() if 'does not answer' in str(event)]
     assert bool(told) is not answered
+
+
+def slow(gap: float) -> Talk:
+    """Have a drive lost, and answer so many s after its last answer."""
+    talk = Talk()
+    talk.at(10.0)
+    talk.answer(10.001)
+    for number in range(1, round(gap / 0.02) + 1):
+        talk.at(10.0 + 0.02 * number)
+    talk.session.take_events()
+    talk.answer(10.001 + gap)
+    return talk
+
+
+def test_what_would_have_held_is_said_when_the_answer_comes() -> None:
+    talk = slow(0.1)
+    told = says('more_missed_would_hold', gap=pytest.approx(0.1), limit=6,
+                seconds=pytest.approx(0.12))
+    assert Noted(told, warning=True) in talk.session.take_events()
+    # with that, it is not lost
+    patient = Talk(missed_limit=6)
+    patient.at(10.0)
+    patient.answer(10.001)
+    for number in range(1, 6):
+        patient.at(10.0 + 0.02 * number)
+    patient.answer(10.101)
+    assert not [event for event in patient.session.take_events()
+                if isinstance(event, StationLost)]
+
+
+def test_what_would_have_held_is_said_once() -> None:
+    talk = slow(0.1)
+    talk.session.take_events()
+    for number in range(6, 11):
+        talk.at(10.0 + 0.02 * number)
+    talk.answer(10.201)
+    assert [event for event in talk.session.take_events() if isinstance(event, Noted)] == []
+
+
+def test_nothing_would_have_held_for_a_drive_that_was_away() -> None:
+    assert [event for event in slow(2.1).session.take_events() if isinstance(event, Noted)] == []
+
+
+def test_a_longer_period_would_have_held_for_what_is_late() -> None:
+    talk = Talk()
+    talk.at(10.0)
+    talk.answer(10.001)
+    talk.at(10.02)
+    talk.at(10.04)
+    talk.session.take_events()
+    for at in (10.049, 10.0491):
+        talk.answer(at)
+    late = says('longer_period_would_hold', late=pytest.approx(0.009), period=0.032)
+    assert [event for event in talk.session.take_events() if isinstance(event, Noted)] == [
+        Noted(late, warning=True)]

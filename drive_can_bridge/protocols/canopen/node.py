@@ -62,6 +62,8 @@ class Node:
     :ivar emergency: what it last said of its errors; None: nothing, or no error any more.
     :ivar free_at: when PDOs may be sent.
     :ivar heartbeat_lost: a heartbeat is overdue.
+    :ivar silent_for: s that a heartbeat was overdue and more, when it has come at last; 0: it was
+        not, or the device has restarted.
     :ivar pdo_at: when it sent a PDO last, for who looks at them.
     :ivar heard_at: when it said anything else last, likewise.
     """
@@ -77,6 +79,7 @@ class Node:
         self.emergency: Emergency | None = None
         self.free_at = math.inf
         self.heartbeat_lost = self.without_content = False
+        self.silent_for = 0.0
         self.pdo_at = self.heard_at = -math.inf
         self._heartbeat_at = self._said_at = -math.inf      # or the boot-up frame
         self._interval: float | None = None     # None: there was no heartbeat yet
@@ -98,6 +101,8 @@ class Node:
         """Take a boot-up frame or heartbeat."""
         was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
+        self.silent_for = (
+            now - self._said_at if recovered and state is not NmtState.BOOT_UP else 0.0)
         self._heartbeat_at = self._said_at = self.heard_at = now
         if state is NmtState.BOOT_UP:
             self.state = NmtState.PRE_OPERATIONAL

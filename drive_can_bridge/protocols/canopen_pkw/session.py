@@ -305,12 +305,14 @@ class PkwSession(Session):
         change = self._node.receive_heartbeat(state, now)
         if self.stage is not Stage.RUNNING or change is Change.NONE:
             return
+        self._exchange.slack.heartbeat(self._node.silent_for)
         if change is Change.OPERATIONAL:
             self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
         else:       # before a stop: the node hears that only when it was started
             self._look_for_it(now, max(now, self._started_at + START_SPACING))
         if change is Change.RESTARTED:
             self.report.note(Noted(sentences.booted()))
+            self._exchange.slack.forget()
             reason = sentences.device_restarted()
             self._close(reason, Failure(
                 FailureKind.NO_ANSWER, sentences.no_answer_because(reason)), now)

@@ -28,6 +28,8 @@ from drive_can_bridge.protocols.exchange_book import CYCLE_SPACING_MIN, CycleTim
 SYNC_WAIT_MAX = 0.02
 #: s since a drive was heard for which SYNC goes on between rounds
 HEARD_TIME = 1.0
+#: s for which the longest pause between two heartbeats is remembered
+GAP_TIME = 5.0
 #: s before NMT start, and behind it, in which there is SYNC although nobody is heard
 BEFORE_START, BEHIND_START = 0.1, 0.2
 
@@ -299,7 +301,8 @@ class BridgeHeartbeat:
     def __init__(self, node: int, interval: float) -> None:
         self._frame = network.encode_heartbeat(node, network.NmtState.OPERATIONAL)
         self._interval = interval
-        self._due = -math.inf
+        self._due = self._sent_at = self._longest_at = -math.inf
+        self._longest = 0.0
 
     def next_timer(self) -> float:
         """Return when the next one is due."""
@@ -311,6 +314,19 @@ class BridgeHeartbeat:
             self._due = now + self._interval if now > self._due + self._interval else (
                 self._due + self._interval)
             outbox.put(self._frame)
+            gap = now - self._sent_at
+            if gap < math.inf and (gap > self._longest or now > self._longest_at + GAP_TIME):
+                self._longest, self._longest_at = gap, now
+            self._sent_at = now
+
+    def gap(self, now: float) -> float:
+        """Return how many s lay between two of them at most, in the last few seconds."""
+        return max(self._longest, now - self._sent_at if self._sent_at > -math.inf else 0.0)
+
+    def rest(self) -> None:
+        """Begin anew with what lies between two: a drive is left alone, which may be the last."""
+        self._sent_at = -math.inf
+        self._longest = 0.0
 
 
 def smallest(intervals: Sequence[float]) -> float:

@@ -17,13 +17,11 @@ from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, CONTROL_WORD, MODE, MODES, MOVING, state_of, STATUS_NAME, STATUS_PARAMETER,
-    STATUS_WORD)
+    CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of, STATUS_NAME,
+    STATUS_PARAMETER, STATUS_WORD)
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, IntegerList, option, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
-#: s: longest period in which a drive that interpolates gets its setpoints
-INTERPOLATION_MAX = 0.02
 #: s: periods of which the jitter of a process without a real-time kernel is a good part
 JITTERS_BELOW = 0.005
 #: s: longest event timer, and longest time of a heartbeat consumer (16 bits of ms)

@@ -56,11 +56,13 @@ from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, MODES, State, state_of, STATUS_PARAMETER)
+    CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, State, state_of, STATUS_PARAMETER)
+from drive_can_bridge.protocols.cia402.watch import WATCH_INTERVALS
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import (
     ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
+from drive_can_bridge.protocols.slack import enough, Slack
 
 #: s until a drive that differs, or runs on, is looked at again
 LOOK_AGAIN = 1.0
@@ -98,7 +100,20 @@ class Heartbeats:
         return min(own, self._node.next_timer()) if stage is Stage.RUNNING else own
 
     def stop(self) -> None:
-        """Nothing to be done: the stage says it."""
+        """Send none on account of this drive: the stage says it."""
+        if self._beat is not None:
+            self._beat.rest()
+
+    def was_missed(self, slack: Slack, now: float) -> None:
+        """Say what would have held: the drive has missed that of the bridge."""
+        if self._beat is None:      # whose else it watches, it does not say
+            return
+        interval, gap = self._session.configuration.options.bridge_heartbeat, self._beat.gap(now)
+        if gap > (WATCH_INTERVALS - 0.5) * interval:
+            slack.tell('bridge_heartbeat', sentences.longer_beat_would_hold(
+                gap=gap, interval=enough(gap / WATCH_INTERVALS)))
+        else:
+            slack.tell('1016h', sentences.beats_were_sent(gap=gap))
 
 
 class Cia402Session(Session):
@@ -148,7 +163,9 @@ class Cia402Session(Session):
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
         self._answers = Answers(self, silence='no complete set of PDOs',
                                in_turn=not self._synchronous,
-                               timer=self._turn or EventTimer(drive.period))
+                               timer=self._turn or EventTimer(drive.period),
+                               period_max=INTERPOLATION_MAX if MODES[options.mode].interpolated
+                               else math.inf)
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
         if heartbeat is None and options.bridge_heartbeat > 0.0:
             heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
@@ -405,6 +422,8 @@ class Cia402Session(Session):
                 self._take_heartbeat(network.decode_heartbeat(data), now)
             elif identifier == network.EMERGENCY_BASE + self.configuration.station:
                 self._node.take_emergency(data, self.report)
+                if self._missed_bridge:
+                    self._heartbeats.was_missed(self._answers.slack, now)
         except Unasked as error:
             self.report.unasked(sentences.malformed(str(error)), self._channel.late(
                 now - age, partial(self._transactor.answers, data)), now)
@@ -436,6 +455,7 @@ class Cia402Session(Session):
         self._node.pdo_at = now
         if not exchange.cycling:
             answers.book.take_stale()
+            answers.slack.came(received_at)
             return
         if self._synchronous and not answers.wanted:
             if place == count - 1 and not answers.expects('transmit PDO', now, received_at):
@@ -486,8 +506,10 @@ class Cia402Session(Session):
             self._no_pdos_at_the_end(state, now)
         if self.stage is not Stage.RUNNING:
             return
+        self._answers.slack.heartbeat(self._node.silent_for)
         if change is Change.RESTARTED:
             self.report.note(Noted(sentences.booted()))
+            self._answers.slack.forget()
             reason = sentences.device_restarted()
             self.services.fail_all(Failure(
                 FailureKind.NO_ANSWER, sentences.no_answer_because(reason)))
@@ -670,10 +692,14 @@ class Cia402Session(Session):
             return refusal
         if self.error or not self._machine.fault:
             return self.error
+        return sentences.bridge_missed() if self._missed_bridge else NOTHING
+
+    @property
+    def _missed_bridge(self) -> bool:
+        """The drive says that it missed the heartbeat of the bridge."""
         # nobody heard the emergency where the bridge itself was gone
         emergency, watch = self._node.emergency, self.fault_watch
-        missed = HEARTBEAT_ERROR in (emergency and emergency.code, watch and watch.error_code)
-        return sentences.bridge_missed() if missed else NOTHING
+        return HEARTBEAT_ERROR in (emergency and emergency.code, watch and watch.error_code)
 
     # -- the stop ---------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from drive_can_bridge.core.bridges import is_some
 from drive_can_bridge.process.local_stop import (
     Answer, does_not_answer, may_match, RUNNING, stop_answer, STOP_TIMEOUT, twins)
 from drive_can_bridge.process.local_way import meant
-from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unoffered
+from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unanswered, unoffered
 from drive_can_bridge.process.presence import Present, short
 from drive_can_bridge.ros.client.calls import (
     HasEnd, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
@@ -230,6 +230,7 @@ def give(graph: Graph, order: str, nodes: Sequence[str]) -> list[Answer]:
     """
     calls = NodeCalls(graph.client_node, CONTROL_TIMEOUT)
     answers: dict[str, Answer] = {}
+    began = graph.now()
     service = ORDERS[order].service
 
     def ask(node: str) -> None:
@@ -237,7 +238,7 @@ def give(graph: Graph, order: str, nodes: Sequence[str]) -> list[Answer]:
             if response is not None:
                 answers[node] = Answer(node, response.success, response.message)
             elif calls.offered(node, service):
-                answers[node] = Answer(node, False, 'no answer')
+                answers[node] = unanswered(node, graph.now() - began)
             else:
                 answers[node] = unoffered(node, order)
         calls.ask(node, service, ORDERS[order].request(), take, graph.now(), OFFER_TIMEOUT)

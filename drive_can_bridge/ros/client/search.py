@@ -31,6 +31,7 @@ from drive_can_bridge.process.environment import nobody
 from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.client.foreign import foreign, why_not
+from drive_can_bridge.ros.client.signs import Signs
 from drive_can_bridge.ros.rcl.end import End
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
@@ -91,6 +92,7 @@ class Graph:
         if timeout not in self._calls:
             self._calls[timeout] = NodeCalls(self.client_node, timeout)
         calls, answers, asked = self._calls[timeout], list[Any](), True
+        began = self._clock.now()
 
         def unasked() -> None:
             nonlocal asked
@@ -106,7 +108,8 @@ class Graph:
             self._heard.add(node)
             return answers[0]
         if calls.offered(node, service):
-            raise NoAnswer(sentences.node_unanswering(node=node, timeout=timeout), asked=asked)
+            raise NoAnswer(sentences.node_unanswering(
+                node=node, timeout=round(self._clock.now() - began)), asked=asked)
         raise NoAnswer(sentences.node_gone(node) if node in self._heard
                        else sentences.no_such_service(node=node, service=service), asked=asked)
 
@@ -144,6 +147,10 @@ class Graph:
 _QUIET, _LONGEST = 4.0, 12.0
 #: s that a bridge has to answer
 _ANSWER_TIMEOUT = 5.0
+#: s that one has of which there are signs of life
+_BUSY_TIMEOUT = 30.0
+#: s without an answer after which signs of life are looked for
+_SIGNS_AFTER = 1.0
 #: s between two looks at the graph
 _GRAPH_PERIOD = 0.01
 _MARK = '.profile_sha256'
@@ -158,6 +165,7 @@ class Found:
     :ivar others: the bridges that it sees, itself among them; None: not known yet.
     :ivar silent: it has not answered in time.
     :ivar foreign: it has another middleware, and is not asked.
+    :ivar asked_at: when it was, for the first time.
     """
 
     name: str
@@ -165,6 +173,7 @@ class Found:
     others: tuple[str, ...] | None = None
     silent: bool = False
     foreign: bool = False
+    asked_at: float = 0.0
 
     @property
     def answered(self) -> bool:
@@ -197,14 +206,20 @@ class Search:
     :param expected: full names of bridges that are known to be there.
     :param only: those that are looked for; None: all.
     :param patience: s that a bridge has to answer; None: a few.
+    :param signs: makes what looks for signs of life: a bridge that gives any has longer to
+        answer; None: none has.
     :ivar found: by full name, whether they have answered or not.
     :ivar services: all that have been discovered.
     """
 
     def __init__(self, client_node: Seeing, namespace: str | None,
                  expected: Iterable[str] = (), *, only: Container[str] | None = None,
-                 patience: float | None = None) -> None:
+                 patience: float | None = None,
+                 signs: Callable[[], Signs] | None = None) -> None:
         self._client_node = client_node
+        self._make_signs = signs
+        self._signs: Signs | None = None
+        self._now = 0.0
         self._namespace = namespace
         self._expected = list(expected)
         self._only = only
@@ -237,6 +252,8 @@ class Search:
         if self._began < 0.0:
             self._began = self._changed_at = now
             self._see(self._expected, now)
+        self._now = now
+        self._look_for_signs(now)
         self._calls.look(now)
         if now < self._looked_at + _GRAPH_PERIOD:
             return False
@@ -257,6 +274,24 @@ class Search:
     def close(self) -> None:
         """Ask nobody any more."""
         self._calls.close()
+        if self._signs is not None:
+            self._signs.close()
+
+    def _look_for_signs(self, now: float) -> None:
+        if self._signs is not None:
+            self._signs.look(now)
+        elif self._make_signs is not None and any(
+                now > each.asked_at + _SIGNS_AFTER for each in self.found.values()
+                if not (each.answered or each.silent)):
+            self._signs = self._make_signs()
+
+    def _give_up(self, bridge: Found, ask_again: Callable[[float], None]) -> None:
+        """Have a bridge silent that has not answered in time, unless it is seen to live."""
+        if (self._signs is not None and self._now < bridge.asked_at + _BUSY_TIMEOUT
+                and self._signs.lives(bridge.name)):
+            ask_again(self._now)
+        else:
+            bridge.silent = True
 
     def _see(self, names: Iterable[str], now: float) -> None:
         for name in filter(is_ros_name, names):     # anybody may tell anything
@@ -268,8 +303,13 @@ class Search:
                     self._ask(self.found[name], now)
 
     def _ask(self, bridge: Found, now: float) -> None:
+        bridge.asked_at = now
+
         def take_others(response: GetParameters.Response | None) -> None:
-            if response is None or not response.values:
+            if response is None:
+                self._give_up(bridge, ask_for_others)
+                return
+            if not response.values:
                 bridge.silent = True
                 return
             bridge.others = tuple(response.values[0].string_array_value)
@@ -277,25 +317,35 @@ class Search:
 
         def take_drives(response: ListParameters.Response | None) -> None:
             if response is None:
-                bridge.silent = True
+                self._give_up(bridge, ask_for_drives)
                 return
             drives = (name.split('.')[1] for name in response.result.names
                       if name.endswith(_MARK) and name.count('.') == 2)
             bridge.drives = tuple(drive for drive in drives if is_ros_name(f'/{drive}'))
-        self._calls.ask(bridge.name, 'get_parameters',
-                        GetParameters.Request(names=[BRIDGES]), take_others, now)
-        self._calls.ask(bridge.name, 'list_parameters',
-                        ListParameters.Request(prefixes=['drives']), take_drives, now)
+
+        def ask_for_others(now: float) -> None:
+            self._calls.ask(bridge.name, 'get_parameters',
+                            GetParameters.Request(names=[BRIDGES]), take_others, now)
+
+        def ask_for_drives(now: float) -> None:
+            self._calls.ask(bridge.name, 'list_parameters',
+                            ListParameters.Request(prefixes=['drives']), take_drives, now)
+        ask_for_others(now)
+        ask_for_drives(now)
+
+    def waited(self, names: Iterable[str]) -> float:
+        """Return for how many s bridges were waited for that have not answered, at most."""
+        return max((self._now - self.found[name].asked_at for name in names), default=0.0)
 
 
 def _search(graph: Graph, namespace: str | None, enough: Callable[[list[str]], bool]) -> Search:
     """Search until all is known, or the names of the bridges are enough."""
-    search = Search(graph.client_node, namespace)
+    search = Search(graph.client_node, namespace, signs=lambda: Signs(graph.client_node))
 
     def done(now: float) -> bool:
         search.look(now)
         return enough(search.names) or search.settled or search.over(now)
-    graph.wait(done, 2.0 * _LONGEST)
+    graph.wait(done, 2.0 * _LONGEST + _BUSY_TIMEOUT)
     return search
 
 
@@ -319,7 +369,7 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
             names=names, silent=silent))
     bridge_of = bridges_of({name: search.found[name].drives or () for name in names})
     if silent or not bridge_of:
-        raise _none(graph, namespace, search.found.values(), silent)
+        raise _none(graph, namespace, search, silent)
     return bridge_of
 
 
@@ -330,11 +380,12 @@ def find_bridges(graph: Graph, pattern: str) -> list[Found]:
     :raises NoBridge: there is none.
     :raises SilentBridge: one does not answer.
     """
-    found = [each for each in _search(graph, None, lambda _: False).found.values()
+    search = _search(graph, None, lambda _: False)
+    found = [each for each in search.found.values()
              if fnmatchcase(namespace_of(each.name), pattern)]
     _must_talk(graph, found)
     if not found or not all(each.answered for each in found):
-        raise _none(graph, pattern, found, [each.name for each in found if not each.answered])
+        raise _none(graph, pattern, search, [each.name for each in found if not each.answered])
     return found
 
 
@@ -350,13 +401,13 @@ def _must_talk(graph: Graph, found: Iterable[Found]) -> None:
         raise SilentBridge('; '.join(reasons))
 
 
-def _none(graph: Graph, pattern: str | None, seen: Iterable[Found],
+def _none(graph: Graph, pattern: str | None, search: Search,
           silent: Sequence[str]) -> DriveCanError:
     """Say that there is no bridge, or none that answers: one that has left the graph, perhaps."""
     if silent:
-        return SilentBridge(nobody(pattern, silent))
+        return SilentBridge(nobody(pattern, silent, search.waited(silent)))
     domain = graph.client_node.context.get_domain_id()
-    known = {short(each.name) for each in seen}
+    known = {short(name) for name in search.found}
     hung = [sentences.silent_and_holds(name=each.name, how=each.silence(domain))
             for each in bridges()
             if each.domain == domain and each.may_be_in(pattern) and each.name not in known]
