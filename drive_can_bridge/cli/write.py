@@ -4,6 +4,7 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 import re
+import shlex
 
 from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
 from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
@@ -174,10 +175,15 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
     if not losers:
         return
     from drive_can_bridge.protocols.families import FAMILIES    # takes its time
-    lost = dict.fromkeys(FAMILIES[drive.facts.protocol].keeps_by for drive in losers)
-    for text in lost:
-        if text and not args.json:
-            print(text)
+    for name, protocol in dict.fromkeys((drive.name, drive.facts.protocol) for drive in losers):
+        family = FAMILIES[protocol]
+        if family.keeps_by and not args.json:
+            words = ['drive_can', 'write', name, family.stores_by]
+            if args.params_file is not None:
+                words += ['-p', str(args.params_file)]
+            elif args.namespace is not None:
+                words += ['--namespace', args.namespace or '/']
+            print(f'{family.keeps_by}{shlex.join(words)}')
 
 
 def _is_lost(outcome: WriteOutcome) -> bool:

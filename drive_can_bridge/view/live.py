@@ -33,7 +33,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, Source, Times
-from drive_can_bridge.monitor.summary import in_order, silence, tone_of
+from drive_can_bridge.monitor.summary import in_order, silence, Tone, tone_of
 from drive_can_bridge.view.parts import (
     advice_lines, bus_lines, clock, DIM, drives_table, flow, lamps, Lines, log_lines, milliseconds,
     section, state, TONE_STYLES, ValueColumns, wrapped)
@@ -44,6 +44,7 @@ class Page(Enum):
 
     DRIVES = 'drives'
     DRIVE = 'drive'
+    HELP = 'help'
 
 
 class Key(Enum):
@@ -53,6 +54,7 @@ class Key(Enum):
     DOWN = 'down'
     OPEN = 'open'
     BACK = 'back'
+    HELP = 'help'
     QUIT = 'quit'
 
 
@@ -62,14 +64,15 @@ _SEQUENCES = {
     '\x1b[B': Key.DOWN, '\x1bOB': Key.DOWN, 'j': Key.DOWN, '\t': Key.DOWN,
     '\r': Key.OPEN, '\n': Key.OPEN, '\x1b[C': Key.OPEN, '\x1bOC': Key.OPEN,
     '\x1b': Key.BACK, '\x7f': Key.BACK, '\x08': Key.BACK, '\x1b[D': Key.BACK,
-    '\x1bOD': Key.BACK, 'q': Key.QUIT, 'Q': Key.QUIT,
+    '\x1bOD': Key.BACK, '?': Key.HELP, 'q': Key.QUIT, 'Q': Key.QUIT,
 }
 _LONGEST = max(map(len, _SEQUENCES))
 
 #: the last line: what may be pressed here
 HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
-    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('q', 'quit')),
-    Page.DRIVE: (('↑↓', 'drive'), ('esc', 'back'), ('q', 'quit')),
+    Page.DRIVES: (('↑↓', 'drive'), ('⏎', 'in detail'), ('?', 'help'), ('q', 'quit')),
+    Page.DRIVE: (('↑↓', 'drive'), ('esc', 'back'), ('?', 'help'), ('q', 'quit')),
+    Page.HELP: (('esc', 'back'), ('q', 'quit')),
 }
 
 
@@ -121,6 +124,8 @@ class Choice:
             step = 1 if key is Key.DOWN else -1
             place = (drives.index(self.drive) + step) % len(drives)
             return replace(self, drive=drives[place])
+        if key is Key.HELP and self.page is not Page.HELP:
+            return replace(self, page=Page.HELP)
         return replace(self, page=Page.DRIVE if key is Key.OPEN else Page.DRIVES)
 
 
@@ -285,7 +290,10 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
     for text in silence(snapshot, clock):
         frame.lines(wrapped(text, width, 'bold white on red'))
     drive = snapshot.drive(choice.drive or '')
-    if drive is None:
+    if choice.page is Page.HELP:
+        told = help_lines(drive, setting, frame.inner)
+        frame.add('help', told, len(told))
+    elif drive is None:
         _nobody(frame, snapshot, setting)
     elif choice.page is Page.DRIVE:
         _drive(frame, snapshot, drive)
@@ -298,6 +306,29 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
     root = Layout()
     root.split_column(*frame.parts)
     return root
+
+
+def help_lines(drive: DriveSnapshot | None, setting: Setting, width: int) -> Lines:
+    """Say what can be typed elsewhere, of the drive that is marked, and what the colours mean."""
+    name = drive.name if drive is not None else 'DRIVE'
+    lines: Lines = [Text('in another terminal', style=DIM)]
+    if setting.environment:
+        lines += wrapped(setting.environment, width, 'bold')
+    controlled = drive is None or bool(drive.control)
+    for command, what in (
+            (f'drive_can read {name}', 'its parameters'),
+            (f'drive_can write {name} NAME=VALUE', 'one of them, written and looked at again'),
+            *([(f'drive_can enable {name}', 'or says what is missing')] if controlled else []),
+            (f'drive_can jog {name} VALUE', 'a setpoint for 2 s, then neutral'),
+            ('drive_can stop', 'all drives of all bridges, at once')):
+        lines += flow([Text(command, style='bold'), Text(what, style=DIM)], width, 2)
+    lines += [Text(), Text('states', style=DIM)]
+    for tone, what in ((Tone.OK, 'enabled and armed, or online'), (Tone.OFF, 'disabled'),
+                       (Tone.WARN, 'not armed, or a warning'),
+                       (Tone.ERROR, 'fault, offline, or not seen'),
+                       (Tone.UNKNOWN, 'its bridge is silent')):
+        lines.append(Text('● ', style=TONE_STYLES[tone]).append(what, style='not bold'))
+    return lines
 
 
 def closely(choice: Choice) -> str | None:

@@ -45,6 +45,8 @@ TREND_SPAN = 30.0
 Lines = list[Text]
 #: longest state that a drive has
 _STATE = 2 + len('mapping differs')
+#: longest state of a control word, where there is room for it
+_CONTROL = len('quick stop active, holds')
 _TREND_MIN, _TREND_MAX = 8, 30
 _EXCHANGE_WIDTH = 28
 _LOAD_WIDTH = 12
@@ -220,6 +222,11 @@ class _FullTable:
         # where there is room for one of them only, a trend tells more
         self._exchange = left >= _TREND_MIN + GAP + _EXCHANGE_WIDTH
         left -= (GAP + _EXCHANGE_WIDTH) * self._exchange
+        if any(drive.control for drive in drives):     # a word tells more than a longer trend
+            wanted = max(_CONTROL, *(len(drive.control) for drive in drives)) + 2 - self._first
+            widened = max(0, min(wanted, left))
+            self._first += widened
+            left -= widened
         self._trend = min(left, _TREND_MAX) if left >= _TREND_MIN else 0
         self.height = 1 + sum(self._lines(drive) for drive in drives) + max(0, len(drives) - 1)
 
@@ -237,8 +244,7 @@ class _FullTable:
         trend = GAP + self._trend if self._trend else 0
         table.add_column('actual value', width=self._values.width + trend, no_wrap=True)
         if self._exchange:
-            table.add_column(f'{"exchange":14}{"mean":>5}{"p99":>9}', width=_EXCHANGE_WIDTH,
-                             no_wrap=True)
+            table.add_column('exchange', width=_EXCHANGE_WIDTH, no_wrap=True)
         for number, drive in enumerate(drives):
             if number:
                 table.add_row()
@@ -263,12 +269,13 @@ def _identity(drive: DriveSnapshot, marked: str | None) -> Text:
 
 
 def _exchange(drive: DriveSnapshot) -> Text:
-    missed = Text(f'{"missed":12}{drive.missed:7}', style='bold yellow' if drive.missed else '')
+    missed = Text(f'{drive.missed} missed', style='bold yellow' if drive.missed else '')
     return _stack([
-        Text(f'{"rate":12}{drive.rate:7.1f}').append(' /s', style=DIM), missed,
+        Text(f'{drive.rate:.1f}').append(' /s', style=DIM).append(', ').append_text(missed),
+        Text(f'{"ms":12}{"mean":>7} {"p99":>8}', style=DIM),
         *(Text(f'{label:12}{milliseconds(found.mean):>7} {milliseconds(found.p99):>8}')
           for label, found in (('period error', drive.period_error),
-                               ('latency, ms', drive.latency)))])
+                               ('latency', drive.latency)))])
 
 
 def _line_table(all_drives: Sequence[DriveSnapshot], drives: Sequence[DriveSnapshot],

@@ -5,7 +5,7 @@ from itertools import product
 
 from extent import some
 from monitor_builders import (
-    bus_status, drive_status, many_drives, model_of, seen, three_drives)
+    bus_status, drive_status, feed, many_drives, model_of, seen, three_drives)
 import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
@@ -76,10 +76,26 @@ def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.Monk
     assert '32m' not in shown(snapshot, Choice(), 80, 24, colours=True)
 
 
+@pytest.mark.parametrize('state', ['switch-on disabled', 'fault reaction active',
+                                   'quick stop active, holds'])
+@pytest.mark.parametrize('width', [120, 140, 200])
+def test_a_state_is_not_cut_where_there_is_room(state: str, width: int) -> None:
+    model = model_of([bus_status(), drive_status('lift', control_state=state)])
+    feed(model, '/lift')
+    assert f' {state} ' in plain(seen(model), Choice(drive='/lift'), width, 50)
+
+
+def test_help_says_what_another_terminal_has_to_export() -> None:
+    snapshot, choice = VIEWS['help']
+    text = plain(snapshot, choice, 80, 24)
+    for line in ('export ROS_DOMAIN_ID=7', 'drive_can enable /lift', 'drive_can stop'):
+        assert f'\n{line}' in text
+
+
 # -- keys -----------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize(('typed', 'keys'), [
-    ('q', [Key.QUIT]), ('\x1b[A\x1b[B', [Key.UP, Key.DOWN]), ('\x1bOBjk', [
+    ('q', [Key.QUIT]), ('?', [Key.HELP]), ('\x1b[A\x1b[B', [Key.UP, Key.DOWN]), ('\x1bOBjk', [
         Key.DOWN, Key.DOWN, Key.UP]), ('\r', [Key.OPEN]), ('\x1b', [Key.BACK]),
     ('x\x00ü', []), ('\x1b[1;5Cq', [Key.QUIT]), ('\x1b[200~\r', [Key.OPEN]), ('\x1b\x1b', [
         Key.BACK, Key.BACK]), ('', [])])
@@ -97,5 +113,9 @@ def test_keys_change_what_is_chosen() -> None:
     assert (choice.page, closely(choice)) == (Page.DRIVE, '/c')
     choice = choice.press(Key.BACK, drives)
     assert (choice.page, closely(choice)) == (Page.DRIVES, None)
+    for key, page in ((Key.HELP, Page.HELP), (Key.HELP, Page.DRIVES), (Key.HELP, Page.HELP),
+                      (Key.BACK, Page.DRIVES)):
+        choice = choice.press(key, drives)
+        assert choice.page is page
     assert choice.among(['/a']).drive == '/a'
     assert choice.among([]).drive is None

@@ -28,6 +28,7 @@ VIEWS: dict[str, tuple[Snapshot, Choice]] = {
     'many': (seen(many_drives()), Choice(drive='/axis_30')),
     'drive': (seen(three_drives()), Choice(Page.DRIVE, '/conveyor')),
     'fifteen': (seen(fifteen_drives()), Choice()),
+    'help': (seen(three_drives()), Choice(Page.HELP, '/lift')),
     'nobody': (seen(Model()), Choice()),
     'silent': (three_drives().look(1007.0, seen(three_drives()).at), Choice()),
 }
