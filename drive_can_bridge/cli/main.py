@@ -70,7 +70,8 @@ GROUPS: dict[str, dict[str, str]] = {
 SUBCOMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 EXAMPLES: dict[str, tuple[str, str]] = {
     'demo': ('demo', 'demo --drive --duration 60'),
-    'simulate': ('simulate -p robot.yaml --pty', 'simulate -p robot.yaml --interface vcan0'),
+    'simulate': ('simulate -p robot.yaml --pty',
+                 'simulate -p robot.yaml --interface socketcan --channel vcan0'),
     'adapters': ('adapters', 'adapters --json'),
     'scan': ('scan --interface socketcan --channel can0',
              'scan --interface slcan --channel /dev/ttyACM0 --bitrate 125k -o found.yaml'),
