@@ -250,7 +250,8 @@ class DirectDrive(Drive):
         supervision = self._family.supervision(self._drive)
         if supervision is not None:
             outcome, = self._wait_for((supervision,))
-            if isinstance(outcome, ReadValue) and outcome.raw != 0:
+            # a negative one is none; raw names have no sign
+            if isinstance(outcome, ReadValue) and 0 < outcome.raw < 1 << 15:
                 yield sentences.telegrams_supervised(self.name, supervision.address)
 
     def role(self, name: str) -> Role | None:

@@ -612,6 +612,10 @@ timeout_too_tight = Text(
     'telegram time-out {timeout:g} s ({name}, {address}) is too tight for a period of '
     '{period:g} s: set it to {least:g} s or more, or shorten the period',
     do='set P513 or the period')
+not_monitored = Text(
+    'nothing stops this inverter when the bridge dies: its telegram time-out ({name}, {address}) '
+    'is {timeout:g} s, which is none', fields='name address timeout',
+    do='set P513 to at least three periods')
 timeout_unknown = Text(
     'telegram time-out ({address}) unknown: {reason}',
     do='see whether this inverter has the parameter')

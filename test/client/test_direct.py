@@ -204,6 +204,10 @@ def test_supervision_of_telegrams_is_warned_about(tmp_path: Path) -> None:
     with a_world(tmp_path, mixer=MIXER) as world:
         with open_drives(world.file) as drives:
             assert drives.warnings == ()
+        for none in (0, -1):    # -0.1 s: it runs on when telegrams end
+            world.drives['mixer'].set_value('p513', none)
+            with open_drives(world.file) as drives:
+                assert drives.warnings == ()
         world.drives['mixer'].set_value('p513', 20)
         with open_drives(world.file) as drives:
             assert drives.warnings == (SAID['supervised'],)

@@ -145,3 +145,25 @@ def test_whatever_happens_answers_are_true_and_the_drive_comes_back(
     assert len(found) - 1 <= len(line.found(StationLost))
     # no PDO before the node was ready for it, but for those that crossed a boot-up frame
     assert set(line.ltmr.violations) <= {RULES['not operational']}
+
+
+def test_a_motor_that_was_stopped_by_hand_does_not_start_when_control_comes_back() -> None:
+    """
+    Local control, then remote again: the controller obeys the newest command that it holds.
+
+    Its CANopen guide (DOCA0132, Schneider Electric) warns of that: it may restart by itself.
+    """
+    line = Line(control_timeout=5.0)
+    line.until(1.0)
+    assert line.control(ControlAction.ENABLE) == (True, 'enabled')
+    line.until(3.0)
+    assert line.writes('C002')[-1] == '0100'
+    line.ltmr.set_value('system_status_1', 0x0041, line.now)    # ready, not on
+    line.until(4.0)
+    # it holds no command any more before it has control again
+    assert line.writes('C002')[-1] == '0000'
+    line.ltmr.release('system_status_1')
+    line.until(8.0)
+    assert line.writes('C002')[-1] == '0000'
+    status, *_ = line.found(ProcessDataReceived)[-1].raws
+    assert not status & 0x0002

@@ -397,12 +397,16 @@ def test_a_bus_that_takes_nothing() -> None:
         Bench(takes_nothing).probe(LIFT)
 
 
-def test_a_telegram_time_out_is_told() -> None:
-    question, answer = map(bytes.fromhex, ('0112000000000000', '0112000000003200'))  # 0.5 s
+@pytest.mark.parametrize(('answer', 'told'), [
+    ('0112000000003200', True), ('0112000032000000', True), ('0112000000000000', False),
+    # -0.1 s, in either order of the words: it runs on when telegrams end
+    ('01120000FFFFFFFF', False), ('011200000000FFFF', False)])
+def test_a_telegram_time_out_is_told(answer: str, told: bool) -> None:
+    question, said = map(bytes.fromhex, ('0112000000000000', answer))
     prober = FAMILIES['cannord'].make_prober(INVERTER)
-    bench = Bench(lambda frame: [Frame(0x265, answer, False)] if frame.data == question else [])
+    bench = Bench(lambda frame: [Frame(0x265, said, False)] if frame.data == question else [])
     Asker(BusConfiguration('main', 'virtual', 'x'), bench, [INVERTER], bench.clock).probe(prober)
-    assert prober.notes == [SAID['timeout']]
+    assert prober.notes == [SAID['timeout']] * told
 
 
 def file_with(tmp_path: Path, name: str, options: str) -> Path:

@@ -8,6 +8,8 @@ Process frames come once a ``period``, and so do the broadcasts of a group. A si
 lost on a busy bus, or be late on a busy machine, so the time-out should allow for
 :data:`PERIODS_MIN` periods.
 
+Without it nothing stops the motor when the bridge dies, which is told once.
+
 The scale of P513 comes from the profile, as that of every parameter; a profile that does not list
 it gets no warning.
 """
@@ -73,6 +75,7 @@ class TimeoutWatch:
         self._access = access
         self._report = report
         self._ask_at = -math.inf
+        self._told = NOTHING
 
     def look(self, now: float) -> None:
         """Read it, unless that is under way, or nobody answered lately."""
@@ -93,10 +96,16 @@ class TimeoutWatch:
         if self._parameter is None:
             return
         if isinstance(outcome, ReadValue):
-            self.warning = timeout_warning(
-                self._parameter, float(self._parameter.value_from_raw(outcome.raw)), self._period)
+            timeout = float(self._parameter.value_from_raw(outcome.raw))
+            self.warning = timeout_warning(self._parameter, timeout, self._period)
             if self.warning:
                 self._report.note(Noted(self.warning, warning=True))
+            unwatched = sentences.not_monitored(
+                self._parameter.name, self._parameter.address, timeout) if (
+                    timeout <= 0.0) else NOTHING
+            if unwatched and unwatched != self._told:
+                self._report.note(Noted(unwatched, warning=True))
+            self._told = unwatched
         elif isinstance(outcome, Failure):
             self._ask_at = self._access.channel.now + UNKNOWN_PAUSE
             self._report.note(Noted(sentences.timeout_unknown(

@@ -43,6 +43,8 @@ _CONTROL_MASK = 0x27FF
 SIMPLE = (514, 513)
 ARRAYS = (102, 700)
 TELEGRAM_TIMEOUT = 513
+#: words from here on are numbers below 0
+_NEGATIVE = 0x8000
 _NOT_AN_ARRAY = 4
 _WRONG_SUBINDEX = 3
 _TRIES = 4
@@ -143,7 +145,9 @@ class CannordProber(Prober):
 
     def converse(self) -> Conversation:
         timeout = yield from self._ask(Task.READ, TELEGRAM_TIMEOUT)
-        if timeout is not None and timeout.response == Response.WORD and any(timeout.words):
+        # -0.1 s is none, as 0 is
+        if timeout is not None and timeout.response == Response.WORD and any(
+                timeout.words) and max(timeout.words) < _NEGATIVE:
             self.notes.append('P513 is not 0: the inverter supervises telegrams once it has got '
                               'one, and trips when they end')
         findings = [(yield from self._value_order()), (yield from self._index_byte())]

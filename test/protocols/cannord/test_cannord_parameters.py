@@ -432,7 +432,9 @@ def test_telegram_time_out(period: float, deciseconds: str, tight: bool) -> None
     high = 'FFFF' if deciseconds == 'FFFF' else '0000'
     talk.hears(f'203#01120000{high}{deciseconds}', 10.005)
     assert bool(talk.session.warning) is tight
-    assert len(talk.events(Noted)) == int(tight)
+    none = deciseconds in ('0000', 'FFFF')
+    assert [event.text.code for event in talk.events(Noted)] == (
+        ['not_monitored'] if none else ['timeout_too_tight'] * tight)
 
 
 @pytest.mark.parametrize('raw_value', [-1, 65535])
@@ -447,6 +449,24 @@ def test_telegram_time_out_that_is_negative(raw_value: int) -> None:
     talk.hears('203#0112000000000000', 10.005)
     item = (MONITORING, -1) if raw_value == -1 else (found, raw_value)
     assert talk.submits(write(item), 10.006) == ['202#01220000FFFFFFFF']
+
+
+def test_that_nothing_stops_an_inverter_is_told_once() -> None:
+    """P513 = -0.1 s: it runs on when telegrams end; so it does with 0, as delivered."""
+    talk, _ = monitored()
+    talk.hears('203#01120000FFFFFFFF', 10.005)
+    event, = talk.events(Noted)
+    assert event.warning and event.text == says(
+        'not_monitored', name='telegram_timeout', address='P513', timeout=pytest.approx(-0.1))
+    assert talk.session.warning == ''
+    # looked at again behind a write
+    for raw_value, told in ((-1, []), (0, ['not_monitored']), (5, []), (0, ['not_monitored'])):
+        word = f'{(raw_value & 0xFFFF).to_bytes(2, "little").hex().upper()}'
+        high = 'FFFF' if raw_value < 0 else '0000'
+        talk.submits(write((MONITORING, raw_value)), talk.now + 0.0001)
+        talk.hears(f'203#01120000{high}{word}', talk.now + 0.0001)
+        talk.hears(f'203#01120000{high}{word}', talk.now + 0.0001)
+        assert [each.text.code for each in talk.events(Noted)] == told
 
 
 def test_telegram_time_out_in_words() -> None:
