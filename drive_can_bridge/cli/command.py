@@ -34,7 +34,9 @@ PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'
 Parsed = TypeVar('Parsed')
 #: what an argument that begins with the name of a drive looks like
 _EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
-             '--axis': 'DRIVE:KEY=VALUE, for example lift:load=0.3'}
+             '--axis': 'DRIVE:KEY=VALUE, for example lift:load=0.3',
+             '--habit': 'DRIVE:KEY=VALUE, for example servo:start=0.3',
+             '--without': 'DRIVE=OBJECT, for example servo=6007h,1800h.05h'}
 
 
 class WrongUsage(DriveCanError):
@@ -189,16 +191,16 @@ def add_seconds(parser: ArgumentParser) -> None:
 
 
 def of_drive(option: str, text: str, configuration: 'BridgeConfiguration',
-             parse: Callable[[str], Parsed]) -> tuple[str, Parsed]:
+             parse: Callable[[str], Parsed], sign: str = ':') -> tuple[str, Parsed]:
     """
     Read an argument that begins with the name of a drive.
 
-    :param option: ``--fault`` or ``--axis``.
-    :param parse: reads what stands behind the colon; may raise ValueRefused.
+    :param option: ``--fault``, ``--axis`` …
+    :param parse: reads what stands behind the sign; may raise ValueRefused.
     :raises WrongUsage: it makes no sense; says what is allowed.
     """
-    name, colon, rest = text.partition(':')
-    if not colon:
+    name, found, rest = text.partition(sign)
+    if not found:
         raise WrongUsage(f'{option} {text}: write {_EXAMPLES[option]}')
     if name not in configuration.drives:
         raise WrongUsage(f"{option} {text}: no drive '{name}'; drives: "

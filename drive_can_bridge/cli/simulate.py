@@ -9,9 +9,10 @@ takes faults while the drives run (:class:`Console`).
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
+import re
 import select
 import signal
 import sys
@@ -23,6 +24,9 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
+from drive_can_bridge.protocols.cia402.states import CONTROL_WORD, STATUS_WORD
+from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
+from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.faults import Fault, parse_fault, usage_lines
 from drive_can_bridge.simulation.registers import Mechanics
 from drive_can_bridge.simulation.simulation import PlayedDrive, Say, ShowFrame, Simulation
@@ -33,6 +37,8 @@ _CHUNK = 4096
 _LINE_MAX = 1000
 #: s between two looks at the threads
 _LOOK_PERIOD = 0.5
+CIA402 = 'cia402'
+_OBJECT = re.compile('([0-9A-Fa-f]{4})h?(?:[.]([0-9A-Fa-f]{1,2})h?)?')
 
 
 class Console:
@@ -158,6 +164,13 @@ def define(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--axis', metavar='DRIVE:KEY=VALUE,…', action='append', default=[],
                         help='what the motor of a drive carries, for example '
                              'lift:load=0.3,noise=1,brake=0; repeatable')
+    parser.add_argument('--without', metavar='DRIVE=OBJECT,…', action='append', default=[],
+                        help='objects that a cia402 drive does not have, for example '
+                             'servo=6007h,1800h.05h; repeatable')
+    parser.add_argument('--habit', metavar='DRIVE:KEY=VALUE,…', action='append', default=[],
+                        help='what differs between makers of cia402 drives, for example '
+                             'servo:mapping=operational,start=0.3 (docs/simulation.md); '
+                             'repeatable')
     parser.add_argument('--log-frames', metavar='FILE', type=Path, nargs='?', const=Path('-'),
                         help='print every frame: (seconds) BUS ID#DATA R|T; or write it to FILE, '
                              'as candump -L does')
@@ -187,8 +200,9 @@ def run(args: argparse.Namespace) -> int:
         faults = [of_drive('--fault', text, configuration, parse_fault) for text in args.fault]
         mechanics = dict(of_drive('--axis', text, configuration, Mechanics.parse)
                          for text in args.axis)
+        servos = _servos(configuration, args.without, args.habit)
         with ExitStack() as stack:
-            return _simulate(stack, args.clock, configuration, faults, mechanics, pty=pty,
+            return _simulate(stack, args.clock, configuration, faults, mechanics, servos, pty=pty,
                              link=args.pty_link, log_frames=args.log_frames,
                              strict=args.bitrate is not None)
     except (BusMisconfigured, BusUnavailable) as error:
@@ -197,8 +211,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration,
-              faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics], *, pty: bool,
-              link: Path | None, log_frames: Path | None, strict: bool) -> int:
+              faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics],
+              servos: 'Servos', *, pty: bool, link: Path | None, log_frames: Path | None,
+              strict: bool) -> int:
     # before anything is announced: a reader of the first line may send the signal at once
     wake = stack.enter_context(_signals_as_descriptor())
     if not pty:     # a bridge locks the other end of a pseudo-terminal
@@ -219,6 +234,7 @@ def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration
             simulation.drives[name].fault(fault)
         except ValueRefused as error:
             raise WrongUsage(f'--fault {name}:{fault}: {error}') from None
+    servos.prepare(simulation)
     for bus in configuration.buses.values():
         if pty:
             terminals[bus.name] = terminal = SlcanTerminal(
@@ -240,6 +256,73 @@ def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration
         for rule, count in drive.violations.items():
             output.say(f'{drive.name}: violation: {rule}: {count} times')
     return status
+
+
+@dataclass(frozen=True)
+class Servos:
+    """What the command line says of drives of CiA 402."""
+
+    without: dict[str, frozenset[tuple[int, int | None]]]
+    habits: dict[str, Habits]
+
+    def prepare(self, simulation: Simulation) -> None:
+        """Make the drives like that. What one does not have anyway is told."""
+        for name, habits in self.habits.items():
+            _servo(simulation, name).habits = habits
+        for name, places in self.without.items():
+            servo = _servo(simulation, name)
+            for index, subindex in sorted(places, key=str):
+                if not servo.has(index, subindex):
+                    _complain(f'--without: {name} has no {_object_text(index, subindex)} anyway')
+            servo.take_away(places)
+
+
+def _servos(configuration: BridgeConfiguration, without: list[str], habit: list[str]) -> Servos:
+    """
+    Read ``--without`` and ``--habit``.
+
+    :raises WrongUsage: they make no sense, or are said of a drive of another family.
+    """
+    taken: dict[str, frozenset[tuple[int, int | None]]] = {}
+    for text in without:
+        name, places = of_drive('--without', text, configuration, _objects, '=')
+        taken[name] = taken.get(name, frozenset()) | places
+    habits = dict(of_drive('--habit', text, configuration, Habits.parse) for text in habit)
+    for option, names in (('--without', taken), ('--habit', habits)):
+        for name in names:
+            protocol = configuration.drives[name].protocol
+            if protocol != CIA402:
+                raise WrongUsage(f'{option} {name}: it is a drive of {protocol}, '
+                                 f'allowed are those of {CIA402}')
+    return Servos(taken, habits)
+
+
+def _objects(text: str) -> frozenset[tuple[int, int | None]]:
+    """
+    Read ``6007h,1800h.05h``; a sub-index that is left out is all of the index.
+
+    :raises ValueRefused: it is no list of objects, or one without which no drive can be played.
+    """
+    found: set[tuple[int, int | None]] = set()
+    for part in text.split(','):
+        match = _OBJECT.fullmatch(part.strip())
+        if match is None:
+            raise ValueRefused(f"'{part.strip()}' is no object; write 6007h or 1800h.05h")
+        index, subindex = int(match[1], 16), int(match[2], 16) if match[2] else None
+        if index in (CONTROL_WORD, STATUS_WORD):
+            raise ValueRefused(f'{index:04X}h: without it there is no drive')
+        found.add((index, subindex))
+    return frozenset(found)
+
+
+def _object_text(index: int, subindex: int | None) -> str:
+    return f'{index:04X}h' + ('' if subindex is None else f'.{subindex:02X}h')
+
+
+def _servo(simulation: Simulation, name: str) -> SimulatedServoDrive:
+    drive = simulation.drives[name].drive
+    assert isinstance(drive, SimulatedServoDrive)
+    return drive
 
 
 def _frame_log(stack: ExitStack, clock: Clock, output: '_Output',

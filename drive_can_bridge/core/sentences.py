@@ -549,6 +549,22 @@ other_master_asks_node = Text(
     'another master sends {what} to node {node}: {frame}',
     fields='node what frame',
     do='end the other master; there must be one only')
+other_master_resets = Text(
+    'another master restarts {whom} (NMT {command}: {frame}): the drive loses its power and its '
+    'set-up', fields='command whom frame',
+    do='have the other master leave this node alone, or start it before the bridge')
+other_master_nmt = Text(
+    'another master sends NMT {command} to {whom}: {frame}', fields='command whom frame',
+    do='have the other master leave this node alone; where it is to start the nodes, set '
+       'nmt_start: false here')
+heartbeats_ended = Text(
+    'another master switches the heartbeats of node {node} off (1017h := 0): {frame}; a loss is '
+    'seen by missing answers alone', fields='node frame',
+    do='have it leave 1017h alone, or set heartbeat_timeout: 0 here')
+other_master_reads = Text(
+    'somebody else reads node {node} by SDO: {frame}; a node serves one client, so that requests '
+    'of both can fail', fields='node frame',
+    do='have it ask through the bridge (drive_can read, the parameter services)')
 other_master_broadcasts = Text(
     'another master sends broadcasts, which station {station} obeys if it is set to listen '
     '(P509): {frame}',

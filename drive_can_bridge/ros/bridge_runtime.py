@@ -50,6 +50,10 @@ _RANKS = {DriveState.OFFLINE: 1, DriveState.FAULT: 2, DriveState.MAPPING_DIFFERS
 _BUS_LOST_RANK = 3
 #: s that is waited for the first attempt to open the buses, to report what can never work
 FIRST_ATTEMPT_TIMEOUT = 3.0
+#: s that one may take longer than another that is open: its drives may be enabled since before
+OTHERS_TIMEOUT = 0.5
+#: s between two looks whether one is open
+_LOOK = 0.05
 
 
 class Trigger(Protocol):
@@ -322,9 +326,7 @@ class BridgeRuntime:
         """
         for exchange in self.exchanges.values():
             exchange.open()
-        deadline = self._clock.now() + FIRST_ATTEMPT_TIMEOUT
-        for exchange in self.exchanges.values():
-            exchange.link.wait_first_attempt(max(0.0, deadline - self._clock.now()))
+        self._await_buses()
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)
         self._misconfigured = None
@@ -333,6 +335,16 @@ class BridgeRuntime:
         self._reporting.start()
         if self.joints is not None:
             self.joints.start()
+
+    def _await_buses(self) -> None:
+        """Wait until each bus was tried once; not for long, where another one is open."""
+        links = [exchange.link for exchange in self.exchanges.values()]
+        deadline, others_wait = self._clock.now() + FIRST_ATTEMPT_TIMEOUT, False
+        for link in links:
+            while not link.wait_first_attempt(_LOOK) and self._clock.now() < deadline:
+                if not others_wait and any(other.is_open for other in links):
+                    others_wait = True
+                    deadline = min(deadline, self._clock.now() + OTHERS_TIMEOUT)
 
     def activate(self) -> None:
         """Begin the exchange with every drive."""

@@ -21,7 +21,8 @@ from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.pdos import Pdo, Pdos
 from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
-from drive_can_bridge.simulation.cia402_plant import Habits, own_parameters, ServoPlant
+from drive_can_bridge.simulation.cia402_plant import (
+    Habits, LOST_MASTER, own_parameters, ServoPlant)
 from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
 from drive_can_bridge.simulation.registers import PlantFactory, Refused
 
@@ -87,7 +88,7 @@ class SimulatedServoDrive(SimulatedDrive):
     """
     One drive. See the base class.
 
-    :ivar habits: what differs between makers; may be replaced before it is set up.
+    :ivar habits: what differs between makers; may be replaced while nobody has set it up.
     """
 
     plant: ServoPlant
@@ -98,13 +99,14 @@ class SimulatedServoDrive(SimulatedDrive):
             raise ConfigurationError([f'{self.name}: a drive of CiA 402 needs a ServoPlant'])
         self.table = ObjectDictionary(self.registers)
         self.pdos = Pdos(self.configuration.station, self.table, *self._factory())
-        self.habits = Habits()
         self._consumer = HeartbeatConsumer()
         self._node_state = NmtState.BOOT_UP
         self.power_lost(forget=False)
         self.node = self.companion = CanopenNode(
             self, self, constants=self._constants, trip_code=self.plant.trip_code, heartbeat=0,
             make_emergency=_emergency, segmented_writes=True)
+        self.pdos.absent = self.node.absent
+        self.habits = Habits()
 
     @property
     def habits(self) -> Habits:
@@ -114,6 +116,27 @@ class SimulatedServoDrive(SimulatedDrive):
     def habits(self, habits: Habits) -> None:
         self._habits = self.pdos.habits = habits
         self.plant.habits = self.plant.machine.habits = habits
+        self.node.start_time = habits.start
+
+    def take_away(self, places: Iterable[tuple[int, int | None]]) -> None:
+        """
+        Have objects no more: SDO and mappings find none.
+
+        What follows from their content stays as delivered; without 6007h a lost master is told by
+        an emergency (8130h, register 11h), and the axis moves on, as Lely core 2.4 has it.
+
+        :param places: index and sub-index; None: all of the index.
+        """
+        self.node.take_away(frozenset(places))
+
+    def has(self, index: int, subindex: int | None) -> bool:
+        """Tell whether there is an object; None: anything of the index."""
+        try:
+            self.node.read_object(index, subindex or 0)
+        except Refused as error:
+            return error.code != sdo.NO_SUCH_OBJECT and (
+                subindex is None or error.code != sdo.NO_SUCH_SUBINDEX)
+        return True
 
     def allow_torque(self, allowed: bool) -> None:
         self.plant.machine.set_safe(allowed)
@@ -234,15 +257,23 @@ class SimulatedServoDrive(SimulatedDrive):
             for pdo in (*self.pdos.receive, *self.pdos.transmit):
                 pdo.pending = pdo.sent = None
         elif self._node_state is NmtState.STOPPED and before is NmtState.OPERATIONAL:
-            self.plant.machine.connection_lost()
+            self._connection_lost()
         for node in self._consumer.missed(now):
             self._notices.append(f'{self.name}: no heartbeat of node {node}')
-            self.plant.machine.connection_lost()
+            if not self._connection_lost():
+                self.node.send_error(Emergency(LOST_MASTER, 0x11))
         self.plant.advance(now)
         self.node.look(now)
         for pdo in self.pdos.transmit if operational else ():
             if self.pdos.due(pdo) <= now:
                 self.answer(self.pdos.frame(pdo, now), now)
+
+    def _connection_lost(self) -> bool:
+        """Do what 6007h says, and tell whether there is one."""
+        if (states.ABORT_CONNECTION_OPTION, 0) in self.node.absent:
+            return False
+        self.plant.machine.connection_lost()
+        return True
 
     # -- objects ----------------------------------------------------------------------------------
 
@@ -259,7 +290,8 @@ class SimulatedServoDrive(SimulatedDrive):
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
         found = self.pdos.find(index)
         if found is not None:
-            self.pdos.write(*found, subindex, data)
+            self.pdos.write(*found, subindex, data,
+                            operational=self.node.state is NmtState.OPERATIONAL)
         elif index == CONSUMER_HEARTBEATS:
             self._consumer.write(subindex, data)
         elif index == STORE and subindex == 1:

@@ -13,14 +13,15 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 import math
 import random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
+from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.simulation import quantities
-from drive_can_bridge.simulation.canopen.pdos import PdoHabits
+from drive_can_bridge.simulation.canopen.pdos import Checks, PdoHabits
 from drive_can_bridge.simulation.canopen.sdo import Place
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, State
 from drive_can_bridge.simulation.motor import (
@@ -111,6 +112,7 @@ class Habits(PdoHabits):
     """
     What else differs between makers.
 
+    :param start: s from NMT start to operational.
     :param mode_shown_early: 6061h shows a new mode at once; else in operation enabled only.
     :param leaves_quick_stop: 000Fh leads from quick stop active (605Ah 5 to 8) back to operation.
     :param stand_bit: bit 10 tells in quick stop active that the axis stands.
@@ -119,11 +121,59 @@ class Habits(PdoHabits):
         is not found within two.
     """
 
+    start: float = 0.0
     mode_shown_early: bool = True
     leaves_quick_stop: bool = True
     stand_bit: bool = True
     ramp_bits: bool = True
     home_switch: float | None = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> 'Habits':
+        """
+        Read ``mapping=operational,start=0.3,types=254+255,stand_bit=0``.
+
+        :raises ValueRefused: says what is allowed.
+        """
+        given: dict[str, Any] = {}
+        for part in text.split(','):
+            key, _, value = map(str.strip, part.partition('='))
+            try:
+                given[key] = _HABITS[key][1](value)
+            except (KeyError, ValueError):
+                raise ValueRefused(
+                    f"'{part.strip()}' is not possible; allowed: "
+                    f'{", ".join(f"{name}={what}" for name, (what, _) in _HABITS.items())}',
+                ) from None
+        return cls(**given)
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 <= seconds <= 60.0:      # not a number is neither
+        raise ValueError
+    return seconds
+
+
+def _types(text: str) -> frozenset[int]:
+    types = frozenset(map(int, text.split('+')))
+    if not types <= frozenset(range(256)):
+        raise ValueError
+    return types
+
+
+def _switch(text: str) -> bool:
+    return {'0': False, '1': True}[text]
+
+
+#: what may be said of a habit in a text, and what reads it
+_HABITS: Mapping[str, tuple[str, Callable[[str], Any]]] = {
+    'mapping': ('|'.join(each.value for each in Checks), Checks),
+    'start': ('0…60', _seconds),
+    'types': ('1+254+255', _types),
+    **dict.fromkeys(('fixed_mapping', 'no_remote', 'mode_shown_early', 'leaves_quick_stop',
+                     'stand_bit', 'ramp_bits'), ('0|1', _switch)),
+}
 
 
 class DriveOperation(Operation):

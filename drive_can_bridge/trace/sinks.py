@@ -21,7 +21,9 @@ import json
 import math
 from typing import Any, NamedTuple, TextIO
 
-from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
+from drive_can_bridge.core.configuration import (
+    BridgeConfiguration, DriveConfiguration, JointConfiguration)
+from drive_can_bridge.core.continuous import ContinuousPosition
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.families import FAMILIES
@@ -426,6 +428,23 @@ class Marks:
             self.faults.append((time, time))
 
 
+class Turning:
+    """The position of a ``continuous`` joint: goes on where its counter begins again."""
+
+    def __init__(self, drive: DriveConfiguration, joint: JointConfiguration) -> None:
+        self._position = ContinuousPosition(joint, drive.cyclic_response)
+        #: s without a sample after which nobody knows how far it has turned: as for the bridge
+        self._lost_after = (drive.missed_limit + 1) * drive.period
+        self._last = math.nan
+
+    def take(self, time: float, raw: int) -> int:
+        """Return the raw integer without wraps."""
+        if time - self._last > self._lost_after:
+            self._position.begin_again()
+        self._last = time
+        return self._position.take(raw)
+
+
 class Plotter:
     """
     Collects curves for a picture.
@@ -439,6 +458,7 @@ class Plotter:
         self._curves: dict[tuple[str, str], Curve] = {}
         self._lanes: dict[tuple[str, str], Lanes] = {}
         self._marks: dict[str, Marks] = {}
+        self._turning: dict[tuple[str, str], Turning] = {}
         self._start = math.nan
         for text in wanted:
             drive_name, _, name = text.partition('.')
@@ -460,6 +480,9 @@ class Plotter:
         self._marks.setdefault(drive.name, Marks())
         unit = parameter.unit if parameter is not None else ''
         self._curves[drive.name, name] = Curve(f'{drive.name}.{name}', unit)
+        joint = drive.joint
+        if joint is not None and joint.continuous is not False and joint.position == name:
+            self._turning[drive.name, name] = Turning(drive, joint)
 
     def __call__(self, bus: str, telegram: Telegram) -> None:
         """Take a telegram."""
@@ -476,6 +499,8 @@ class Plotter:
                 self._lanes_of(place, parameter).add(telegram.time - self._start, raw)
                 continue
             if place in self._curves:
+                if place in self._turning:
+                    raw = self._turning[place].take(telegram.time, raw)
                 self._curves[place].add(telegram.time - self._start,
                                         float(parameter.value_from_raw(raw)))
 

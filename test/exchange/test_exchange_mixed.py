@@ -67,6 +67,28 @@ def test_what_came_in_one_packet_is_taken_before_anything_is_sent() -> None:
     assert len(bench.link.coming) == 1, 'nothing is to be sent, so nobody looks'
 
 
+def test_the_start_of_another_master_concerns_all_nodes() -> None:
+    """NMT and, of a PKW drive, requests to its SDO server are on identifiers of no drive."""
+    target = parameter('target', None, index=0x60FF, subindex=0, type=INT32)
+    bench = Bench(drive('cia402', name='servo', station=5, mode='pv', table=(target,),
+                        request=(target,), response=()),
+                  drive('canopen_pkw', name='starter', station=6))
+    bench.begin()
+
+    def told(text: str) -> list[list[str]]:
+        for notes in bench.notes:
+            notes.events.clear()
+        bench.hears(text, 10.1)
+        return [[event.text.code for event in notes.events
+                 if isinstance(event, ForeignMasterSeen)] for notes in bench.notes]
+    assert told('000#8200') == [['other_master_resets']] * 2
+    assert told('000#0206') == [[], ['other_master_nmt']]
+    assert told('605#2B17100000000000') == [['heartbeats_ended'], []]
+    assert told('606#4000100000000000') == [[], ['other_master_reads']]
+    assert told('607#4000100000000000') == [[], []]
+    assert bench.exchange.frames_rejected == 1
+
+
 def test_both_begin_at_once() -> None:
     bench = mixed()
     bench.begin()

@@ -362,8 +362,13 @@ def test_base_with_wheels(bridge: StartBridge, client: Client) -> None:
         assert one.played['left_wheel'].value('actual_speed') == pytest.approx(382.0, abs=0.1)
         assert one.played['right_wheel'].value('actual_speed') == pytest.approx(-573.0, abs=0.1)
         message = manager.hardware.latest
-        assert not len(message.position)
-        assert not takes_positions(message), 'so transforms come from joint_state_broadcaster'
+        assert takes_positions(message)
+        # its counter began 10 turns before its end: it begins again, and the joint goes on
+        left = one.played['left_wheel']
+        wait_until(lambda: left.value('actual_position') < 0.0, what='the counter has wrapped')
+        turned = (float(left.value('actual_position')) + 655.36) / 20.0
+        assert state['left_wheel_joint', 'position'] == pytest.approx(
+            2.0 * math.pi * turned, abs=5.0)
 
         # without power at speed: neutral until commanded neutral, whatever the controller goes on
         one.played['right_wheel'].fault('power_cut=4')

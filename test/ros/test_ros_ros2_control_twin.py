@@ -34,9 +34,9 @@ class Node:
 class Arm:
     """The example's system with its controller, in virtual time."""
 
-    def __init__(self, robot: str = 'arm') -> None:
+    def __init__(self, urdf: Path = FOLDER / 'arm.urdf') -> None:
         self.node = Node()
-        self.hardware = HardwareTwin(self.node, System(FOLDER / f'{robot}.urdf'))
+        self.hardware = HardwareTwin(self.node, System(urdf))
         text = (FOLDER / 'arm_controllers.yaml').read_text(encoding='utf-8')
         self.controller = TrajectoryTwin(self.hardware, Constraints.of(
             yaml.safe_load(text)['arm_controller']['ros__parameters']))
@@ -87,8 +87,12 @@ def test_nan_is_skipped_and_the_last_value_stays(arm: Arm) -> None:
     assert arm.hardware.configured
 
 
-def test_a_value_without_an_interface_unconfigures_and_it_comes_back_by_hand() -> None:
-    arm = Arm('base')
+def test_a_value_without_an_interface_unconfigures_and_it_comes_back_by_hand(
+        tmp_path: Path) -> None:
+    text = (FOLDER / 'base.urdf').read_text(encoding='utf-8')
+    less = tmp_path / 'base.urdf'
+    less.write_text(text.replace('<state_interface name="position"/>', ''), encoding='utf-8')
+    arm = Arm(less)
     names = ['left_wheel_joint', 'right_wheel_joint']
     arm.node.receive(JointState(name=names, velocity=[1.0, 2.0]))
     arm.cycle()

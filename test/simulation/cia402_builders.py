@@ -10,6 +10,7 @@ import builders
 from drive_can_bridge.configuration.profiles import read_profile
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.resources import profiles_directory
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
@@ -104,6 +105,10 @@ class Servo:
         answer, = self.ask(f'605#40{place}00000000')
         assert answer.startswith('585#4')
         return int.from_bytes(bytes.fromhex(answer[-8:]), 'little')
+
+    @property
+    def node_state(self) -> NmtState:
+        return self.drive.node.state
 
     @property
     def status(self) -> int:

@@ -148,6 +148,14 @@ def refused(capsys: pytest.CaptureFixture[str], directory: Path, *arguments: str
     (('--bitrate', '99'), 2, '--bitrate: 99: allowed are 1000 to 8000000 bit/s, also as 500k; '
                              'see drive_can simulate --help'),
     (('--axis', 'lift:load=2'), 2, "'load=2' is not possible; allowed: load=0…1"),
+    (('--without', 'lift'), 2, 'write DRIVE=OBJECT, for example servo=6007h,1800h.05h'),
+    (('--without', 'lift=6007h'), 2,
+     'lift: it is a drive of datamodel_extended, allowed are those of cia402'),
+    (('--without', 'lift=6o07h'), 2, "'6o07h' is no object; write 6007h or 1800h.05h"),
+    (('--without', 'lift=605Ah,6041h'), 2, '6041h: without it there is no drive'),
+    (('--habit', 'belt:start=1'), 2, "no drive 'belt'"),
+    (('--habit', 'lift:start=-1'), 2, "'start=-1' is not possible; allowed: "
+                                      'mapping=checked|operational|unchecked, start=0…60, '),
     (('--interface', 'nonsense'), 1,
      "drive_can simulate: --interface: 'nonsense' is no interface of python-can, allowed: "),
     (('--pty-link', '/dev/null/x'), 1, '/dev/null'),

@@ -9,6 +9,8 @@ import pytest
 from simulation_builders import RULES
 
 from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.protocols.canopen.network import NmtState
+from drive_can_bridge.simulation.canopen.pdos import Checks
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.motor import MotorPlant
@@ -95,18 +97,112 @@ def test_a_mapping_is_changed_in_the_order_of_the_standard_only() -> None:
     # entries only while their number is 0
     assert servo.refused(0x1A00, 1, 0x60640020, 4) == 0x06010000
     servo.write(0x1A00, 0, 0, 1)
-    assert servo.refused(0x1A00, 1, 0x60640010, 4) == 0x06040041     # half of it
+    # codes of CANopenNode 4 (9b8beed)
+    assert servo.refused(0x1A00, 1, 0x60640028, 4) == 0x06040041     # more than it has
+    assert servo.refused(0x1A00, 1, 0x6064000C, 4) == 0x06040041     # one and a half bytes
     assert servo.refused(0x1A00, 1, 0x10180120, 4) == 0x06040041     # no process data
-    assert servo.refused(0x1A00, 1, 0x50000010, 4) == 0x06040041     # does not exist
+    assert servo.refused(0x1A00, 1, 0x50000010, 4) == 0x06020000     # does not exist
+    assert servo.refused(0x1A00, 1, 0x60C10520, 4) == 0x06090011
     for place in (1, 2, 3):
         servo.write(0x1A00, place, 0x60640020, 4)
     assert servo.refused(0x1A00, 0, 3, 1) == 0x06040042
-    assert servo.refused(0x1A00, 0, 9, 1) == 0x06090031
+    assert servo.refused(0x1A00, 0, 9, 1) == 0x06040042
     servo.write(0x1A00, 0, 2, 1)
     servo.write(0x1800, 2, 1, 1)
     servo.write(0x1800, 1, 0x40000185, 4)
     assert servo.ask('000#0105') == []
     assert servo.ask('080#') == [f'185#{BEGINNING.to_bytes(4, "little").hex().upper() * 2}']
+
+
+def test_fewer_bytes_than_an_object_has_are_taken() -> None:
+    servo = Servo()
+    servo.write(0x1800, 1, 0xC0000185, 4)
+    servo.write(0x1A00, 0, 0, 1)
+    servo.write(0x1A00, 1, 0x60640010, 4)
+    servo.write(0x1A00, 0, 1, 1)
+    servo.write(0x1800, 2, 1, 1)
+    servo.write(0x1800, 1, 0x40000185, 4)
+    servo.ask('000#0105')
+    assert servo.ask('080#') == [f'185#{BEGINNING.to_bytes(2, "little").hex().upper()}']
+
+
+@pytest.mark.parametrize(('checks', 'operational'), [
+    (Checks.OPERATIONAL, False), (Checks.UNCHECKED, False), (Checks.UNCHECKED, True)])
+def test_stacks_that_check_no_mapping(checks: Checks, operational: bool) -> None:
+    """As Lely core 2.4 does while pre-operational, CanFestival 3 and durand 0.5 always."""
+    servo = Servo(habits=Habits(mapping=checks))
+    if operational:
+        servo.ask('000#0105')
+    # in no order, an object that does not exist, more bytes than it has; all is read back
+    servo.write(0x1800, 2, 1, 1)
+    servo.write(0x1800, 1, 0x40000285, 4)
+    servo.write(0x1A00, 1, 0x50000010, 4)
+    servo.write(0x1A00, 2, 0x60410020, 4)
+    servo.write(0x1A00, 0, 2, 1)
+    assert [servo.read(0x1A00, place) for place in range(3)] == [2, 0x50000010, 0x60410020]
+    servo.write(0x1600, 0, 2, 1)
+    servo.write(0x1600, 1, 0x50000010, 4)
+    servo.write(0x1600, 2, 0x60400010, 4)
+    servo.ask('000#0105')
+    # what does not exist is 0 there, and has no effect
+    assert servo.ask('080#') == ['285#000050020000']
+    servo.ask('205#34120600')
+    assert servo.read(0x6040) == 6
+
+
+def test_lely_checks_while_operational() -> None:
+    servo = Servo(habits=Habits(mapping=Checks.OPERATIONAL))
+    servo.ask('000#0105')
+    assert servo.refused(0x1800, 1, 0x40000285, 4) == 0x06090030
+    assert servo.refused(0x1A00, 1, 0x60640020, 4) == 0x06010000
+
+
+def test_a_start_that_takes_its_time() -> None:
+    servo = Servo(habits=Habits(start=0.3))
+    servo.ask('000#0105', 1.0)
+    servo.ask('000#0105', 1.2)      # a second one does not delay it
+    assert servo.node_state is NmtState.PRE_OPERATIONAL
+    assert servo.drive.next_timer() == 1.3
+    assert servo.at(1.3) == ['185#5002']
+    assert servo.node_state is NmtState.OPERATIONAL
+    servo.ask('000#8005', 2.0)
+    servo.ask('000#0105', 2.1)
+    servo.ask('000#8005', 2.2)      # taken back
+    servo.at(3.0)
+    assert servo.node_state is NmtState.PRE_OPERATIONAL
+
+
+def test_objects_that_were_taken_away() -> None:
+    servo = Servo()
+    servo.drive.take_away([(0x605A, None), (0x1800, 5), (0x6072, None), (0x1017, None)])
+    assert servo.ask('605#405A600000000000') == ['585#805A600000000206']
+    assert servo.ask('605#2B5A600002000000') == ['585#805A600000000206']
+    assert servo.ask('605#4000180500000000') == ['585#8000180500000206']
+    assert servo.read(0x1800, 3) == 0
+    servo.write(0x1400, 1, 0x80000205, 4)
+    servo.write(0x1600, 0, 0, 1)
+    assert servo.refused(0x1600, 1, 0x60720010, 4) == 0x06020000
+    servo.drive.fault('restart', 1.0)
+    assert servo.at(1.5) == ['705#00']
+    assert servo.at(9.0) == [], 'no heartbeat, and nothing to switch it on'
+    assert servo.ask('605#2B17100064000000') == ['585#8017100000000206']
+
+
+def test_without_6007h_a_lost_master_is_told_and_the_axis_moves_on() -> None:
+    """As Lely core 2.4 (620d185) was seen to do: 8130h, register 11h, never taken back."""
+    servo = Servo()
+    servo.drive.take_away([(0x6007, None)])
+    servo.set_up(9)
+    servo.write(0x1016, 1, 0x7F0064, 4)
+    servo.enable()
+    servo.target = 10_000
+    servo.ask('77F#05')
+    servo.run(0.09)
+    told = servo.at(servo.now + 0.02)
+    assert '085#3081110000000000' in told
+    status, _ = servo.run(1.0)
+    assert status & 0x6F == 0x27
+    assert servo.speed == pytest.approx(1.0)
 
 
 def test_an_rpdo_of_type_1_counts_from_the_sync_on() -> None:

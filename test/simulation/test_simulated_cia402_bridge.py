@@ -11,6 +11,7 @@ import pytest
 from saying import says
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
+from drive_can_bridge.simulation.canopen.pdos import Checks
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
 
@@ -101,6 +102,9 @@ def test_an_axis_stays_where_it_is_whatever_happens() -> None:
     (Habits(types={254}), {**PV, 'transmission': 'event'}, True),
     (Habits(types={1, 255}), {}, True),
     (Habits(no_remote=True), {}, True),
+    (Habits(mapping=Checks.OPERATIONAL), {}, True),
+    (Habits(mapping=Checks.UNCHECKED), {}, True),
+    (Habits(start=0.5), {}, True),
     (Habits(mode_shown_early=False), {}, True)])
 def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> None:
     cable = Cable(configuration(**keys), habits=habits)
@@ -111,6 +115,29 @@ def test_makers_differ(habits: Habits, keys: dict[str, Any], online: bool) -> No
         cable.command(0.0)
         cable.command(60.0, 1.0)
         assert cable.speed == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(('taken', 'keys', 'online', 'told'), [
+    ([(0x605A, None), (0x605B, None), (0x605C, None)], {}, True, ''),
+    ([(0x6007, None), (0x6502, None), (0x1800, 5)], {}, True, 'is not known (no 6007h)'),
+    ([(0x1016, None), (0x1006, None), (0x1019, None), (0x60C2, None)], {}, True,
+     'nothing stops this drive when the bridge dies'),
+    ([(0x1017, None)], {}, True, '1017h'),
+    ([(0x606C, None)], {}, False, '')])
+@pytest.mark.parametrize('habits', [Habits(), Habits(mapping=Checks.OPERATIONAL)])
+def test_makers_leave_out_objects(taken: list[Any], keys: dict[str, Any], online: bool,
+                                  told: str, habits: Habits) -> None:
+    cable = Cable(configuration(**keys), habits=habits,
+                  prepare=lambda drive: drive.take_away(taken))
+    cable.run(2.0)
+    assert cable.sessions[0].online is online, cable.told()
+    assert told in str(cable.told())
+    if online:
+        assert cable.control(ControlAction.ENABLE)[0]
+        cable.command(0.0)
+        cable.command(60.0, 1.0)
+        assert cable.speed == pytest.approx(1.0, rel=1e-3)
+        assert cable.control(ControlAction.QUICK_STOP)[0]
 
 
 # -- ways out, told by the motor ------------------------------------------------------------------

@@ -243,6 +243,30 @@ def test_a_servo_as_configured() -> None:
     assert Bench(simulated(verified)).probe(AXIS)['mapping'].value == 'verify'
 
 
+@pytest.mark.parametrize(('axes', 'told'), [
+    ({}, []),
+    ({0x6841: 0x0250}, [
+        'there are 2 axes behind this node (6841h is 0250h): the bridge drives the first (6040h), '
+        'and leaves the others alone']),
+    ({0x6841: 0x0250, 0x7041: 0x1237, 0x8041: 0x0250}, [
+        'there are 3 axes behind this node (6841h is 0250h, 7041h is 1237h): the bridge drives '
+        'the first (6040h), and leaves the others alone'])])
+def test_which_axis_is_driven_of_several(axes: dict[int, int], told: list[str]) -> None:
+    servo, station = simulated(AXIS), AXIS.station
+
+    def device(frame: Frame) -> list[Frame]:
+        index = int.from_bytes(frame.data[1:3], 'little')
+        if index not in axes:
+            return servo(frame)
+        return [Frame(0x580 + station, b'\x4B' + frame.data[1:4] + axes[index].to_bytes(
+            4, 'little'), False)]
+    asker = Asker(BusConfiguration('main', 'virtual', 'x'), bench := Bench(device), [AXIS],
+                  bench.clock)
+    prober = FAMILIES['cia402'].make_prober(AXIS)
+    asker.probe(prober)
+    assert prober.notes == told
+
+
 class Story:
     """Does the steps of a transcript."""
 

@@ -1,10 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Curves in bounded memory."""
 
+import builders
+from trace_builders import bridge
+
+from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.trace.sinks import Curve, Lanes, Marks
+from drive_can_bridge.trace.sinks import Curve, Lanes, Marks, Plotter
 
 
 def test_a_short_curve_is_kept_as_it_is() -> None:
@@ -53,3 +57,18 @@ def test_a_word_has_a_lane_for_each_bit() -> None:
         lanes.add(time, raw)
     assert [curve.points() for curve in lanes.curves] == [
         ([0.0, 1.0, 2.0], [0.0, 0.8, 0.8]), ([0.0, 1.0, 2.0], [1.0, 1.0, 1.8])]
+
+
+def test_the_position_of_a_joint_that_turns_on_and_on_goes_on_in_a_picture() -> None:
+    place = builders.parameter('place', 214, type=builders.INT16, scale=0.5, unit='rev')
+    drive = builders.drive(
+        table=(place,), response=(place,), period=0.1, missed_limit=2,
+        joint=JointConfiguration('wheel', position='place', continuous=True))
+    plotter = Plotter(bridge(drive), ['conveyor.place'], [])
+    # a counter of 16 bits that begins again; after a loss the drive has the word
+    for time, raw in ((5.0, 32766), (5.1, -32766), (5.2, -32764), (6.0, 8), (6.1, 10)):
+        plotter('main', Telegram(time, 'conveyor', Direction.RESPONSE, Kind.CYCLIC,
+                                 'cyclic response', (place,), (raw,)))
+    curve, = plotter._curves.values()
+    assert [round(time, 6) for time in curve.points()[0]] == [0.0, 0.1, 0.2, 1.0, 1.1]
+    assert curve.points()[1] == [16383.0, 16385.0, 16386.0, 4.0, 5.0]

@@ -7,12 +7,13 @@ from typing import Any, Literal
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import STANDARD_IDENTIFIER_MAX, worst_bits
+from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.addressing import (
     node_claims, NodeOptions, predefined_set, reserved_claims, station_complaints)
+from drive_can_bridge.protocols.canopen.masters import NMT_ROUTE, sdo_route
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, option, Talk
@@ -91,6 +92,10 @@ class CanopenPkw(Family):
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         return reserved_claims(drive)
+
+    def overheard(self, drive: DriveConfiguration) -> list[Route]:
+        """Return NMT, and what the bridge does not use: requests to the SDO server of the node."""
+        return [NMT_ROUTE, sdo_route(drive.station)]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: each period one round, and every setpoint changes."""

@@ -46,7 +46,7 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.access import SentWrites
-from drive_can_bridge.protocols.canopen import network
+from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
@@ -412,6 +412,13 @@ class PkwSession(Session):
             elif identifier == options.request_cob_id:
                 self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
                     self.configuration.station, 'PKW requests', str(frame))))
+            elif identifier == network.NMT_IDENTIFIER:
+                ordered = masters.nmt_command(frame, self.configuration.station)
+                if ordered:
+                    self.report.note(ForeignMasterSeen(ordered))
+            elif identifier == sdo.REQUEST_BASE + self.configuration.station:
+                self.report.note(ForeignMasterSeen(
+                    masters.sdo_request(frame, self.configuration.station)))
         except RemoteProtocolError as error:
             self.report.reject(sentences.malformed(str(error)))
             if not self.online:

@@ -64,6 +64,7 @@ class BringUp:
     :param beat: has SYNC; None: the drive does not hear it.
     :ivar nmt_at: when it was sent NMT last.
     :ivar started_at: when it was sent NMT start last.
+    :ivar moving: in which state it was found, where nobody has seen it leave that since.
     """
 
     def __init__(self, session: Session, node: Node, rules: DriveRules, channel: SdoChannel,
@@ -77,6 +78,7 @@ class BringUp:
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
         self._told: set[str] = set()
+        self.moving: State | None = None
         self._found = NOTHING           # what was told of a drive that runs
         self.options: dict[int, int] = {}
         self.nmt_at = self.started_at = -math.inf
@@ -165,6 +167,7 @@ class BringUp:
             if state not in states.MOVING:
                 break
             self._stopped_at = min(self._stopped_at, self._channel.now)
+            self.moving = state
             # a fault reaction ends by itself, whatever it is told; a quick stop takes its course
             braking = state is State.FAULT_REACTION or (
                 state is State.QUICK_STOP_ACTIVE and (yield from self._brakes()))
@@ -185,7 +188,7 @@ class BringUp:
             yield Ask(pause=LOOK_PERIOD)
             reply = yield from self._transfer(Ask(states.STATUS_WORD))
         self._found = NOTHING
-        self._disabled = True
+        self.moving, self._disabled = None, True
         self._rules.known_disabled()
         self._session.duty.happened(Happened.STOPPED)
         return raw

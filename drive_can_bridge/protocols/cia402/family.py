@@ -13,6 +13,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
     node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints)
+from drive_can_bridge.protocols.canopen.masters import NMT_ROUTE
 from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
@@ -159,6 +160,10 @@ class Cia402(Family):
 
     def reserved(self, drive: DriveConfiguration) -> list[Claim]:
         return reserved_claims(drive)
+
+    def overheard(self, drive: DriveConfiguration) -> list[Route]:
+        """Return NMT: another master may restart or stop all nodes at once."""
+        return [NMT_ROUTE]
 
     def bits_per_second(self, drive: DriveConfiguration) -> float:
         """Return the worst-case load: PDOs and SYNC once a period, and the heartbeats."""

@@ -32,6 +32,10 @@ from drive_can_bridge.protocols.telegrams import Direction
 PROFILE = 0x0192
 #: kinds of drives, in bits 16 to 23 of it
 _KINDS = {1: 'frequency converter', 2: 'servo drive', 4: 'stepper'}
+#: the other half of it where a node has several device modules (CiA 301)
+_MODULES = 0xFFFF
+#: index of the status word of the first axis; that of the next ones, so much above
+_STATUS_WORD, _NEXT_AXIS, _AXES_MAX = states.STATUS_WORD, 0x800, 8
 #: cycles that make process data likely to be what they look like
 _CYCLES = 3
 #: bits of a control word that no mode has
@@ -112,6 +116,8 @@ class Cia402Scanner(Scanner):
             self._types[node] = 'refused' if value is None else f'{value:08X}h'
             if value is not None and value & 0xFFFF == PROFILE:
                 kind = _KINDS.get(value >> 16 & 0xFF, 'drive')
+                if value >> 16 == _MODULES:
+                    kind = 'drive, perhaps several axes, of which the first is driven,'
                 self._types[node] = f'device type {value:08X}h ({kind} of CiA 402)'
                 self._tell(node)
                 self._ask_identity(node)
@@ -176,8 +182,25 @@ class Cia402Prober(Prober):
         if device is not None and device & 0xFFFF != _DEVICE_PROFILE:
             self.notes.append(f'1000h says {device:08X}h: no drive of CiA 402 (0192h in the lower '
                               'half)')
+        axes = yield from self._axes()
+        if axes:
+            self.notes.append(
+                f'there are {len(axes) + 1} axes behind this node '
+                f'({", ".join(f"{index:04X}h is {word:04X}h" for index, word in axes)}): the '
+                'bridge drives the first (6040h), and leaves the others alone')
         return [(yield from self._mode()), (yield from self._mapping()),
                 (yield from self._disable_word()), (yield from self._bridge_heartbeat())]
+
+    def _axes(self) -> Generator[Question, Frame | None, list[tuple[int, int]]]:
+        """Return the status words of further axes, with their indices."""
+        found: list[tuple[int, int]] = []
+        for axis in range(1, _AXES_MAX):
+            index = _STATUS_WORD + _NEXT_AXIS * axis
+            word = (yield from self._value(index, 0)).value
+            if word is None:
+                break
+            found.append((index, word & 0xFFFF))
+        return found
 
     def _mode(self) -> Generator[Question, Frame | None, Finding]:
         offered = yield from self._value(MODES_OFFERED, 0)

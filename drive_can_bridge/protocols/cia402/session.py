@@ -35,7 +35,7 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
 from drive_can_bridge.protocols.answers import Answers
-from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
@@ -222,10 +222,14 @@ class Cia402Session(Session):
         self._limits.stop()
         self._stop.forget()
         self._course.stop()
-        if self._rules.may_run and self.stage is not Stage.IDLE and not self.exchange.cycling:
+        found = self._bring_up.moving
+        if self.stage is not Stage.IDLE and not self.exchange.cycling and (
+                self._rules.may_run or found is State.OPERATION_ENABLED):
             # it has acknowledged its stop by SDO, and nobody has seen it disabled since
             for happened in Happened.RUN_LEFT, Happened.STOP_LEFT, Happened.SILENT:
                 self.duty.channel(CYCLE, happened)
+        elif self.stage is not Stage.IDLE and found is not None:
+            self.report.warn(sentences.still_in_state(found.value), may_run=True)
         owes = self.duty.happened(Happened.ENDS) is Do.STOP
         return self.stage is not Stage.IDLE and (
             self.exchange.cycling or owes or self._bring_up.watch.slot is not None)
@@ -412,10 +416,14 @@ class Cia402Session(Session):
                 self._again.heard(now)
                 self._channel.receive(data, now)
             elif identifier in self._masters:
-                sdo_request = identifier == sdo.REQUEST_BASE + self.configuration.station
-                self.report.note(ForeignMasterSeen(sentences.other_master_asks_node(
-                    self.configuration.station,
-                    'SDO requests' if sdo_request else 'process data', str(frame))))
+                node = self.configuration.station
+                self.report.note(ForeignMasterSeen(
+                    masters.sdo_request(frame, node) if identifier == sdo.REQUEST_BASE + node
+                    else sentences.other_master_asks_node(node, 'process data', str(frame))))
+            elif identifier == network.NMT_IDENTIFIER:
+                ordered = masters.nmt_command(frame, self.configuration.station)
+                if ordered:
+                    self.report.note(ForeignMasterSeen(ordered))
             elif identifier == network.HEARTBEAT_BASE + self.configuration.station and not data:
                 self._node.take_empty_heartbeat(self.report, now)
             elif identifier == network.HEARTBEAT_BASE + self.configuration.station:

@@ -13,7 +13,7 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
-from drive_can_bridge.simulation.canopen.sdo import checked_length, Objects, SdoServer
+from drive_can_bridge.simulation.canopen.sdo import Absent, checked_length, Objects, SdoServer
 from drive_can_bridge.simulation.drive import Companion, Ignored, SimulatedDrive
 from drive_can_bridge.simulation.registers import Refused
 
@@ -55,6 +55,8 @@ class CanopenNode(Companion):
     :param make_emergency: makes the message of a trip from its code.
     :param segmented_writes: takes them by SDO.
     :ivar state: boot-up: without power, or still starting.
+    :ivar start_time: s from NMT start to operational.
+    :ivar absent: objects that it does not have, although it could.
     """
 
     def __init__(self, drive: SimulatedDrive, objects: Objects, *,
@@ -69,6 +71,8 @@ class CanopenNode(Companion):
             1000.0 * watched / HEARTBEATS_WATCHED) if watched else HEARTBEAT
         self._make_emergency = make_emergency
         self._server = SdoServer(self, segmented_writes=segmented_writes)
+        self.start_time = 0.0
+        self.absent = Absent()
         self._now = -math.inf
         self._looks_at = math.inf
         # the boot-up frame leaves as soon as somebody looks
@@ -84,7 +88,7 @@ class CanopenNode(Companion):
     def power_lost(self, back_at: float) -> None:
         self.state = NmtState.BOOT_UP
         self._heartbeat = self._default_heartbeat
-        self._boots_at, self._beats_at = back_at, math.inf
+        self._boots_at, self._beats_at, self._starts_at = back_at, math.inf, math.inf
         self._server.reset()
         self._error = _NO_ERROR
 
@@ -95,6 +99,7 @@ class CanopenNode(Companion):
         if self.state is NmtState.BOOT_UP:
             # who is ready to receive has sent its boot-up frame
             self._report_state(now)
+        self._started(now)
         if identifier == network.NMT_IDENTIFIER:
             self._obey(data, now)
         elif identifier == REQUEST_BASE + self.number:
@@ -114,8 +119,18 @@ class CanopenNode(Companion):
             self._drive.lose_power(now, now + RESET_TIME)
         elif command == NmtCommand.RESET_COMMUNICATION:
             self._drive.restart(now + RESET_TIME)
-        elif self.state is not NmtState.BOOT_UP:
-            self.state = _STATES.get(command, self.state)
+        elif self.state is not NmtState.BOOT_UP and command in _STATES:
+            state = _STATES[command]
+            if state is not NmtState.OPERATIONAL:
+                self.state, self._starts_at = state, math.inf
+            elif self.state is not state:
+                self._starts_at = min(self._starts_at, now + self.start_time)
+                self._started(now)
+
+    def _started(self, now: float) -> None:
+        """Be operational once the start has taken its time."""
+        if self._starts_at <= now:
+            self.state, self._starts_at = NmtState.OPERATIONAL, math.inf
 
     def _serve(self, data: bytes, now: float) -> None:
         if self._communicates:
@@ -141,9 +156,10 @@ class CanopenNode(Companion):
         return self.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 
     def next_timer(self) -> float:
-        return min(self._boots_at, self._beats_at, self._looks_at)
+        return min(self._boots_at, self._beats_at, self._looks_at, self._starts_at)
 
     def handle_timer(self, now: float) -> None:
+        self._started(now)
         self._report_state(now)
         self.look(now)
 
@@ -163,11 +179,25 @@ class CanopenNode(Companion):
     def _plan_heartbeat(self, now: float) -> None:
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
+    def take_away(self, places: frozenset[tuple[int, int | None]]) -> None:
+        """Have these objects no more; a sub-index None is all of the index."""
+        self.absent.places = places
+        if HEARTBEAT_TIME in self.absent:
+            self._default_heartbeat = self._heartbeat = 0
+            self._beats_at = math.inf
+
+    def send_error(self, error: Emergency) -> None:
+        """Send an emergency that stays, whatever becomes of the motor."""
+        if self._communicates:
+            self._drive.send(network.encode_emergency(self.number, error))
+
     def read_object(self, index: int, subindex: int) -> bytes:
+        self.absent.check(index, subindex)
         content = self._content(index, subindex)
         return self._objects.read_object(index, subindex) if content is None else content
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
+        self.absent.check(index, subindex)
         if (index, subindex) == HEARTBEAT_TIME:
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
             self._plan_heartbeat(self._now)

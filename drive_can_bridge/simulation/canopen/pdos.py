@@ -2,20 +2,23 @@
 """
 PDOs of a simulated drive: their objects (1400h to 1BFFh), the rules of their mapping, and traffic.
 
-A mapping is changed as CANopenNode and the manuals of Festo and Nanotec want it: only while bit 31
-of the COB-ID is set, entries only while their number is 0; the number says whether all fit.
+A mapping is changed as CANopenNode 4 and the manuals of Festo and Nanotec want it: only while bit
+31 of the COB-ID is set, entries only while their number is 0, of objects that exist; the number
+says whether all fit. Fewer bytes than an object has are taken, more are not. Other stacks check
+less (:class:`Checks`).
 """
 
 from collections.abc import Collection
 from copy import deepcopy
 from dataclasses import dataclass, field
+from enum import Enum
 import math
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.simulation.canopen.sdo import (
-    bytes_of, checked_length, ObjectDictionary, TOO_HIGH)
+    Absent, bytes_of, checked_length, ObjectDictionary)
 from drive_can_bridge.simulation.registers import Refused
 
 COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
@@ -28,16 +31,29 @@ _MAPPABLE_FROM = 0x2000
 _WIDTHS = {1: 4, 2: 1, 3: 2, 5: 2}
 
 
+class Checks(Enum):
+    """What is checked when a mapping is written."""
+
+    #: everything, in every state: CANopenNode 4
+    CHECKED = 'checked'
+    #: everything, but nothing while pre-operational: Lely core 2.4
+    OPERATIONAL = 'operational'
+    #: nothing, ever: CanFestival 3, durand 0.5
+    UNCHECKED = 'unchecked'
+
+
 @dataclass(frozen=True)
 class PdoHabits:
     """
     What differs between makers.
 
+    :param mapping: what is checked when a mapping is written.
     :param types: transmission types that PDOs take.
     :param fixed_mapping: mappings cannot be written.
     :param no_remote: TPDOs want bit 30 of their COB-ID.
     """
 
+    mapping: Checks = Checks.CHECKED
     types: Collection[int] = frozenset((0, 1, 254, 255))
     fixed_mapping: bool = False
     no_remote: bool = False
@@ -90,6 +106,7 @@ class Pdos:
                  transmit: dict[int, list[int]], kind: int) -> None:
         self._objects = objects
         self.habits = PdoHabits()
+        self.absent = Absent()
         self._node, self._mapped, self._kind = node, (receive, transmit), kind
         self._stored: tuple[list[Pdo], list[Pdo]] | None = None
         self.begin()
@@ -138,11 +155,14 @@ class Pdos:
             raise Refused(sdo.NO_SUCH_SUBINDEX)
         return contents[subindex].to_bytes(_WIDTHS.get(subindex, 1), 'little')
 
-    def write(self, pdo: Pdo, mapping: bool, subindex: int, data: bytes) -> None:
+    def write(self, pdo: Pdo, mapping: bool, subindex: int, data: bytes, *,
+              operational: bool = False) -> None:
         """Write one of its objects. :raises Refused: against the rules."""
         self.read(pdo, mapping, subindex)      # it exists
+        checks = self.habits.mapping
+        checked = checks is Checks.CHECKED or checks is Checks.OPERATIONAL and operational
         if mapping:
-            self._map(pdo, subindex, data)
+            self._map(pdo, subindex, data, checked=checked)
             return
         if subindex == 0:
             raise Refused(sdo.WRITE_OF_READ_ONLY)
@@ -150,7 +170,7 @@ class Pdos:
         valid = not pdo.cob_id & INVALID
         if subindex == 1:
             if (value & EXTENDED or self.habits.no_remote and pdo.transmit
-                    and not value & NO_REMOTE or valid and not value & INVALID
+                    and not value & NO_REMOTE or checked and valid and not value & INVALID
                     and value != pdo.cob_id):
                 raise Refused(sdo.VALUE_OUT_OF_RANGE)
             pdo.cob_id = value
@@ -160,36 +180,44 @@ class Pdos:
                 raise Refused(sdo.VALUE_OUT_OF_RANGE)
             pdo.type = value
         elif subindex == 3:
-            if valid:
+            if valid and checked:
                 raise Refused(sdo.DEVICE_STATE)
             pdo.inhibit = value
         else:
             pdo.event = value
 
-    def _map(self, pdo: Pdo, subindex: int, data: bytes) -> None:
-        if self.habits.fixed_mapping or not pdo.cob_id & INVALID or subindex and pdo.count:
+    def _map(self, pdo: Pdo, subindex: int, data: bytes, *, checked: bool) -> None:
+        if self.habits.fixed_mapping or checked and (
+                not pdo.cob_id & INVALID or subindex and pdo.count):
             raise Refused(ACCESS)
         if subindex:
             entry = int.from_bytes(checked_length(data, 4), 'little')
-            if entry:
+            if entry and checked:
                 self._mappable(pdo, entry)
             pdo.entries[subindex - 1] = entry
             return
         count = checked_length(data, 1)[0]
+        if not checked:
+            pdo.count = min(count, ENTRIES_MAX)
+            return
         if count > ENTRIES_MAX:
-            raise Refused(TOO_HIGH)
+            raise Refused(TOO_LONG)
         for entry in pdo.entries[:count]:
             self._mappable(pdo, entry)
         if sum(entry & 0xFF for entry in pdo.entries[:count]) > BITS_MAX:
             raise Refused(TOO_LONG)
         pdo.count = count
 
-    def _mappable(self, pdo: Pdo, entry: int) -> Parameter:
-        cell = self._objects.cells.get((entry >> 16, entry >> 8 & 0xFF))
-        if (cell is None or entry >> 16 < _MAPPABLE_FROM or entry & 0xFF != 8 * bytes_of(cell)
+    def _mappable(self, pdo: Pdo, entry: int) -> None:
+        """Check an entry. :raises Refused: no such object, or it does not travel like this."""
+        place, bits = (entry >> 16, entry >> 8 & 0xFF), entry & 0xFF
+        self.absent.check(*place)
+        cell = self._objects.cells.get(place)
+        if cell is None and place[0] >= _MAPPABLE_FROM:
+            self._objects.find(*place)      # says what is missing
+        if (cell is None or place[0] < _MAPPABLE_FROM or bits % 8 or bits > 8 * bytes_of(cell)
                 or not (cell.readable if pdo.transmit else cell.writable)):
             raise Refused(NOT_MAPPABLE)
-        return cell
 
     # -- traffic ----------------------------------------------------------------------------------
 
@@ -197,11 +225,17 @@ class Pdos:
         """Return what an RPDO says: parameters and raw integers."""
         found, at = [], 0
         for entry in pdo.mapped:
-            cell = self._mappable(pdo, entry)
-            end = at + bytes_of(cell)
-            found.append((cell, cell.raw_from_word(int.from_bytes(data[at:end], 'little'))))
-            at = end
+            length = (entry & 0xFF) // 8
+            cell = self._cell(entry)
+            if cell is not None and cell.writable:
+                content = data[at:at + length][:bytes_of(cell)]
+                found.append((cell, cell.raw_from_word(int.from_bytes(content, 'little'))))
+            at += length
         return found
+
+    def _cell(self, entry: int) -> Parameter | None:
+        place = entry >> 16, entry >> 8 & 0xFF
+        return None if place in self.absent else self._objects.cells.get(place)
 
     def frame(self, pdo: Pdo, now: float) -> Frame:
         """Make a TPDO of what its objects hold now."""
@@ -210,8 +244,12 @@ class Pdos:
         return Frame(pdo.cob_id & 0x7FF, pdo.sent, False)
 
     def content(self, pdo: Pdo) -> bytes:
-        return b''.join(self._objects.content(self._objects.cells[entry >> 16, entry >> 8 & 0xFF])
-                        for entry in pdo.mapped)
+        content = b''
+        for entry in pdo.mapped:
+            length, cell = (entry & 0xFF) // 8, self._cell(entry)
+            told = b'' if cell is None else self._objects.content(cell)
+            content += told[:length].ljust(length, b'\0')
+        return content[:BITS_MAX // 8]
 
     def synchronised(self, pdo: Pdo) -> bool:
         """Tell whether this TPDO leaves with a SYNC: with each, or with content that is new."""

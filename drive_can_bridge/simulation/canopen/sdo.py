@@ -34,6 +34,29 @@ def bytes_of(parameter: Parameter) -> int:
     return 1 if parameter.type is ParameterType.BOOL else parameter.type.bits // 8
 
 
+class Absent:
+    """
+    Objects that were taken away from a node.
+
+    :ivar places: index and sub-index; None: all of the index.
+    """
+
+    def __init__(self) -> None:
+        self.places: frozenset[tuple[int, int | None]] = frozenset()
+
+    def __contains__(self, place: Place) -> bool:
+        return place in self.places or (place[0], None) in self.places
+
+    def check(self, index: int, subindex: int) -> None:
+        """
+        See whether an object is there.
+
+        :raises Refused: it was taken away.
+        """
+        if (index, subindex) in self:
+            raise Refused(sdo.NO_SUCH_OBJECT)
+
+
 class ObjectDictionary:
     """
     Registers that have an index. Sub-index 0 says how many there are, where none stands there.
@@ -56,7 +79,7 @@ class ObjectDictionary:
     def read_object(self, index: int, subindex: int) -> bytes:
         if subindex == 0 and index in self._counts:
             return bytes((self._counts[index],))
-        cell = self._cell(index, subindex)
+        cell = self.find(index, subindex)
         if not cell.readable:
             raise Refused(sdo.READ_OF_WRITE_ONLY)
         return self.content(cell)
@@ -69,7 +92,7 @@ class ObjectDictionary:
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
         if subindex == 0 and index in self._counts:
             raise Refused(sdo.WRITE_OF_READ_ONLY)
-        cell = self._cell(index, subindex)
+        cell = self.find(index, subindex)
         raw = cell.raw_from_word(int.from_bytes(checked_length(data, bytes_of(cell)), 'little'))
         refusal = self._registers.refusal({cell.name: raw})
         if refusal is Refusal.OUT_OF_RANGE:
@@ -84,7 +107,12 @@ class ObjectDictionary:
         """Return the raw integer of an object that there is."""
         return self._registers.raw(self.cells[index, subindex].name)
 
-    def _cell(self, index: int, subindex: int) -> Parameter:
+    def find(self, index: int, subindex: int) -> Parameter:
+        """
+        Return an object.
+
+        :raises Refused: there is none.
+        """
         cell = self.cells.get((index, subindex))
         if cell is None:
             raise Refused(sdo.NO_SUCH_SUBINDEX if any(

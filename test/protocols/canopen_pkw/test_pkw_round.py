@@ -252,7 +252,7 @@ def test_malformed_and_unasked_frames_are_counted(text: str) -> None:
 
 
 @pytest.mark.parametrize('text', [
-    '486#C701002641000000', '00000485#C701002641000000', '000#0200', '000#0105', '123#00',
+    '486#C701002641000000', '00000485#C701002641000000', '000#0206', '000#0105FF', '123#00',
     '00000705#00', '706#00', '706#05', '086#1023000000000000'])
 def test_frames_of_others_do_not_matter(text: str) -> None:
     talk = online()
@@ -263,9 +263,18 @@ def test_frames_of_others_do_not_matter(text: str) -> None:
     assert talk.session.online
 
 
-def test_another_master_is_noticed() -> None:
+@pytest.mark.parametrize(('frame', 'code', 'facts'), [
+    ('505#C002002A01000000', 'other_master_asks_node', {'node': 5, 'what': 'PKW requests'}),
+    ('605#4000100000000000', 'other_master_reads', {'node': 5}),
+    ('605#2B17100000000000', 'heartbeats_ended', {'node': 5}),
+    ('000#8200', 'other_master_resets',
+     {'command': 'reset communication', 'whom': 'all nodes'}),
+    ('000#0200', 'other_master_nmt', {'command': 'stop', 'whom': 'all nodes'}),
+    ('000#0105', 'other_master_nmt', {'command': 'start', 'whom': 'node 5'}),
+])
+def test_another_master_is_noticed(frame: str, code: str, facts: dict[str, Any]) -> None:
     talk = online()
-    assert talk.hears('505#C002002A01000000', 10.06) == []
+    assert talk.hears(frame, 10.06) == []
     event, = talk.events()
-    assert event.text == says('other_master_asks_node', what='PKW requests',
-                              frame='505#C002002A01000000', node=5)
+    assert event.text == says(code, frame=frame, **facts)
+    assert talk.session.online

@@ -183,14 +183,39 @@ def test_an_entry_of_another_protocol_is_no_object() -> None:
     assert not [text for text in axis.take() if text.startswith('605#') and '000000' in text[:12]]
 
 
-def test_what_another_master_sends_is_named() -> None:
+@pytest.mark.parametrize(('frame', 'code', 'facts'), [
+    # a monitor that polls, segments included
+    ('605#4041600000000000', 'other_master_reads', {'node': 5}),
+    ('605#6000000000000000', 'other_master_reads', {'node': 5}),
+    ('605#2F60600009000000', 'other_master_asks_node', {'node': 5, 'what': 'SDO requests'}),
+    ('605#2B171000F4010000', 'other_master_asks_node', {'node': 5, 'what': 'SDO requests'}),
+    ('605#C641600000000000', 'other_master_asks_node', {'node': 5, 'what': 'SDO requests'}),
+    ('605#40', 'other_master_asks_node', {'node': 5, 'what': 'SDO requests'}),
+    ('605#2B17100000000000', 'heartbeats_ended', {'node': 5}),
+    ('205#0F0000000000', 'other_master_asks_node', {'node': 5, 'what': 'process data'}),
+    # the start of many masters
+    ('000#8200', 'other_master_resets',
+     {'command': 'reset communication', 'whom': 'all nodes'}),
+    ('000#8105', 'other_master_resets', {'command': 'reset node', 'whom': 'node 5'}),
+    ('000#0100', 'other_master_nmt', {'command': 'start', 'whom': 'all nodes'}),
+    ('000#0205', 'other_master_nmt', {'command': 'stop', 'whom': 'node 5'}),
+    ('000#8000', 'other_master_nmt', {'command': 'enter pre-operational', 'whom': 'all nodes'}),
+])
+def test_what_another_master_sends_is_named(frame: str, code: str,
+                                            facts: dict[str, Any]) -> None:
     axis = Axis().online()
     axis.talk.events()
-    for frame, what in (('605#4041600000000000', 'SDO requests'),
-                        ('205#0F0000000000', 'process data')):
-        axis.says(frame)
-        event, = axis.talk.events(ForeignMasterSeen)
-        assert event.text == says('other_master_asks_node', node=5, what=what, frame=frame)
+    axis.says(frame)
+    event, = axis.talk.events(ForeignMasterSeen)
+    assert event.text == says(code, frame=frame, **facts)
+
+
+@pytest.mark.parametrize('frame', ['000#8206', '000#8100FF', '000#', '000#0300', '00000000#8200'])
+def test_nmt_that_is_not_about_this_node(frame: str) -> None:
+    axis = Axis().online()
+    axis.talk.events()
+    axis.says(frame)
+    assert axis.talk.events(ForeignMasterSeen) == []
 
 
 @pytest.mark.parametrize(('after', 'outcome'), [

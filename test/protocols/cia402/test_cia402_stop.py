@@ -210,6 +210,39 @@ class TestFoundEnabled:
         assert doubts(axis) == [says('may_still_be_running', why=says(
             'found_running', state='operation enabled'))]
 
+    @pytest.mark.parametrize('stops', [False, True])
+    def test_one_that_is_still_enabled_at_the_end_is_stopped_or_named(self, stops: bool) -> None:
+        """The end of the bridge comes while it is waited for."""
+        axis = self.meet(control_timeout=0.5)
+        axis.drive.ramp = 1000
+        axis.start()
+        axis.live(0.2)
+        assert doubts(axis) == []
+        axis.take()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.1)
+        assert DISABLE_BY_SDO in axis.take()
+        if stops:
+            axis.drive.becomes(axis.drive.ON)
+        axis.live(1.5)
+        assert axis.session.stopped
+        assert not any(text.startswith(('000#', '205#')) for text in axis.take())
+        assert doubts(axis) == [] if stops else doubts(axis) == [says(
+            'may_still_be_running', why=says('stop_failed', what=[
+                says('still_in_state', state='operation enabled')]))]
+
+    def test_one_that_is_found_braking_is_named_and_not_touched_at_the_end(self) -> None:
+        axis = self.meet()
+        axis.drive.becomes(axis.drive.QUICK_STOP)
+        axis.start()
+        axis.live(0.2)
+        axis.take()
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(1.0)
+        assert not any(text.startswith(('605#2', '000#', '205#')) for text in axis.take())
+        assert doubts(axis) == [says('may_still_be_running', why=says(
+            'still_in_state', state='quick stop active'))]
+
     @pytest.mark.parametrize('delay', [0.0002, 0.08])
     def test_it_is_named_at_the_time_out_however_slowly_it_answers(self, delay: float) -> None:
         axis = self.meet(control_timeout=1.0)

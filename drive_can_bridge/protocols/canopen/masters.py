@@ -1,0 +1,58 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What other masters send to a node, named as what it is.
+
+NMT commands reach all nodes that they name, so that each session overhears them; requests to the
+SDO server of a node are on an identifier that is its own.
+"""
+
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.errors import RemoteProtocolError
+from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.protocols.canopen import network, sdo
+from drive_can_bridge.protocols.canopen.network import NmtCommand
+from drive_can_bridge.protocols.telegrams import Direction
+
+#: producer heartbeat time
+HEARTBEAT_TIME = (0x1017, 0)
+_RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
+_COMMANDS = {NmtCommand.START: 'start', NmtCommand.STOP: 'stop',
+             NmtCommand.ENTER_PRE_OPERATIONAL: 'enter pre-operational',
+             NmtCommand.RESET_NODE: 'reset node',
+             NmtCommand.RESET_COMMUNICATION: 'reset communication'}
+#: NMT commands; they belong to no drive
+NMT_ROUTE = Route(network.NMT_IDENTIFIER, STANDARD_IDENTIFIER_MAX, False)
+
+
+def sdo_route(node: int) -> Route:
+    """Return the requests to the SDO server of a node."""
+    return Route(sdo.REQUEST_BASE + node, STANDARD_IDENTIFIER_MAX, False)
+
+
+def nmt_command(frame: Frame, node: int) -> Sentence:
+    """Say what another master orders by NMT; '' where it is not about this node."""
+    try:
+        number, addressed = network.decode_nmt(frame.data)
+        command = NmtCommand(number)
+    except (RemoteProtocolError, ValueError):
+        return NOTHING
+    if addressed not in (0, node):
+        return NOTHING
+    whom = f'node {node}' if addressed else 'all nodes'
+    row = sentences.other_master_resets if command in _RESETS else sentences.other_master_nmt
+    return row(_COMMANDS[command], whom, str(frame))
+
+
+def sdo_request(frame: Frame, node: int) -> Sentence:
+    """Say what another master asks of the SDO server of a node."""
+    try:
+        asked = sdo.decode(Direction.REQUEST, frame.data)
+    except RemoteProtocolError:
+        asked = None
+    if asked is not None and asked.kind in (sdo.Kind.UPLOAD, sdo.Kind.SEGMENT_WANTED):
+        return sentences.other_master_reads(node, str(frame))
+    if asked is not None and asked.kind is sdo.Kind.DOWNLOAD and (
+            asked.object == HEARTBEAT_TIME and not any(asked.data)):
+        return sentences.heartbeats_ended(node, str(frame))
+    return sentences.other_master_asks_node(node, 'SDO requests', str(frame))
