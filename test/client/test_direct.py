@@ -204,7 +204,7 @@ def test_supervision_of_telegrams_is_warned_about(tmp_path: Path) -> None:
     with a_world(tmp_path, mixer=MIXER) as world:
         with open_drives(world.file) as drives:
             assert drives.warnings == ()
-        for none in (0, -1):    # -0.1 s: it runs on when telegrams end
+        for none in (0.0, -0.1):   # it runs on when telegrams end
             world.drives['mixer'].set_value('p513', none)
             with open_drives(world.file) as drives:
                 assert drives.warnings == ()
