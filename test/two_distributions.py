@@ -74,7 +74,7 @@ def two_hosts() -> Iterator[tuple[Host, Host]]:
     for program in 'ip', 'unshare':
         if shutil.which(program) is None:
             raise Missing(f'no {program}: apt install iproute2 util-linux')
-    hosts = [Host(f'drive_can_{number}_{os.getpid()}') for number in (1, 2)]
+    hosts = [Host(f'drive-can-{number}-{os.getpid()}') for number in (1, 2)]
     ends = [f'dc{number}x{os.getpid() % 1_000_000}' for number in (1, 2)]
     with ExitStack() as stack:
         for host in hosts:
