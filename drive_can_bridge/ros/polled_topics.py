@@ -209,7 +209,7 @@ class PolledTopics:
             self._warn(f'quality {name}', sentences.publisher_incompatible(
                 name, qos_policy_name_from_kind(status.last_policy_kind)))
         incoming = subscribe(node, message_type, topic, command_quality(),
-                             overriding(node, topic), incompatible)
+                             overriding(node, topic), incompatible, self._clock.stamp)
 
         def aged(age: Age, seconds: float) -> None:
             if age is Age.LATE:

@@ -3,6 +3,7 @@
 
 from collections import deque
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,7 +15,8 @@ from std_msgs.msg import Bool, Float64, Int64
 from drive_can_bridge.core.command_age import Age
 from drive_can_bridge.ros import polled_topics
 from drive_can_bridge.ros.polled_topics import CommandTopic
-from drive_can_bridge.ros.rcl.incoming import by_hand
+from drive_can_bridge.ros.rcl import incoming
+from drive_can_bridge.ros.rcl.incoming import by_hand, Incoming, subscribe
 
 MS = 1_000_000
 
@@ -24,6 +26,7 @@ class Subscription:
 
     def __init__(self, kind: Any, depth: int = 8) -> None:
         self.msg_type = kind
+        self.topic_name = '/belt'
         self.qos_profile = QoSProfile(depth=depth)
         self.handle = self
         self.waiting: deque[tuple[bytes, dict[str, Any]]] = deque()
@@ -46,7 +49,7 @@ class Subscription:
 class Taken:
     """A topic and what became of its messages."""
 
-    def __init__(self, kind: Any, depth: int = 8) -> None:
+    def __init__(self, kind: Any, depth: int = 8, comes: Incoming | None = None) -> None:
         self.subscription = Subscription(kind, depth)
         self.used: list[Any] = []
         self.old: list[Any] = []
@@ -54,7 +57,8 @@ class Taken:
         self.begun: list[Age] = []
         self.unreadable: list[str] = []
         self.topic = CommandTopic(
-            by_hand(self.subscription), use=lambda message, _: self.used.append(message),
+            comes or by_hand(self.subscription),
+            use=lambda message, _: self.used.append(message),
             old=self.old.append, aged=self._aged, unreadable=self.unreadable.append)
 
     def _aged(self, age: Age, seconds: float) -> None:
@@ -168,6 +172,37 @@ def test_stamped_when_it_is_taken() -> None:
     # it was on its way as long: the look before would have found it
     assert comes(2420, 2021) == (0, [pytest.approx(0.377, abs=0.001)])
     assert comes(2440, 2438) == (1, [])
+
+
+def test_what_waited_for_an_executor_is_as_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The middleware had it in time, the exchange was in time; who brings it there was not."""
+    monkeypatch.setattr(incoming, 'why_not_by_hand', lambda: 'rclpy has no EventHandle any more')
+    clock, callbacks = SimpleNamespace(now=20_000_000 * MS), []
+
+    def create(kind: Any, topic: str, callback: Any, *_: Any, **__: Any) -> Any:
+        callbacks.append(callback)
+        return Subscription(kind)
+    node: Any = SimpleNamespace(create_subscription=create, count_publishers=lambda _: 1)
+    taken = Taken(Float64, comes=subscribe(
+        node, Float64, 'belt', QoSProfile(depth=8), None, lambda _: None, lambda: clock.now))
+
+    def comes(value: float, waited: int) -> tuple[list[float], list[float]]:
+        """Have a message published at once, and brought so many ms later."""
+        taken.used.clear()
+        taken.old.clear()
+        published, clock.now = clock.now, clock.now + waited * MS
+        for now in range(published, clock.now, 20 * MS):
+            taken.take(now)
+        callbacks[0](serialize_message(Float64(data=value)), {
+            'source_timestamp': published, 'received_timestamp': published + 100_000})
+        clock.now += MS
+        taken.take(clock.now)
+        return taken.used, taken.old
+    assert comes(0.0, 1) == ([0.0], [])
+    assert comes(12.0, 200) == ([12.0], [])
+    assert comes(15.0, 1000) == ([], [15.0])
+    assert taken.late == [pytest.approx(0.999, abs=0.005)]
+    assert comes(12.0, 1) == ([12.0], [])
 
 
 def test_of_two_commanders_the_one_whose_clock_is_behind_can_only_stop() -> None:

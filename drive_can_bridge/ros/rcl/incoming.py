@@ -2,7 +2,9 @@
 """
 Messages that whoever wants them takes by hand, as the bytes that came, and events of their topics.
 
-Where rclpy has other ways for that, its executor takes them (``raw=True``), and they wait here.
+Where rclpy has other ways for that, its executor takes them (``raw=True``), and they wait here. The
+stamp of the middleware does not show how long one has waited for the executor: so what counts is
+when that has taken it.
 """
 
 from collections import deque
@@ -75,15 +77,16 @@ def why_not_by_hand() -> str:
 
 
 def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile,
-              overriding: QoSOverridingOptions | None,
-              incompatible: Callable[[Any], None]) -> Incoming:
+              overriding: QoSOverridingOptions | None, incompatible: Callable[[Any], None],
+              stamp: Callable[[], int]) -> Incoming:
     """
     Subscribe to a topic.
 
     :param incompatible: takes the status of a publisher whose quality does not do.
+    :param stamp: returns the time of the day, in ns.
     """
     if why_not_by_hand():
-        return _by_executor(node, kind, topic, quality, overriding, incompatible)
+        return _by_executor(node, kind, topic, quality, overriding, incompatible, stamp)
     subscription = node.create_subscription(
         kind, topic, _never, quality, callback_group=PolledGroup(),
         qos_overriding_options=overriding,
@@ -102,12 +105,12 @@ def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile,
 
 
 def _by_executor(node: Node, kind: type, topic: str, quality: QoSProfile,
-                 overriding: QoSOverridingOptions | None,
-                 incompatible: Callable[[Any], None]) -> Incoming:
+                 overriding: QoSOverridingOptions | None, incompatible: Callable[[Any], None],
+                 stamp: Callable[[], int]) -> Incoming:
     came: deque[Taken] = deque()
 
     def take(data: Any, info: Any) -> None:
-        came.append((data, info))
+        came.append((data, {**info, 'received_timestamp': stamp()}))
     taking: Any = take
     subscription = node.create_subscription(
         kind, topic, taking, quality, callback_group=ReentrantCallbackGroup(), raw=True,
