@@ -222,7 +222,8 @@ class Cia402Session(Session):
         self._limits.stop()
         self._stop.forget()
         self._course.stop()
-        found = self._bring_up.moving
+        # the next activation sees for itself
+        found, self._bring_up.moving = self._bring_up.moving, None
         if self.stage is not Stage.IDLE and not self.exchange.cycling and (
                 self._rules.may_run or found is State.OPERATION_ENABLED):
             # it has acknowledged its stop by SDO, and nobody has seen it disabled since

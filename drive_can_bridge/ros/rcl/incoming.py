@@ -2,9 +2,9 @@
 """
 Messages that whoever wants them takes by hand, as the bytes that came, and events of their topics.
 
-Where rclpy has other ways for that, its executor takes them (``raw=True``), and they wait here. The
-stamp of the middleware does not show how long one has waited for the executor: so what counts is
-when that has taken it.
+Where rclpy has other ways for that, its executor takes them (``raw=True``), and they wait here.
+The stamp of the middleware does not show how long one has waited for the executor: so what counts
+is when that has taken it.
 """
 
 from collections import deque

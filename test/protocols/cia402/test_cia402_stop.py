@@ -231,6 +231,29 @@ class TestFoundEnabled:
             'may_still_be_running', why=says('stop_failed', what=[
                 says('still_in_state', state='operation enabled')]))]
 
+    def test_one_that_was_stopped_at_the_end_is_not_named_at_the_next(self) -> None:
+        """It is switched off meanwhile: nothing says that it runs."""
+        axis = self.meet(control_timeout=0.5)
+        axis.drive.ramp = 1000
+        axis.start()
+        axis.live(0.2)
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.1)
+        axis.drive.becomes(axis.drive.ON)
+        axis.live(1.5)
+        assert axis.session.stopped
+        assert doubts(axis) == []
+        axis.mute = axis.deaf = True
+        axis.deliver(axis.talk.activate(axis.now))
+        axis.live(3.0)
+        axis.take()
+        assert by_sdo(axis) == []
+        began = axis.now
+        axis.deliver(axis.talk.deactivate(axis.now))
+        axis.live(0.05)
+        assert axis.session.stopped, axis.now - began
+        assert doubts(axis) == []
+
     def test_one_that_is_found_braking_is_named_and_not_touched_at_the_end(self) -> None:
         axis = self.meet()
         axis.drive.becomes(axis.drive.QUICK_STOP)
