@@ -27,6 +27,8 @@ from drive_can_bridge.ros.rcl.extension import GONE
 PATIENCE = 1.0
 #: stops of strangers that are passed on at a time
 STRANGERS_AT_ONCE = 4
+#: s for which the same stop once more has been heard just now: whoever is late shares the next
+JUST_NOW = 0.25
 
 
 class NodeEnd:
@@ -75,12 +77,14 @@ class _Way:
 
     :param find_end: returns what asks them.
     :param asked: who wants to know what becomes of it.
+    :ivar began: when it was.
     """
 
     def __init__(self, find_end: Callable[[], NodeEnd], wanted: OthersStop,
-                 asked: list[Asked]) -> None:
+                 asked: list[Asked], now: float) -> None:
         self.wanted = wanted
         self.asked = asked
+        self.began = now
         self.is_strangers = not any(each.trusted for each in asked)
         self._stop: Stop | None = None
         self._failure = ''
@@ -134,9 +138,10 @@ class _Way:
 
 class Passing:
     """
-    Passes stops on, each at once; those that are the same as one under way share the next.
+    Passes stops on, each at once; those that are the same as one of just now share the next.
 
-    Strangers have a few under way. The thread begins with the first one.
+    Not one that is merely under way: a drive that hangs keeps that for long, and others may run
+    again by then. Strangers have a few under way. The thread begins with the first one.
 
     :param warn: takes a line for the log.
     """
@@ -176,8 +181,8 @@ class Passing:
     def _run(self) -> None:
         while not self._ending:
             self._take_mail()
-            self._begin_what_may()
             now = self._clock.now()
+            self._begin_what_may(now)
             for way in list(self._under_way):
                 if way.look(now):
                     self._under_way.remove(way)
@@ -196,7 +201,7 @@ class Passing:
                     self._waiting.append(item)
                 until = -math.inf
 
-    def _begin_what_may(self) -> None:
+    def _begin_what_may(self, now: float) -> None:
         """Begin what waits, and may; whoever wants the same at the same time shares it."""
         together: dict[OthersStop, list[Asked]] = {}
         for wanted, asked in self._waiting:
@@ -204,8 +209,9 @@ class Passing:
         self._waiting = []
         for wanted, askers in together.items():
             strange = not any(each.trusted for each in askers)
-            if any(way.wanted == wanted for way in self._under_way) or strange and sum(
+            if any(way.wanted == wanted and now < way.began + JUST_NOW
+                   for way in self._under_way) or strange and sum(
                     way.is_strangers for way in self._under_way) >= STRANGERS_AT_ONCE:
                 self._waiting += [(wanted, each) for each in askers]
             else:
-                self._under_way.append(_Way(self._find_end, wanted, askers))
+                self._under_way.append(_Way(self._find_end, wanted, askers, now))

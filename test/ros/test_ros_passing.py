@@ -21,13 +21,14 @@ class Far:
     """
     A bridge of another host.
 
+    :param also: a drive that somebody else plays.
     :ivar stops: how often each drive was told to stop.
     """
 
-    def __init__(self, client: Client, name: str, *drives: str) -> None:
+    def __init__(self, client: Client, name: str, *drives: str, also: str = '') -> None:
         self.stops = dict.fromkeys(drives, 0)
         self.name = name
-        answer(client, name, drives=' '.join(drives))()
+        answer(client, name, drives=' '.join((*drives, also)))()
         for each in drives:
             node = f'{name.rpartition("/")[0]}/{each}'
             offer(client, node, 'quick_stop', Trigger, lambda _, response, each=each: self._stop(
@@ -148,6 +149,24 @@ def test_the_same_at_the_same_time_is_passed_on_once_more_at_most(
         assert answers(each) == [['drives', '/far/hoist'],
                                  ['passed', '/far/hoist', '1', 'stopped', '0'], ['end']]
     assert 1 <= far.stops['hoist'] <= 2
+
+
+def test_the_same_once_more_does_not_wait_for_a_drive_that_hangs(
+        here: Bridge, client: Client) -> None:
+    """The others of its bridge may have been enabled again meanwhile."""
+    far = Far(client, '/far/bridge', 'hoist', also='belt')
+    belt = rclpy.create_node('belt', namespace='/far', context=client.node.context,
+                             enable_rosout=False, start_parameter_services=False)
+    belt.create_service(Trigger, '~/quick_stop', lambda _, response: response)  # nobody spins it
+    seen(here, far.name)
+    first = ask(here, 'pass', far.name, '', '')
+    wait_until(lambda: far.stops['hoist'] == 1)
+    waiting.pause(0.3)
+    again = ask(here, 'pass', far.name, '', '')
+    waiting.pause(0.7)
+    assert far.stops['hoist'] == 2
+    assert not (first.take() or again.take())   # both wait for the belt
+    belt.destroy_node()
 
 
 def test_drives_that_have_theirs_are_left_alone(here: Bridge, client: Client) -> None:
