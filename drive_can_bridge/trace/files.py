@@ -2,9 +2,9 @@
 """
 Trace files: which formats there are, what each of them loses, reading and writing them.
 
-Formats are python-can's, by suffix. One damaged line does not cost a trace. Errors of files say
-which one it was. The two texts that candump writes, its log file (``-l``, ``-L``) and its screen,
-have a reader and writer of their own:
+Formats are python-can's, by suffix; ``.blf`` and ``.trc`` have readers of ours. One damaged line
+does not cost a trace. Errors of files say which one it was. The two texts that candump writes, its
+log file (``-l``, ``-L``) and its screen, have a reader and writer of their own:
 
 .. code-block:: text
 
@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from datetime import datetime
 from errno import EIO
+from functools import partial
 import gzip
 import io
 import itertools
@@ -41,7 +42,7 @@ from drive_can_bridge.core.frame import (
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.trace.blf import read_blf
 from drive_can_bridge.trace.captures import BEGINNINGS, read_capture
-from drive_can_bridge.trace.peak import PeakLines
+from drive_can_bridge.trace.peak import read_peak
 from drive_can_bridge.trace.vector import of_vector
 from drive_can_bridge.transport.tap import message_of, record_of
 
@@ -242,10 +243,11 @@ class Database(can.SqliteWriter):
             self._failure = error
 
 
-#: suffixes of candump's texts; everything else is python-can's
+#: suffixes of candump's texts, and of PEAK's; everything else is python-can's
 _CANDUMP = ('.log', '.txt', '.candump')
+_PEAK = '.trc'
 _TEXT_READERS: dict[str, Any] = {
-    '.asc': can.ASCReader, '.csv': can.CSVReader, '.trc': can.TRCReader}
+    '.asc': can.ASCReader, '.csv': can.CSVReader}
 #: by which number the tools of a format call what python-can calls 0; else they agree
 _FIRST = {'.asc': 1}
 _BINARY_READERS = ('.blf', '.db', '.mf4', '.pcap', '.pcapng')
@@ -266,7 +268,8 @@ LOSSES = {
 #: a format without buses holds those of one only
 ONE_BUS = ('.csv', '.db')
 WRITABLE = tuple(sorted(('.log', *_WRITERS)))
-READABLE = tuple(sorted((*_CANDUMP, *_TEXT_READERS, *_BINARY_READERS)))
+_TEXTS = (*_CANDUMP, _PEAK, *_TEXT_READERS)
+READABLE = tuple(sorted((*_TEXTS, *_BINARY_READERS)))
 
 
 class _Head(NamedTuple):
@@ -348,10 +351,12 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
                 complain(stranger)
             elif head is None:
                 yield from _candump_records(lines, complain)
-            elif head.pattern.match(begin[-1].encode()):
-                yield from _text_records(suffix, lines, complain)
-            else:
+            elif not head.pattern.match(begin[-1].encode()):
                 complain(head.otherwise)
+            elif suffix == _PEAK:
+                yield from _peak_records(lines, complain)
+            else:
+                yield from _text_records(suffix, lines, complain)
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
             complain(f'the rest cannot be unpacked: {error}')
 
@@ -375,7 +380,7 @@ def check_readable(path: Path) -> tuple[str, bool]:
     """
     packed = path.suffix.lower() == '.gz'
     suffix = Path(path.stem).suffix.lower() if packed else path.suffix.lower()
-    if suffix not in (_CANDUMP + tuple(_TEXT_READERS) + (() if packed else _BINARY_READERS)):
+    if suffix not in (_TEXTS + (() if packed else _BINARY_READERS)):
         raise UnknownFormat(f'{path}: no trace format has the suffix {suffix or "(none)"!s}; '
                             f'known are {", ".join(READABLE)}, and .gz behind those of text')
     path.open('rb').close()
@@ -506,14 +511,6 @@ class _Heard(logging.Handler):
         self._complain('' if 'Failed to parse' in text else text.partition('Reader: ')[2] or text)
 
 
-def _prepared(suffix: str, lines: Iterator[str], aside: deque[Record],
-              passed: Counter[str]) -> Iterator[str]:
-    """Return the lines of a text as the reader of python-can wants them."""
-    if suffix == '.asc':
-        return of_vector(lines, aside, passed)
-    return PeakLines(aside, passed).of(lines) if suffix == '.trc' else lines
-
-
 def _tell_passed(passed: Counter[str], complain: Complain) -> None:
     """Tell, once, what has no entry."""
     if passed:
@@ -546,6 +543,25 @@ def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]
             yield record
 
 
+def _tell_wrong(suffix: str, lines: _Numbered, complain: Complain, text: str) -> None:
+    """Tell what is wrong with the last line; '': it is no entry."""
+    complain(f'line {lines.number()}: {text or f"no entry of a {suffix} trace"}')
+
+
+def _peak_records(stream: Iterable[str], complain: Complain) -> Iterator[Record]:
+    numbered = _Numbered(stream)
+    passed: Counter[str] = Counter()
+    wrong = partial(_tell_wrong, _PEAK, numbered, complain)
+    for record in read_peak(numbered.lines, wrong, passed):
+        try:
+            record = checked(record)
+        except ValueError as error:
+            wrong(str(error))
+        else:
+            yield record
+    _tell_passed(passed, complain)
+
+
 def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Iterator[Record]:
     """
     Read by a reader of python-can, which ends at the first line that it does not understand.
@@ -558,10 +574,8 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     numbered = _Numbered(stream)
     aside: deque[Record] = deque()      # that the reader does not know, before its next one
     passed: Counter[str] = Counter()
-    stream = _prepared(suffix, numbered.lines, aside, passed)
-
-    def wrong(text: str) -> None:
-        complain(f'line {numbered.number()}: {text or f"no entry of a {suffix} trace"}')
+    stream = of_vector(numbered.lines, aside, passed) if suffix == '.asc' else numbered.lines
+    wrong = partial(_tell_wrong, suffix, numbered, complain)
     logger = logging.getLogger('can')
     heard = _Heard(wrong)
     logger.addHandler(heard)

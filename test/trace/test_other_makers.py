@@ -107,6 +107,8 @@ def test_errors_and_states_of_peak(head: str, lines: tuple[str, ...], tmp_path: 
      'bus state: SUSPICIOUS: error counters transmit 128, receive 0'),
     ('ER 1         - Rx -  5    04 01 0A 02 00',
      'error frame: SUSPICIOUS: stuff error in the data, error counters transmit 0, receive 2'),
+    ('ER 1         - Rx -  5    00 00 00 07 60',
+     'bus state: SUSPICIOUS: error counters transmit 96, receive 7'),
 ])
 def test_lines_of_peak(line: str, told: str, tmp_path: Path) -> None:
     (tmp_path / 'a.trc').write_text(
@@ -114,6 +116,93 @@ def test_lines_of_peak(line: str, told: str, tmp_path: Path) -> None:
         f'      1   1.0 {line}\n')
     records, complaints = read(tmp_path / 'a.trc')
     assert (lines_of(records), complaints) == ([told], [])
+
+
+HEAD_2_1 = ';$FILEVERSION=2.1\n;$STARTTIME=32509.5\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n'
+
+
+def peak(path: Path, head: str, *lines: str) -> tuple[list[Record], list[str]]:
+    (path / 'a.trc').write_text(head + ''.join(f'{line}\n' for line in lines))
+    return read(path / 'a.trc')
+
+
+@pytest.mark.parametrize(('head', 'line', 'record'), [
+    # a time without a start, and no direction
+    ('', '1) 500 0705 1 05', Record(0.5, 1, 0x705, b'\5', False, DATA)),
+    (';$FILEVERSION=1.0\n', '1) 500 00000705 0', Record(0.5, 1, 0x705, b'', True, DATA)),
+    (';$FILEVERSION=1.1\n;$STARTTIME=32509.5\n', '1) 500.0 Tx 0705 8 RTR',
+     Record(EPOCH + 0.5, 1, 0x705, b'', False, REMOTE, True)),
+    # more than 8 are no more in a classical frame
+    (HEAD_2_1, '1 500.000 DT 2 0705 Tx - 9 01 02 03 04 05 06 07 08',
+     Record(EPOCH + 0.5, 2, 0x705, bytes(range(1, 9)), False, DATA, True)),
+    # codes of lengths, and lengths
+    *((HEAD_2_1, f'1 500.000 {kind} 1 18EFC034 Rx - 9 01 02 03 04 05 06 07 08 09 0A 0B 0C',
+       Record(EPOCH + 0.5, 1, 0x18EFC034, bytes(range(1, 13)), True, FD, False))
+      for kind in ('FD', 'FB', 'FE', 'BI')),
+    (HEAD_2_1.replace('B,I,d,R,L', 'I,d,l'),
+     '1 500.000 FD 0500 Tx 12 01 02 03 04 05 06 07 08 09 0A 0B 0C',
+     Record(EPOCH + 0.5, 1, 0x500, bytes(range(1, 13)), False, FD, True)),
+    # columns in an order of their own, some of them without a meaning here
+    (HEAD_2_1.replace('N,O,T,B,I,d,R,L', 'O, N, I, L, T, x'), '500.000 1 0705 2 DT - 01 02',
+     Record(EPOCH + 0.5, 1, 0x705, b'\1\2', False, DATA)),
+])
+def test_frames_of_peak(head: str, line: str, record: Record, tmp_path: Path) -> None:
+    records, complaints = peak(tmp_path, head, line, '')
+    assert (records, complaints) == ([record], [])
+
+
+def test_a_state_of_peak_with_columns_in_another_order(tmp_path: Path) -> None:
+    records, complaints = peak(tmp_path, ';$FILEVERSION=2.1\n;$COLUMNS=T,I,B,O,L,D\n',
+                               'ST - 3 500.000 4 00 00 00 10', 'ER 0705 3 500.000 4 00 00',
+                               'XL 100 3')
+    assert (lines_of(records), complaints) == (
+        ['bus state: SUSPICIOUS: BUSOFF (bus-off)'],
+        ['line 5: no entry of a .trc trace', 'passed over: ER (1)'])
+    assert [(each.time, each.channel) for each in records] == [(0.5, 3)]
+
+
+@pytest.mark.parametrize(('line', 'told'), [
+    ('1 5.0 DT 1 0705 Rx - 2 05', 'its length is 2, and there are 1 data bytes'),
+    ('1 5.0 DT 1 0705 Rx - 1 05 06', 'its length is 1, and there are 2 data bytes'),
+    ('1 5.0 FD 1 0705 Rx - 16 05', 'its length is 16, and there are 1 data bytes'),
+    ('1 5.0 DT 1 0705 Rx - 1 5', 'no entry of a .trc trace'),
+    ('1 5.0 DT 1 07_5 Rx - 1 05', 'no entry of a .trc trace'),
+    ('1 5,0 DT 1 0705 Rx - 1 05', 'no entry of a .trc trace'),
+    ('1 5.0 DT 1 0705 up - 1 05', 'no entry of a .trc trace'),
+    ('1 5.0 DT 1 0905 Rx - 1 05', 'identifier 905h'),
+    ('1 5.0 DT 1 2FFFFFFF Rx - 1 05', 'identifier 2FFFFFFFh'),
+])
+def test_a_damaged_frame_of_peak(line: str, told: str, tmp_path: Path) -> None:
+    records, complaints = peak(tmp_path, HEAD_2_1, line, '2 6.0 DT 1 0705 Rx - 1 06')
+    assert ([each.data for each in records], complaints) == ([b'\6'], [f'line 4: {told}'])
+
+
+@pytest.mark.parametrize('columns', [
+    '', ';$COLUMNS=N,O,T\n', ';$COLUMNS=N,O,I,d,L,D\n', ';$COLUMNS=N,O,T,I,I,L,D\n',
+    ';$COLUMNS=N,O,T,I,d,l,L,D\n', ';$COLUMNS=N,O,T,t,I,L,D\n'])
+def test_a_file_of_peak_that_does_not_say_its_columns(columns: str, tmp_path: Path) -> None:
+    line = '1 5.0 DT 1 0705 Rx - 1 05'
+    records, complaints = peak(tmp_path, f';$FILEVERSION=2.1\n{columns}', line, line, line)
+    assert (records, complaints) == ([], [
+        f'line {3 if columns else 2}: version 2.1, and no ;$COLUMNS= says where time, type, '
+        'identifier and length are', 'passed over: lines without $COLUMNS (2)'])
+
+
+def test_a_start_of_peak_that_is_none(tmp_path: Path) -> None:
+    for start in ('today', 'nan', '1e300'):
+        records, complaints = peak(tmp_path, f';$FILEVERSION=1.1\n;$STARTTIME={start}\n',
+                                   '1) 500.0 Rx 0705 1 05')
+        assert ([each.time for each in records], complaints) == (
+            [0.5], [f"line 2: $STARTTIME is no number of days: '{start}'"])
+
+
+def test_messages_of_several_frames_are_counted(tmp_path: Path) -> None:
+    """PCAN-Explorer's add-in for J1939 puts them together."""
+    records, complaints = peak(
+        tmp_path, ';$FILEVERSION=1.3\n;$STARTTIME=32509.5\n',
+        '1) 5.000 1 Rx 18ECFF23 FF 9 D2 AF AA 88 18 80 01 02 03', '2) 6.000 1 Rx 0705 - 1 06')
+    assert ([each.data for each in records], complaints) == (
+        [b'\6'], ['passed over: messages of several frames (1)'])
 
 
 def test_what_peak_has_beside_is_counted(tmp_path: Path) -> None:
