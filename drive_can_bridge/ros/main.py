@@ -164,7 +164,7 @@ def set_up_fast_dds(environment: MutableMapping[str, str] = os.environ,
     """
     from rclpy.utilities import get_rmw_implementation_identifier
 
-    middleware, folder = running(get_rmw_implementation_identifier(), maps), Path.cwd()
+    middleware, folder = running(get_rmw_implementation_identifier(), maps), Path()
     warnings = []
     for each in middleware.ignored(environment, folder):
         if each.protects:

@@ -129,3 +129,14 @@ def test_a_file_in_the_working_directory_counts_too(
     environment = {}
     assert set_up_fast_dds(environment) == ('', [])
     assert not environment
+
+
+def test_a_working_directory_that_is_gone_is_none(
+        middleware: Middleware, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As below a terminal that is still in an install folder which was built anew."""
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
+    environment: dict[str, str] = {}
+    assert set_up_fast_dds(environment) == ('', [])
+    assert environment == {
+        middleware.variables[0]: str(config_file(middleware.release.shipped))}
