@@ -2,6 +2,7 @@
 """What is taken from a command subscription: the bytes of any publisher, and how old they are."""
 
 from collections import deque
+from collections.abc import Callable
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -174,17 +175,38 @@ def test_stamped_when_it_is_taken() -> None:
     assert comes(2440, 2438) == (1, [])
 
 
+def by_executor(quality: QoSProfile, stamp: Callable[[], int]) -> tuple[Incoming, Any]:
+    """Subscribe where an executor takes the messages; return what brings one, too."""
+    callbacks: list[Any] = []
+
+    def create(kind: Any, topic: str, callback: Any, quality: QoSProfile, **_: Any) -> Any:
+        callbacks.append(callback)
+        subscription = Subscription(kind)
+        subscription.qos_profile = quality
+        return subscription
+    node: Any = SimpleNamespace(create_subscription=create, count_publishers=lambda _: 1)
+    return subscribe(node, Float64, 'belt', quality, None, lambda _: None, stamp), callbacks[0]
+
+
+@pytest.mark.parametrize(('quality', 'kept'), [
+    (QoSProfile(depth=8), 8), (QoSProfile(history=HistoryPolicy.KEEP_ALL), incoming.KEPT_MAX)])
+def test_what_an_executor_brings_waits_in_bounds(
+        monkeypatch: pytest.MonkeyPatch, quality: QoSProfile, kept: int) -> None:
+    """An inactive bridge takes none."""
+    monkeypatch.setattr(incoming, 'why_not_by_hand', lambda: 'rclpy has no EventHandle any more')
+    comes, brings = by_executor(quality, lambda: 0)
+    for number in range(kept + 10):
+        brings(number, {})
+    waiting = [taken[0] for taken in iter(comes.take, None)]
+    assert waiting == list(range(10, kept + 10))
+
+
 def test_what_waited_for_an_executor_is_as_old(monkeypatch: pytest.MonkeyPatch) -> None:
     """The middleware had it in time, the exchange was in time; who brings it there was not."""
     monkeypatch.setattr(incoming, 'why_not_by_hand', lambda: 'rclpy has no EventHandle any more')
-    clock, callbacks = SimpleNamespace(now=20_000_000 * MS), []
-
-    def create(kind: Any, topic: str, callback: Any, *_: Any, **__: Any) -> Any:
-        callbacks.append(callback)
-        return Subscription(kind)
-    node: Any = SimpleNamespace(create_subscription=create, count_publishers=lambda _: 1)
-    taken = Taken(Float64, comes=subscribe(
-        node, Float64, 'belt', QoSProfile(depth=8), None, lambda _: None, lambda: clock.now))
+    clock = SimpleNamespace(now=20_000_000 * MS)
+    comes_by, brings = by_executor(QoSProfile(depth=8), lambda: clock.now)
+    taken = Taken(Float64, comes=comes_by)
 
     def comes(value: float, waited: int) -> tuple[list[float], list[float]]:
         """Have a message published at once, and brought so many ms later."""
@@ -193,7 +215,7 @@ def test_what_waited_for_an_executor_is_as_old(monkeypatch: pytest.MonkeyPatch) 
         published, clock.now = clock.now, clock.now + waited * MS
         for now in range(published, clock.now, 20 * MS):
             taken.take(now)
-        callbacks[0](serialize_message(Float64(data=value)), {
+        brings(serialize_message(Float64(data=value)), {
             'source_timestamp': published, 'received_timestamp': published + 100_000})
         clock.now += MS
         taken.take(clock.now)

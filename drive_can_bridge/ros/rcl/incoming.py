@@ -25,6 +25,8 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 MEMBERS = ('Subscription.take_message', 'Subscription.get_publisher_count', 'EventHandle',
            'EventHandle.take_event')
 
+#: messages that wait here where everything is kept: what Fast DDS keeps then, whoever takes them
+KEPT_MAX = 5000
 #: the bytes of a message, and what is known of it
 Taken = tuple[bytes, dict[str, Any]]
 
@@ -107,7 +109,7 @@ def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile,
 def _by_executor(node: Node, kind: type, topic: str, quality: QoSProfile,
                  overriding: QoSOverridingOptions | None, incompatible: Callable[[Any], None],
                  stamp: Callable[[], int]) -> Incoming:
-    came: deque[Taken] = deque()
+    came: deque[Taken] = deque(maxlen=KEPT_MAX)
 
     def take(data: Any, info: Any) -> None:
         came.append((data, {**info, 'received_timestamp': stamp()}))
