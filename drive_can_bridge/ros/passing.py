@@ -15,7 +15,7 @@ from typing import NamedTuple
 from rclpy.node import Node
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
-from drive_can_bridge.core.sentences import client_by_rclpy
+from drive_can_bridge.core import sentences
 from drive_can_bridge.process.local_server import Asked
 from drive_can_bridge.process.local_stop import Answer, RUNNING
 from drive_can_bridge.ros.client.control import Stop
@@ -41,7 +41,7 @@ class NodeEnd:
 
     def __init__(self, node: Node, warn: Callable[[str], object]) -> None:
         self.end = End(node.context, f'_{node.get_name()}_passing_on',
-                       lambda reason: warn(client_by_rclpy(reason)), node)
+                       lambda reason: warn(sentences.client_by_rclpy(reason)), node)
         self.services, self.topics = self.end.services, self.end.topics
 
 
@@ -180,15 +180,21 @@ class Passing:
 
     def _run(self) -> None:
         while not self._ending:
-            self._take_mail()
-            now = self._clock.now()
-            self._begin_what_may(now)
-            for way in list(self._under_way):
-                if way.look(now):
-                    self._under_way.remove(way)
-                    way.answer()
+            try:
+                self._turn()
+            except Exception as error:  # noqa: BLE001  outermost loop of a thread
+                self._warn(sentences.internal_error_in_answer(type(error).__name__, str(error)))
         for way in self._under_way:
             way.close()
+
+    def _turn(self) -> None:
+        self._take_mail()
+        now = self._clock.now()
+        self._begin_what_may(now)
+        for way in list(self._under_way):
+            if way.look(now):
+                self._under_way.remove(way)
+                way.answer()
 
     def _take_mail(self) -> None:
         """Take what has come; wait for it, a moment only where something is under way."""

@@ -14,6 +14,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 import waiting
 
+from drive_can_bridge.core.sentences import internal_error_in_answer
 from drive_can_bridge.ros import passing
 
 
@@ -190,6 +191,22 @@ def test_a_policy_that_forbids_it_is_told(
         ['drives'],
         ['passed', '/far/bridge', '0', 'a stop cannot be passed on to this bridge (create_client: '
          'not found in allow rule): its drives may still be running', '1'], ['end']]
+
+
+def test_a_defect_costs_one_answer_and_not_all_that_come(
+        here: Bridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    seen(here, far.name)
+
+    def fails(_: Any) -> None:
+        raise MemoryError('limit')
+    with monkeypatch.context() as patch:
+        patch.setattr(passing._Way, 'answer', fails)
+        ask(here, 'pass', far.name, '', '')
+        client.listen()
+        client.wait_logged(internal_error_in_answer('MemoryError', 'limit'))
+    assert answers(ask(here, 'pass', far.name, '', ''))[-1] == ['end']
+    assert far.stops == {'hoist': 2}
 
 
 @pytest.mark.parametrize('words', [
