@@ -183,7 +183,10 @@ class LocalStop:
             each.look()
         if waited >= SOON or not any(each.quiet for each in self._told):
             self._pass_on()
-        return self._knows_own_domain and self.over(now)
+        if waited > STOP_TIMEOUT + PATIENCE:
+            for each in self._passing:
+                each.hang_up()
+        return self._knows_own_domain and self.over(now) and not self._left_to_ros
 
     def over(self, now: float) -> bool:
         """Tell whether nothing more is to be expected of this host."""
@@ -204,8 +207,12 @@ class LocalStop:
         if any(each.quiet for each in own) and self._waited(now) < SOON:
             return False
         return (not self._knows_own_domain or not all(each.here for each in own)
-                or any(each.failed for each in self._passing
-                       if each.present.domain == self.domain))
+                or self._left_to_ros)
+
+    @property
+    def _left_to_ros(self) -> bool:
+        """A stop was not passed on that ROS can bring, too."""
+        return any(each.failed for each in self._passing if each.present.domain == self.domain)
 
     @property
     def _knows_own_domain(self) -> bool:

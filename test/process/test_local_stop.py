@@ -96,8 +96,33 @@ def test_one_that_stays_busy_leaves_the_others_to_ros(monkeypatch: pytest.Monkey
     host.busy = [False, *[True] * 99]
     stop = LocalStop(None, [])
     assert looked(stop, 0.0, 0.5) == [False, False]
-    assert stop.look(1.1) and stop.wants_ros(1.1)
+    assert not stop.look(1.1) and stop.over(1.1) and stop.wants_ros(1.1)
     assert host.asked == [['stop', '*']]
+
+
+def dies(_: list[str]) -> Any:
+    """Pass nothing on."""
+    yield ['drives', '/arm']
+    raise ConnectionResetError
+
+
+def hangs(_: list[str]) -> Any:
+    """Say nothing any more."""
+    while True:
+        yield None
+
+
+@pytest.mark.parametrize(('passes', 'at'), [
+    (dies, 0.0), (lambda _: [['no', 'another user']], 0.0), (hangs, 11.1)],
+    ids=['dies', 'refuses', 'hangs'])
+def test_one_that_does_not_pass_a_stop_on_leaves_the_others_to_ros(
+        monkeypatch: pytest.MonkeyPatch, passes: Played, at: float) -> None:
+    """It has answered for its own drives, which does not stop those of others."""
+    Host(monkeypatch, lambda question: SAID if question[0] == 'stop' else passes(question))
+    stop = LocalStop(None, [])
+    assert looked(stop, 0.0, at) == [False, False]
+    assert stop.over(at) and stop.wants_ros(at)
+    assert [answer.name for answer in stop.answers()] == ['/lift']
 
 
 def test_one_that_talks_without_end_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ import waiting
 
 from drive_can_bridge.core.sentences import internal_error_in_answer
 from drive_can_bridge.ros import passing
+from drive_can_bridge.ros.local_way import LocalWay
 
 
 class Far:
@@ -191,6 +192,17 @@ def test_a_policy_that_forbids_it_is_told(
         ['drives'],
         ['passed', '/far/bridge', '0', 'a stop cannot be passed on to this bridge (create_client: '
          'not found in allow rule): its drives may still be running', '1'], ['end']]
+
+
+def test_where_it_is_not_passed_on_ros_brings_it(
+        here: Bridge, client: Client, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch,
+        ) -> None:
+    far = Far(client, '/far/bridge', 'hoist')
+    seen(here, far.name)
+    locally(here)
+    monkeypatch.setattr(LocalWay, '_pass', lambda _, asked: asked.refuse('what is that?'))
+    assert run('stop') == (0, ['lift: ready', 'far/hoist: stopped'], '')
+    assert far.stops == {'hoist': 1}
 
 
 def test_a_defect_costs_one_answer_and_not_all_that_come(
