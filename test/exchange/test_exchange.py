@@ -717,9 +717,13 @@ def test_a_session_that_fails_keeps_no_other_from_its_stop(
 def test_frames_that_nobody_else_should_send_are_counted() -> None:
     bench = Bench(drive('canopen_pkw', name='first', station=1))
     bench.begin()
-    bench.hears('000#8100', 10.1)       # NMT: reset all nodes
-    bench.hears('000#0201', 10.2)
+    bench.hears('080#', 10.1)           # SYNC, and a PDO of the node
+    bench.hears('181#0000', 10.2)
     assert bench.exchange.frames_rejected == 2
+    bench.hears('000#8100', 10.3)       # NMT: reset all nodes
+    bench.hears('000#0201', 10.4)
+    assert [event.text.code for event in bench.notes[0].events
+            if isinstance(event, ForeignMasterSeen)] == ['other_master_resets', 'other_master_nmt']
     assert bench.sessions[0].statistics.rejected == 0
 
 
