@@ -11,7 +11,7 @@ from typing import Any
 from drive_can_bridge.backup.document import head_of, settings_of, written
 from drive_can_bridge.cli.command import complain, FAILED, output, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
-    add_words, chosen, complete_drives, opened, read_all, source_of, unread)
+    add_words, by_short_names, chosen, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.client.drive import Drive
 from drive_can_bridge.core.errors import DriveCanError
@@ -39,7 +39,8 @@ def define(parser: ArgumentParser) -> None:
                         help='write the file although parameters could not be read; it lists them '
                              'in a comment')
     add_words(parser, complete_drives, '[DRIVE …] -o FILE', '*',
-              'name or shell pattern; may be left out where there is only one')
+              'a drive, by its name or its full name in the ROS graph (/cell/lift), or a shell '
+              'pattern; may be left out where there is only one')
 
 
 def run(args: Namespace) -> int:
@@ -51,8 +52,9 @@ def run(args: Namespace) -> int:
     :raises DriveCanError: the drives cannot be reached.
     :raises OSError: a file cannot be written.
     """
+    words = by_short_names(args, args.words)
     with source_of(args) as source:
-        names = chosen(source.names, args.words)
+        names = chosen(source.names, words)
         files = _files(args.output, names)
         if not may_overwrite(files.values(), yes=args.yes,
                              otherwise='Nothing was read or written'):

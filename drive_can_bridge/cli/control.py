@@ -47,6 +47,8 @@ def define(parser: ArgumentParser) -> None:
     words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=(
         'a drive, by its name or its full name in the ROS graph (/cell/lift)'
         + ('; patterns too' if patterns else '')))
+    if command != STOP:     # which says what else it means
+        parser.epilog = 'Exit code 0: all did it. 1: not all, or no bridge. 2: wrong usage.'
     words.completer = _complete     # type: ignore[attr-defined]  # for argcomplete
     parser.add_argument('--namespace', metavar='NS', type=namespace,
                         help='only the bridge in this namespace')

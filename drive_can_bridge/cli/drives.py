@@ -5,9 +5,9 @@ What the commands that talk to drives have in common: the way to them, and which
 Positional arguments of such a command are called ``words``; options may stand between them.
 """
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext, suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -74,6 +74,26 @@ def source_of(args: Namespace) -> Iterator[Source]:
         yield source
     finally:
         source.close()
+
+
+def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
+    """
+    Return words with drives by their short names: a full one is where its bridge is, too.
+
+    :raises WrongUsage: they are in several namespaces.
+    """
+    found = []
+    for word in words:
+        place, slash, name = word.rpartition('/')
+        if slash and args.params_file is None:  # nobody knows where the drives of a file will be
+            with suppress(ArgumentTypeError):   # else it is none, which is said with all there are
+                where = namespace(place)
+                if args.namespace not in (None, where):
+                    raise WrongUsage(f'{word}: is not in namespace {args.namespace or "/"}, and '
+                                     'one bridge is asked at a time')
+                args.namespace, word = where, name
+        found.append(word)
+    return found
 
 
 def matching(names: Sequence[str], word: str) -> list[str]:

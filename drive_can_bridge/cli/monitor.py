@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable
 import json
 import os
+import shutil
 import sys
 
 from drive_can_bridge.cli.command import namespace
@@ -26,6 +27,7 @@ LINE_PERIOD = 1.0
 _POLL_PERIOD = 0.1
 #: s that is shown why a view is not suspended
 _REFUSAL_TIME = 5.0
+_TITLE = 'drive_can monitor'
 
 
 def define(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +42,7 @@ def define(parser: argparse.ArgumentParser) -> None:
         'a JSON document per drive and second: time, drive, bridge, state, level, online, '
         'message, control, setpoints and values (name: value, unit), exchanges, missed'))
     # how drive_can demo runs it
-    parser.add_argument('--title', default='drive_can monitor', help=argparse.SUPPRESS)
+    parser.add_argument('--title', default=_TITLE, help=argparse.SUPPRESS)
     parser.add_argument('--quit-code', type=int, default=0, help=argparse.SUPPRESS)
     parser.add_argument('--refuse-to-suspend', metavar='WHY', default='', help=argparse.SUPPRESS)
 
@@ -98,7 +100,13 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
             print(f'{args.title}: no live view without the Python module {error.name}',
                   file=sys.stderr)
         else:
-            setting = Setting(args.title, place, args.namespace, environment.export_command())
+            # a demo starts its bridge itself
+            bridge = '' if args.title != _TITLE else (
+                f'{"ros2 run drive_can_bridge " if shutil.which("ros2") else ""}drive_can_bridge')
+            setting = Setting(
+                args.title, place, args.namespace,
+                tuple(filter(None, (environment.activate_command(),
+                                    environment.export_command()))), bridge)
             code = show(source, model, setting, clock, ended=lambda: watcher.signalled,
                         quit_code=args.quit_code, notice=refusal)
             for text in balance(model.look(clock.now(), 1e-9 * clock.stamp())):

@@ -8,7 +8,7 @@ from typing import Any
 
 from drive_can_bridge.cli.command import above_zero, FAILED, print_json
 from drive_can_bridge.cli.drives import (
-    add_words, complete_words, opened, read_all, source_of, split_words)
+    add_words, by_short_names, complete_words, opened, read_all, source_of, split_words)
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
@@ -29,8 +29,9 @@ def define(parser: ArgumentParser) -> None:
         'Exit code 0: all was read. 1: something was not, its row says why. 2: wrong '
         'usage.')
     add_words(parser, complete_words, '[DRIVE] [NAME …]', '*', (
-        'the drive, also as a shell pattern (may be left out where there is only one); names of '
-        'the profile, or raw ones: p30, p613.5, x2004.10'))
+        'the drive, by its name or its full name in the ROS graph (/cell/lift), also as a shell '
+        'pattern (may be left out where there is only one); names of the profile, or raw ones: '
+        'p30, p613.5, x2004.10'))
     parser.add_argument('--watch', metavar='S', type=above_zero,
                         help='read again every S seconds, until Ctrl-C')
 
@@ -43,6 +44,7 @@ def run(args: Namespace) -> int:
     :raises WrongUsage: it is not clear which drive is meant.
     :raises DriveCanError: another master, a bus or a bridge that is not there.
     """
+    args.words[:1] = by_short_names(args, args.words[:1])
     with source_of(args) as source:
         names, wanted = split_words(source.names, args.words)
         with opened(source, names) as drives:

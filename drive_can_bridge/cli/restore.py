@@ -12,7 +12,7 @@ from drive_can_bridge.backup.restore import (
 from drive_can_bridge.cli.command import (
     agreed, complain, FAILED, must_be_answerable, print_json, say, WrongUsage)
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
+    add_words, by_short_names, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
 from drive_can_bridge.clock import Clock
@@ -49,7 +49,7 @@ def define(parser: ArgumentParser) -> None:
                         help='although profile or identity are not those of the file')
     add_words(parser, complete_drives, 'FILE [DRIVE]', '+', (
         'what drive_can backup has written, and where to (default: the drive that the file is '
-        'of)'))
+        'of), by its name or its full name in the ROS graph (/cell/lift)'))
 
 
 def run(args: Namespace) -> int:
@@ -67,6 +67,8 @@ def run(args: Namespace) -> int:
     backup = read_backup(Path(file))
     if not args.dry_run:
         must_be_answerable(yes=args.yes, otherwise=_NOTHING, yes_means='writes without asking')
+    if word is not None:
+        word, = by_short_names(args, [word])
     with source_of(args) as source:
         name = _target(backup, word, source)
         with opened(source, [name]) as drives:

@@ -7,7 +7,8 @@ import re
 import shlex
 
 from drive_can_bridge.cli.command import FAILED, print_json, WrongUsage
-from drive_can_bridge.cli.drives import add_words, complete_words, opened, source_of, split_words
+from drive_can_bridge.cli.drives import (
+    add_words, by_short_names, complete_words, opened, source_of, split_words)
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
@@ -34,8 +35,9 @@ def define(parser: ArgumentParser) -> None:
         'Exit code 0: all was written. 1: something was not, its row says why. 2: wrong '
         'usage, nothing was sent. After Ctrl-C (130) the write under way is complete.')
     add_words(parser, complete_words, '[DRIVE] NAME=VALUE …', '+', (
-        'the drive, also as a shell pattern (may be left out where there is only one); names of '
-        'the profile, or raw ones, with the new value'))
+        'the drive, by its name or its full name in the ROS graph (/cell/lift), also as a shell '
+        'pattern (may be left out where there is only one); names of the profile, or raw ones, '
+        'with the new value'))
 
 
 def run(args: Namespace) -> int:
@@ -48,6 +50,8 @@ def run(args: Namespace) -> int:
     """
     # what the command line alone shows to be wrong; the first word may be a drive
     _assignments(args.words if '=' in args.words[0] else args.words[1:])
+    if '=' not in args.words[0]:
+        args.words[:1] = by_short_names(args, args.words[:1])
     with source_of(args) as source:
         names, words = split_words(source.names, args.words)
         wanted = _assignments(words)

@@ -3,7 +3,9 @@
 
 from collections.abc import Sequence
 import os
+from pathlib import Path
 import shlex
+import sys
 
 DOMAIN_ID = 'ROS_DOMAIN_ID'
 DISCOVERY_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -61,6 +63,13 @@ def export_command() -> str:
     settings = [f'{name}={shlex.quote(os.environ[name])}' for name in _SHARED
                 if os.environ.get(name)]
     return f'export {" ".join(settings)}' if settings else ''
+
+
+def activate_command() -> str:
+    """Return the shell command that makes another terminal know ``drive_can``; '' if none is."""
+    script = Path(sys.prefix) / 'bin' / 'activate'
+    return (f'source {shlex.quote(str(script))}'
+            if sys.prefix != sys.base_prefix and script.is_file() else '')
 
 
 #: why somebody may not have answered yet

@@ -225,13 +225,15 @@ class Setting:
     :param title: what this is.
     :param place: where it looks, ``ROS domain 0, on this machine only``.
     :param namespace: that it is limited to, or ''.
-    :param environment: command that lets another terminal see the same; may be ''.
+    :param environment: commands that let another terminal see the same.
+    :param bridge: command that starts one; '': one is being started.
     """
 
     title: str = 'drive_can monitor'
     place: str = ''
     namespace: str = ''
-    environment: str = ''
+    environment: tuple[str, ...] = ()
+    bridge: str = 'ros2 run drive_can_bridge drive_can_bridge'
 
 
 class _Frame:
@@ -312,8 +314,8 @@ def help_lines(drive: DriveSnapshot | None, setting: Setting, width: int) -> Lin
     """Say what can be typed elsewhere, of the drive that is marked, and what the colours mean."""
     name = drive.name if drive is not None else 'DRIVE'
     lines: Lines = [Text('in another terminal', style=DIM)]
-    if setting.environment:
-        lines += wrapped(setting.environment, width, 'bold')
+    for command in setting.environment:
+        lines += wrapped(command, width, 'bold')
     controlled = drive is None or bool(drive.control)
     for command, what in (
             (f'drive_can read {name}', 'its parameters'),
@@ -371,12 +373,11 @@ def _nobody(frame: _Frame, snapshot: Snapshot, setting: Setting) -> None:
         told = wrapped(f'No bridge{where} yet. Looking for one in {setting.place or "ROS"}: '
                        f'whatever publishes /diagnostics as a drive_can_bridge does.',
                        frame.inner)
-        told += [Text(), Text('To start one, in another terminal:')]
-        commands = [setting.environment] if setting.environment else []
-        commands.append('ros2 run drive_can_bridge drive_can_bridge --ros-args '
-                        '--params-file FILE')
-        for command in commands:
-            told += wrapped(command, frame.inner, 'bold')
+        if setting.bridge:
+            told += [Text(), Text('To start one, in another terminal:')]
+            for command in (*setting.environment,
+                            f'{setting.bridge} --ros-args --params-file FILE'):
+                told += wrapped(command, frame.inner, 'bold')
         told += [Text(), Text('It appears here by itself.')]
     frame.add('bridges', told, len(told))
     _rest(frame, snapshot)

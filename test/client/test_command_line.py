@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What the words of a command line may be, and how columns stand."""
 
-from argparse import ArgumentTypeError
+from argparse import ArgumentTypeError, Namespace
 import math
 import os
 from pathlib import Path
@@ -14,6 +14,7 @@ import pytest
 from drive_can_bridge.cli import completion as completion_script
 from drive_can_bridge.cli.command import (
     above_zero, bitrate, of_drive, PARAMS_FILE, print_json, whole, WrongUsage)
+from drive_can_bridge.cli.drives import by_short_names
 from drive_can_bridge.cli.main import EXAMPLES, main, SUBCOMMANDS, understood
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.text import column_lines
@@ -102,6 +103,32 @@ def test_a_name_that_names_no_file(words: tuple[str, ...], name: str,
     line, = capsys.readouterr().err.splitlines()
     assert line.startswith(f'drive_can {words[0]}')
     assert f'argument -o/--output: {name!r} names no file' in line
+
+
+def test_alone_it_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        main([])
+    out, told = capsys.readouterr()
+    assert (out, told.startswith('usage: drive_can SUBCOMMAND …')) == ('', True)
+    for subcommand in SUBCOMMANDS:
+        assert f'\n  {subcommand} ' in told
+
+
+def test_a_full_name_says_where_its_bridge_is() -> None:
+    def understand(file: str | None, where: str | None,
+                   *words: str) -> tuple[list[str], str | None]:
+        args = Namespace(params_file=file, namespace=where)
+        return by_short_names(args, words), args.namespace
+    assert understand(None, None, 'lift', 'l*') == (['lift', 'l*'], None)
+    assert understand(None, None, '/lift') == (['lift'], '')
+    assert understand(None, None, '/cell/lift', 'cell/hoist') == (['lift', 'hoist'], '/cell')
+    assert understand(None, '/cell', 'lift', '/cell/l*') == (['lift', 'l*'], '/cell')
+    # no namespace, and a file whose drives have none: said to be no drive, with all there are
+    assert understand(None, None, '/c*/lift') == (['/c*/lift'], None)
+    assert understand('robot.yaml', None, '/lift') == (['/lift'], None)
+    for where, words in (('', ('/cell/lift',)), (None, ('/a/lift', '/b/lift'))):
+        with pytest.raises(WrongUsage, match=f'{words[-1]}: is not in namespace /a?, and one '):
+            understand(None, where, *words)
 
 
 @pytest.mark.parametrize('subcommand', SUBCOMMANDS)

@@ -10,7 +10,7 @@ import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.view.live import Choice, closely, HINTS, Key, keys_in, Page
+from drive_can_bridge.view.live import Choice, closely, HINTS, Key, keys_in, Page, Setting
 
 
 @pytest.mark.parametrize(('width', 'height'), SIZES)
@@ -33,6 +33,15 @@ def test_it_fits_everywhere(width: int, page: Page) -> None:
         assert len(lines) == height
         assert all(len(line) <= width for line in lines)
         assert 'Layout' not in ''.join(lines)
+
+
+def test_nobody_starts_a_bridge_that_is_being_started() -> None:
+    for bridge in ('', 'drive_can_bridge'):
+        snapshot = seen(Model())
+        told = plain(snapshot, Choice(), 100, 30, Setting(bridge=bridge))
+        assert ('To start one' in told) == bool(bridge)
+        assert ('drive_can_bridge --ros-args --params-file FILE' in told) == bool(bridge)
+        assert 'ros2 run' not in told
 
 
 def test_a_load_that_is_no_number_ends_no_view() -> None:

@@ -21,7 +21,7 @@ from drive_can_bridge.view.live import Choice, Page, page, Setting
 GOLDEN = Path(__file__).with_name('golden')
 SIZES = ((80, 24), (140, 50), (60, 20))
 SETTING = Setting(place='ROS domain 7, on this machine only',
-                  environment='export ROS_DOMAIN_ID=7')
+                  environment=('export ROS_DOMAIN_ID=7',))
 #: name -> (what there is, what was chosen)
 VIEWS: dict[str, tuple[Snapshot, Choice]] = {
     'drives': (seen(three_drives()), Choice(drive='/lift')),
@@ -34,22 +34,23 @@ VIEWS: dict[str, tuple[Snapshot, Choice]] = {
 }
 
 
-def shown(snapshot: Snapshot, choice: Choice, width: int, height: int, *,
-          colours: bool = False) -> str:
+def shown(snapshot: Snapshot, choice: Choice, width: int, height: int,
+          setting: Setting = SETTING, *, colours: bool = False) -> str:
     """Print a page as a terminal of that size would get it."""
     os.environ['TZ'] = 'UTC'
     time.tzset()
     output = io.StringIO()
     console = Console(file=output, width=width, height=height, force_terminal=True,
                       color_system='truecolor' if colours else None, legacy_windows=False)
-    console.print(page(snapshot, choice, SETTING, width=width, height=height), height=height)
+    console.print(page(snapshot, choice, setting, width=width, height=height), height=height)
     return output.getvalue()
 
 
-def plain(snapshot: Snapshot, choice: Choice, width: int, height: int) -> str:
+def plain(snapshot: Snapshot, choice: Choice, width: int, height: int,
+          setting: Setting = SETTING) -> str:
     """Print a page without any colours and attributes."""
     console = Console(file=io.StringIO(), width=width, height=height)
-    text = shown(snapshot, choice, width, height)
+    text = shown(snapshot, choice, width, height, setting)
     lines = [console.render_str('').from_ansi(line).plain for line in text.split('\n')]
     return '\n'.join(lines)
 

@@ -1,6 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The ROS environment, as it is told and made."""
 
+from pathlib import Path
+import sys
+
 import pytest
 
 from drive_can_bridge.process import environment
@@ -45,3 +48,15 @@ def test_a_domain_whose_ports_do_not_exist(clean: pytest.MonkeyPatch, given: str
                                            refused: bool) -> None:
     clean.setenv('ROS_DOMAIN_ID', given)
     assert bool(environment.domain_problem()) is refused
+
+
+def test_what_another_terminal_needs_to_know_the_commands(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, 'prefix', str(tmp_path / 'my drives'))
+    assert environment.activate_command() == ''
+    script = tmp_path / 'my drives' / 'bin' / 'activate'
+    script.parent.mkdir(parents=True)
+    script.touch()
+    assert environment.activate_command() == f"source '{script}'"
+    monkeypatch.setattr(sys, 'base_prefix', sys.prefix)     # no virtual environment
+    assert environment.activate_command() == ''
