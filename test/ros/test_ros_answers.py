@@ -148,8 +148,9 @@ def test_others_are_answered_as_ever_and_as_by_rclpy(
     one = bridge(parameters(lift=LIFT))
     sent: list[str] = []
     send = RclServices.send
+    # noted first: who has the answer goes on while the sender may still wait for its turn
     monkeypatch.setattr(RclServices, 'send', lambda self, response: (
-        send(self, response), sent.append(response.service.service_name)))
+        sent.append(response.service.service_name), send(self, response)))
     kinds = {service.service_name: service.srv_type for service in _services(one)}
     ours = {name: client.call(name, kind) for name, kind in kinds.items()}
     assert set(sent) == kinds.keys()
