@@ -13,8 +13,9 @@ import sys
 import threading
 
 from child import serve
-from unix_bus import CAN_FRAME, EXTENDED
+from drives import CAN_FRAME
 
+EXTENDED = 0x80000000
 #: message of the opening -> what is answered
 WORDS = {'open': b'< ok >', 'rawmode': b'< ok >'}
 MESSAGE = re.compile(rb'< *(\w+) *([^>]*)>')
