@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # canopen-asyncio 2.4.1: PDOs of a node without inhibit time, event timer or SYNC start value cannot be
 # read, though these sub-indices (3, 5, 6 of 1400h and 1800h) are optional, and canopen 2.4.1, of which
 # it is a port, takes their refusal (06090011h) as "not there" and goes on.

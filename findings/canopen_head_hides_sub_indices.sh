@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # canopen 2.4.1 (2.3.0 alike), import_eds: sub-indices disappear where the head says that it is a variable.
 #
 # A section [2000] with ObjectType=7 (or without that key, which CiA 306 reads as 7) in front of

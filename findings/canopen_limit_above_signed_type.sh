@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # canopen 2.4.1 (2.3.0 alike), import_eds: decimal limits above a signed type turn negative, without a word.
 #
 # HighLimit=65535 of an INTEGER16 becomes -1, and 32768 becomes -32768: every number above the type's

@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # durand 0.5.0: a TPDO of transmission type n (every nth SYNC) is sent with the nth SYNC, and then with
 # every one: SyncHandler counts up to n and never begins again.
 #

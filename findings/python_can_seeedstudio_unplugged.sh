@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # python-can 4.6.1 (4.3.1 alike), interface "seeedstudio": an adapter that was unplugged is never noticed.
 #
 # SeeedBus._recv_internal catches pyserial's SerialException ("device reports readiness to read but

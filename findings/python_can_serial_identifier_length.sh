@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # python-can 4.5.0 (4.3.1 and 4.4.0 alike), interface "serial": every frame arrives with a 29-bit identifier.
 #
 # SerialBus.send writes the identifier without the flag that tells 11 bits from 29, and _recv_internal

@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # python-can 4.6.1, TRCReader: a .trc of version 1.2 or 3.0 is read as version 1.0, and fails at its first entry.
 #
 # PEAK's format is known to the reader in the versions 1.1, 1.3, 2.0 and 2.1; any other is taken for 1.0,

@@ -1,4 +1,6 @@
 #!/usr/bin/env bash
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+#
 # scapy 2.5.0, RawPcapNgReader: does not tell which interface of a .pcapng a packet is of.
 #
 # Ubuntu 24.04 has this version. A capture of can0 and can1 comes out as one stream: the number of the

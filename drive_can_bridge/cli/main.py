@@ -261,9 +261,6 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         module.define(own)
         own.epilog = '\n\n'.join(filter(None, (own.epilog, examples(PROGRAM, wanted))))
     complete(parser)
-    if not arguments:
-        parser.print_help(sys.stderr)
-        raise SystemExit(WRONG_USAGE)
     if arguments[:1] == [wanted] and wanted not in parsers:
         near = nearest(wanted, SUBCOMMANDS)
         parser.error(f'there is no subcommand {wanted!r}'

@@ -105,15 +105,6 @@ def test_a_name_that_names_no_file(words: tuple[str, ...], name: str,
     assert f'argument -o/--output: {name!r} names no file' in line
 
 
-def test_alone_it_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match='2'):
-        main([])
-    out, told = capsys.readouterr()
-    assert (out, told.startswith('usage: drive_can SUBCOMMAND …')) == ('', True)
-    for subcommand in SUBCOMMANDS:
-        assert f'\n  {subcommand} ' in told
-
-
 def test_a_full_name_says_where_its_bridge_is() -> None:
     def understand(file: str | None, where: str | None,
                    *words: str) -> tuple[list[str], str | None]:
