@@ -42,11 +42,13 @@ class Pace:
     rounds: int = 40
     turns: int = 4
     backups: int = 5
+    loops: int = 8
     sweep: tuple[int, ...] = SWEEP
 
 
 #: each scenario for a second or two, to see that it runs
-SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, turns=1, backups=1, sweep=(1, 2))
+SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, turns=1, backups=1, loops=1,
+             sweep=(1, 2))
 
 
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
@@ -81,7 +83,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         'hand hung': lambda: own_network.run(lambda: scenarios.one_hangs(
             Load(8, 0.01, subscribed=False, control=True), pace.commands)),
         'hand busy': lambda: own_network.run(lambda: scenarios.busy_hand(
-            Load(8, 0.01, subscribed=False, control=True), 3 * pace.commands, 8)),
+            Load(8, 0.01, subscribed=False, control=True), 3 * pace.commands, pace.loops)),
         'backup': lambda: scenarios.backup(
             Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(

@@ -28,6 +28,8 @@ from viewer import Viewer
 SETTLE = 2.0
 #: the program that a user types
 DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
+#: a process that computes, until who started it has ended
+COMPUTES = 'import os; own = os.getppid()\nwhile os.getppid() == own: pass'
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
 #: number of the first setting
 SETTINGS_AT = 1000
@@ -562,7 +564,7 @@ def busy_hand(load: Load, commands: int, loops: int) -> dict[str, Any]:
         stack.enter_context(bridge_under(load, bus))
         for _ in range(loops):
             loop = subprocess.Popen(    # in another terminal
-                [sys.executable, '-c', 'while True: pass'], start_new_session=True)
+                [sys.executable, '-c', COMPUTES], start_new_session=True)
             stack.callback(loop.wait)
             stack.callback(loop.kill)
         for _ in range(commands):
