@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What would have held where the computer was too late, as a servo and its bridge see it."""
 
-from servo_builders import Axis
 from saying import says
+from servo_builders import Axis
 
 from drive_can_bridge.core.events import Noted, StationLost
 
