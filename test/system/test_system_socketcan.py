@@ -200,6 +200,7 @@ def test_interface_taken_down_and_up_deleted_and_created(
     drive = f'/{namespace}/conveyor'
     bus = f'{namespace}/drive_can_bridge: bus main'
     start_moving(client, drive)
+    bridge.error('bus main: open')      # which may be read only now
     told = len(bridge.errors)
     ip('link', 'set', 'dev', own, 'down')
     client.online(drive, wanted=False)
