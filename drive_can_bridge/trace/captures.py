@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 import struct
 from struct import unpack_from
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, cast, NamedTuple
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind
@@ -84,7 +84,8 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
         size = path.stat().st_size
         watched = _Watched(file)
         try:
-            reader = RawPcapReader(watched)
+            # a file is taken, too, whatever scapy's types say
+            reader = RawPcapReader(cast('Any', watched))
         except Exception:  # noqa: BLE001  whatever a damaged head makes it raise
             complain(_CUT)
             return
