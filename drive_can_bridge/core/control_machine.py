@@ -105,7 +105,7 @@ class ControlMachine:
     Bring one drive to the state that was asked for, by the words and conditions of a table.
 
     After any call, look at :attr:`word`, :attr:`take_completed`, :meth:`take_notes`,
-    :meth:`next_timer`. Time is that of a steady clock, in s.
+    :attr:`due`. Time is that of a steady clock, in s.
 
     :param timeout: seconds until an unconfirmed request fails.
     :param pulse: how often the reset word leaves: once where writes are acknowledged.
@@ -354,8 +354,9 @@ class ControlMachine:
         else:
             self._end(False, text)
 
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do; ``math.inf`` if never."""
+    @property
+    def due(self) -> float:
+        """When :meth:`handle_timer` has something to do; infinity: never."""
         return math.inf if self._operation is None else self._operation.deadline
 
     def drop(self, reason: Sentence, whom: str = 'the drive') -> None:

@@ -40,17 +40,21 @@ class Wait:
     :ivar lacking: names of what has not left since.
     """
 
-    deadline: float
     requests: list[ControlRequest]
     lacking: set[str]
 
 
 class NeutralStop:
-    """Those that wait until one drive has everything neutral; nobody does most of the time."""
+    """
+    Those that wait until one drive has everything neutral; nobody does most of the time.
+
+    :ivar due: when it has lasted too long; infinity: nobody waits.
+    """
 
     def __init__(self, session: Commanded) -> None:
         self._session = session
         self._wait: Wait | None = None
+        self.due = math.inf
 
     @property
     def pending(self) -> bool:
@@ -65,7 +69,8 @@ class NeutralStop:
             return
         names = {setpoint.parameter.name for setpoint in session.setpoints.items
                  if not setpoint.parameter.limit}
-        self._wait = Wait(now + session.configuration.control_timeout, [request], names)
+        self._wait = Wait([request], names)
+        self.due = now + session.configuration.control_timeout
         if not names:
             self._end(True, sentences.nothing_commanded())
         else:
@@ -97,16 +102,12 @@ class NeutralStop:
 
     def handle_timer(self, now: float) -> None:
         """Wait no longer than a control service may take."""
-        if now >= self.next_timer():
+        if now >= self.due:
             self.refused(sentences.neutral_unanswered(
                 self._session.configuration.control_timeout))
 
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do."""
-        return math.inf if self._wait is None else self._wait.deadline
-
     def _end(self, success: bool, message: Sentence) -> None:
-        wait, self._wait = self._wait, None
+        wait, self._wait, self.due = self._wait, None, math.inf
         if wait is not None:
             for request in wait.requests:
                 self._session.report.note(ControlCompleted(request, success, message))

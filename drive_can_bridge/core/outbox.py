@@ -21,28 +21,27 @@ Left = Callable[[bool, float], None]
 
 
 class Outbox:
-    """The frames of one session, in order."""
+    """
+    The frames of one session, in order.
 
-    __slots__ = ('_frames', '_leaving', '_left')
+    :ivar frames: those that wait. Looked at after every step, so nobody is called for that.
+    """
+
+    __slots__ = ('_leaving', '_left', 'frames')
 
     def __init__(self) -> None:
-        self._frames: list[Frame] = []
+        self.frames: list[Frame] = []
         self._left: list[Left | None] = []
         self._leaving: list[Left | None] = []
 
     def put(self, frame: Frame, left: Left | None = None) -> None:
         """Have a frame sent now; ``left`` is told what became of it."""
-        self._frames.append(frame)
+        self.frames.append(frame)
         self._left.append(left)
-
-    @property
-    def waiting(self) -> bool:
-        """Something is to be sent."""
-        return bool(self._frames)
 
     def drop(self, unwanted: Callable[[Frame], bool], now: float) -> None:
         """Leave out what waits and is not to be sent any more: it counts as refused."""
-        waiting = list(zip(self._frames, self._left))
+        waiting = list(zip(self.frames, self._left))
         self.clear()
         for frame, left in waiting:
             if not unwanted(frame):
@@ -52,10 +51,10 @@ class Outbox:
 
     def take(self) -> list[Frame]:
         """Return the frames to be sent now, in order."""
-        frames = self._frames
+        frames = self.frames
         if frames:
             self._leaving += self._left
-            self._frames, self._left = [], []
+            self.frames, self._left = [], []
         return frames
 
     def left(self, now: float, refused: Collection[int] = ()) -> None:
@@ -71,11 +70,11 @@ class Outbox:
 
     def take_over(self, other: 'Outbox') -> None:
         """Have the frames sent that wait elsewhere, behind those that wait here."""
-        self._frames += other._frames
+        self.frames += other.frames
         self._left += other._left
         other.clear()
 
     def clear(self) -> None:
         """Forget frames that nobody has fetched; their maker is about to forget, too."""
-        self._frames.clear()
+        self.frames.clear()
         self._left.clear()

@@ -53,11 +53,16 @@ from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty
 
 
-class Part(Protocol):
-    """What goes on in a conversation beside other things."""
+class Timed(Protocol):
+    """What acts at times of its own."""
 
-    def next_timer(self) -> float:
-        """Return when ``handle_timer`` has something to do; infinity: not planned."""
+    @property
+    def due(self) -> float:
+        """When it has something to do; infinity: not planned."""
+
+
+class Part(Timed, Protocol):
+    """What goes on in a conversation beside other things."""
 
     def handle_timer(self, now: float) -> None:
         """Do what is due, which may be nothing."""
@@ -66,11 +71,8 @@ class Part(Protocol):
         """Plan nothing any more. The channel was cleared."""
 
 
-class AcyclicPart(Protocol):
+class AcyclicPart(Timed, Protocol):
     """The acyclic channel."""
-
-    def next_timer(self) -> float:
-        """Return when ``advance`` wants to be called."""
 
     def advance(self, now: float) -> None:
         """Do all that is possible now."""
@@ -167,17 +169,17 @@ class Session(ABC):
         self.partners: Sequence[Session] = ()
         self.phase: float | None = None
         self._parts: Sequence[Part] = ()
-        self._timed: list[tuple[Callable[[], float], Callable[[float], None]]] = []
+        self._timed: list[tuple[Timed, Callable[[float], None]]] = []
 
     def look_after(self, *parts: Part, channel: AcyclicPart) -> None:
         """Name the parts, in the order in which they act; then come control word and channel."""
         self._parts, self._acyclic = parts, channel
-        self._timed = [(part.next_timer, part.handle_timer) for part in parts]
+        self._timed = [(part, part.handle_timer) for part in parts]
         if self.control is not None:
-            self._timed.append((self.control.next_timer, self._look_after_control))
+            self._timed.append((self.control, self._look_after_control))
         else:
-            self._timed.append((self.neutral_stop.next_timer, self.neutral_stop.handle_timer))
-        self._timed.append((channel.next_timer, channel.advance))
+            self._timed.append((self.neutral_stop, self.neutral_stop.handle_timer))
+        self._timed.append((channel, channel.advance))
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -453,15 +455,15 @@ class Session(ABC):
 
     def handle_timer(self, now: float) -> None:
         """Do what is due. Safe to call at any time."""
-        for due, act in self._timed:
-            if now >= due():
+        for part, act in self._timed:
+            if now >= part.due:
                 act(now)
 
     def next_timer(self) -> float:
         """Return when ``handle_timer`` wants to be called next; infinity: never."""
         soonest = math.inf
-        for due, _ in self._timed:      # after every frame: min() costs twice as much
-            at = due()
+        for part, _ in self._timed:     # after every frame: min() costs twice as much
+            at = part.due
             if at < soonest:
                 soonest = at
         return soonest

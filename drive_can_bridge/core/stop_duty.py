@@ -213,7 +213,7 @@ class StopDuty:
 
     def happened(self, happened: Happened) -> Do:
         """Take what happened to the drive; return what has to be done."""
-        do, debts = Do.NOTHING, self._debts
+        do, debts, changed = Do.NOTHING, self._debts, False
         if not debts:
             return do
         # as long as it is told to run as well, an answer shows nothing of a stop, nor does silence
@@ -221,9 +221,12 @@ class StopDuty:
         for channel, debt in list(debts.items()):
             rule = self._rules.get((debt, happened))
             if rule is not None and not (blind and rule.becomes is not debt):
-                self._change(channel, rule.becomes)
+                if rule.becomes is not debt:
+                    self._change(channel, rule.becomes)
+                    changed = True
                 do = max(do, rule.do)
-        self._look()
+        if changed:
+            self._look()
         return do
 
     def _change(self, channel: Hashable, debt: Debt) -> None:

@@ -450,7 +450,11 @@ class BusExchange:
 
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
-        now = self._last_pass = self._look_at_clock()
+        clock = self._clock
+        now = clock()
+        if now - self._meant_at > LATENESS_MAX:
+            self._late(now)
+        self._last_pass = now
         self.hung = False
         self._meant_at = min(self._meant_at, now)
         if now >= self._tell_at:
@@ -458,10 +462,14 @@ class BusExchange:
         soonest = min(now + PASS_PERIOD, self._tell_at)
         for member in self._members:
             if member.due <= now or member.look_at <= now and self.active:
-                now = self._look_at_clock()  # the drives before took their time
+                now = clock()   # the drives before took their time
+                if now - self._meant_at > LATENESS_MAX:
+                    self._late(now)
                 member.look_at = now + LOOK_PERIOD
                 member.take_commands(now)
-                now = self._look_at_clock()  # and so did these
+                now = clock()   # and so did these
+                if now - self._meant_at > LATENESS_MAX:
+                    self._late(now)
                 member.take(member.session.handle_timer, now)
             if member.anew_at <= now:
                 member.begin_anew(now)
@@ -472,20 +480,18 @@ class BusExchange:
         self._meant_at = max(soonest, now)
         return soonest
 
-    def _look_at_clock(self) -> float:
+    def _late(self, now: float) -> None:
         """
-        Return the time, and see to what a stall has made stale.
+        See to what a stall has made stale.
 
         Not only when a pass begins: a process may be stopped in the midst of one.
         """
-        now = self._clock()
         late = now - self._meant_at
-        if late > LATENESS_MAX and not self._notice_lost_time(now):
+        if not self._notice_lost_time(now):
             self._meant_at = now
             for member in self._members if self.active else ():
                 member.tell(member.listener.discard_commands,
                             sentences.exchange_late(seconds=late))
-        return now
 
     def _tell_again(self, now: float) -> None:
         self._tell_at = now + REQUEST_PERIOD
@@ -546,7 +552,7 @@ class BusExchange:
         session = member.session
         session.receive_frame(frame, now, age)
         for _ in range(LOOK_AHEAD):
-            if not session.outbox.waiting:
+            if not session.outbox.frames:
                 return
             more = self.link.look()
             if more is None:

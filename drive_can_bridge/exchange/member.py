@@ -134,7 +134,10 @@ class Member:
         Behind a defect, too: a limit is taken all the same, and what waits for all joints of the
         bus is of other drives as well.
         """
-        self.tell(self.listener.take_commands, now)
+        try:
+            self.listener.take_commands(now)
+        except Exception as error:  # noqa: BLE001  as in tell(), in every pass
+            self.unheard(error)
 
     def pump(self) -> None:
         """Send what the session wants sent, and tell its listener what happened."""
@@ -143,11 +146,14 @@ class Member:
             partner._pump()
 
     def _pump(self) -> None:
+        outbox = self.session.outbox
         try:
-            self._send()
+            if outbox.frames:
+                self._send()
         finally:
             self._report()
-        self._send()    # a fault that was told is asked for its number
+        if outbox.frames:   # a fault that was told is asked for its number
+            self._send()
         self.due = self.session.next_timer()
 
     def _send(self) -> None:
@@ -160,7 +166,7 @@ class Member:
                 if not self._transmit(frame, leaving):
                     refused.append(place)
             session.frames_left(self._clock(), refused)
-            frames = session.take_frames()
+            frames = session.outbox.frames and session.take_frames()
 
     def _report(self) -> None:
         """Tell the listener what was sent, and what happened."""

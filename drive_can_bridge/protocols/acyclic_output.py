@@ -290,7 +290,3 @@ class AcyclicOutput:
         if self._slot is not None:
             self.failed(self._slot)
         return True
-
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do; infinity: never."""
-        return self.again_at

@@ -44,10 +44,6 @@ class Answers:
         self.due = math.inf
         self._silence = silence
 
-    def next_timer(self) -> float:
-        """Return when an answer counts as missed; infinity: with the next cycle."""
-        return self.due
-
     def handle_timer(self, now: float) -> None:
         """Settle what is due."""
         if now >= self.due:

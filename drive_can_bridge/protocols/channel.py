@@ -361,8 +361,9 @@ class Channel(Generic[StepT, ReplyT]):
         finally:
             self._advancing = False
 
-    def next_timer(self) -> float:
-        """Return when ``advance`` wants to be called."""
+    @property
+    def due(self) -> float:
+        """When ``advance`` wants to be called."""
         if not self._awake:
             return math.inf
         soonest = self._transactor.express_at(self._held_until)

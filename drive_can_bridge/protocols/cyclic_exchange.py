@@ -136,8 +136,9 @@ class CyclicExchange(Generic[TelegramT]):
 
     # -- the beat ---------------------------------------------------------------------------------
 
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` has something to do."""
+    @property
+    def due(self) -> float:
+        """When :meth:`handle_timer` has something to do."""
         due, expires_at = self.timer.due, self._session.setpoints.expires_at
         if expires_at < due:
             due = expires_at

@@ -28,37 +28,35 @@ class Life:
 
     What a script has asked for goes on to its end in the channel when another one is started, but
     tells nobody; what the new one asks for follows then.
+
+    :ivar due: until when it waits; infinity: for something else.
     """
 
     def __init__(self, channel: Channel[Any, Any]) -> None:
         self._channel = channel
         self._script: Script | None = None
-        self._due = math.inf
+        self.due = math.inf
         self._asking = False    # a procedure is in the channel, of this script or one before
         self._next: Generator[Any, Any, Any] | None = None      # of this one, waits for that
 
     def start(self, script: Script, now: float) -> None:
         """Begin, instead of what there was."""
-        self._script, self._due, self._next = script, math.inf, None
+        self._script, self.due, self._next = script, math.inf, None
         self._go_on(script, None, now)
 
     def end(self) -> None:
         """End it where it stands; nobody is told what it has asked for."""
-        self._script, self._due, self._next = None, math.inf, None
+        self._script, self.due, self._next = None, math.inf, None
 
     def stop(self) -> None:
         """End it where it stands. The channel was cleared."""
         self.end()
         self._asking = False
 
-    def next_timer(self) -> float:
-        """Return until when it waits; infinity: for something else."""
-        return self._due
-
     def handle_timer(self, now: float) -> None:
         """Go on, if it has waited for this time."""
-        if now >= self._due and self._script is not None:
-            self._due = math.inf
+        if now >= self.due and self._script is not None:
+            self.due = math.inf
             self._go_on(self._script, now, now)
 
     def _go_on(self, script: Script, found: Any, now: float) -> None:
@@ -69,7 +67,7 @@ class Life:
         if script is not self._script:      # what it did has begun or ended a life
             return
         if isinstance(wanted, (int, float)):
-            self._due = wanted
+            self.due = wanted
         else:
             self._next = wanted
             self._ask(now)

@@ -247,7 +247,7 @@ def test_starts_with_disable_and_knows_nothing() -> None:
     control = machine()
     assert (control.word, control.word_due) == (OFF, True)
     assert (control.state, control.fault, control.pending) == ('unknown', False, False)
-    assert control.next_timer() == math.inf
+    assert control.due == math.inf
     assert control.take_completed() == []
     assert control.take_notes() == []
 
@@ -344,7 +344,7 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
     cycle(control, NOT_READY, 0.0)
     ticket = asked(control, ENABLE, 0.01)
     assert control.pending
-    assert control.next_timer() == 2.01
+    assert control.due == 2.01
     assert cycle(control, NOT_READY, 0.02) == OFF
     assert cycle(control, READY, 0.04) == OFF
     assert (control.word, control.word_due) == (RUN, True)
@@ -356,7 +356,7 @@ def test_enable_waits_for_ready_then_for_enabled() -> None:
     assert completed.request is ticket
     assert (completed.success, completed.message) == (True, 'enabled')
     assert (control.word, control.state, control.pending) == (RUN, 'enabled', False)
-    assert control.next_timer() == math.inf
+    assert control.due == math.inf
     assert control.take_notes() == []
 
 
@@ -517,7 +517,7 @@ def test_enable_that_is_not_confirmed_is_withdrawn(
     assert outcomes(control) == [(ENABLE, False, says(
         'stuck', timeout=2.0, state=state, status=status, remarks=remarks))]
     assert (control.word, control.pending) == (OFF, False)
-    assert control.next_timer() == math.inf
+    assert control.due == math.inf
     cycle(control, READY, 2.1)
     cycle(control, ENABLED, 2.2)
     assert control.word == OFF
@@ -551,7 +551,7 @@ def test_request_after_the_deadline_does_not_find_the_old_one() -> None:
     control.request(ControlRequest(ENABLE), 0.0)
     control.request(ControlRequest(ENABLE), 2.5)
     assert [success for _, success, _ in outcomes(control)] == [False]
-    assert control.next_timer() == 4.5
+    assert control.due == 4.5
 
 
 def test_second_enable_joins_the_first() -> None:
@@ -560,7 +560,7 @@ def test_second_enable_joins_the_first() -> None:
     cycle(control, READY, 0.02)
     second = asked(control, ENABLE, 1.0)
     assert control.word == RUN
-    assert control.next_timer() == 2.0
+    assert control.due == 2.0
     assert control.take_completed() == []
     cycle(control, ENABLED, 1.02)
     completed = control.take_completed()
@@ -761,7 +761,7 @@ def braking() -> ControlMachine:
 def test_quick_stop_goes_on_while_the_drive_says_that_it_brakes() -> None:
     """Under ``disable`` the motor may coast."""
     control = braking()
-    assert (control.word, control.pending, control.next_timer()) == (STOP, True, 5.0)
+    assert (control.word, control.pending, control.due) == (STOP, True, 5.0)
     cycle(control, BRAKES, 3.1)
     assert control.disregard == says(
         'disregards', state='enabled', status=status_word(BRAKES), action='quick_stop', word=STOP)
@@ -770,7 +770,7 @@ def test_quick_stop_goes_on_while_the_drive_says_that_it_brakes() -> None:
     cycle(control, BRAKES, 5.1)
     assert (control.word, outcomes(control)) == (STOP, [])
     control.request(ControlRequest(QUICK_STOP), 5.3)
-    assert control.next_timer() == pytest.approx(7.3)
+    assert control.due == pytest.approx(7.3)
     cycle(control, READY, 6.0)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')]
     assert (control.word, control.pending) == (OFF, False)
@@ -802,7 +802,7 @@ def test_second_quick_stop_joins_the_first() -> None:
     control = enabled()
     control.request(ControlRequest(QUICK_STOP), 1.0)
     control.request(ControlRequest(QUICK_STOP), 1.5)
-    assert control.next_timer() == 3.0
+    assert control.due == 3.0
     cycle(control, READY, 1.52)
     assert outcomes(control) == [(QUICK_STOP, True, 'ready')] * 2
 
@@ -848,7 +848,7 @@ def test_quick_stop_without_a_status_is_answered_when_sent_and_keeps_braking() -
     assert cycle(control, None, 1.02) == STOP
     message = 'quick_stop sent; the drive does not report its state'
     assert outcomes(control) == [(QUICK_STOP, True, message)]
-    assert (control.word, control.pending, control.next_timer()) == (STOP, True, 3.0)
+    assert (control.word, control.pending, control.due) == (STOP, True, 3.0)
     assert control.state == 'quick_stop sent'
     control.request(ControlRequest(QUICK_STOP), 1.5)
     assert outcomes(control) == [(QUICK_STOP, True, message)]
@@ -1094,7 +1094,7 @@ def test_withdraw_fails_what_is_under_way(action: ControlAction) -> None:
     control.request(ControlRequest(action), 0.01)
     control.withdraw('drive offline', 1.0)
     assert outcomes(control) == [(action, False, 'drive offline')] * 2
-    assert (control.word, control.pending, control.next_timer()) == (OFF, False, math.inf)
+    assert (control.word, control.pending, control.due) == (OFF, False, math.inf)
     assert control.take_notes() == []
 
 
@@ -1247,7 +1247,7 @@ class AnyConversation(RuleBasedStateMachine):
         self.control.handle_timer(self.now)
         self.collect()
         assert all(deadline > self.now for deadline in self.open.values())
-        assert self.control.next_timer() > self.now
+        assert self.control.due > self.now
 
     @rule()
     def withdraw(self) -> None:
@@ -1289,7 +1289,7 @@ class AnyConversation(RuleBasedStateMachine):
     @invariant()
     def open_tickets_are_watched(self) -> None:
         assert not self.open or self.control.pending
-        assert self.control.pending == (self.control.next_timer() < math.inf)
+        assert self.control.pending == (self.control.due < math.inf)
         assert self.control.state
         assert all(self.control.take_notes())
 

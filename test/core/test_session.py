@@ -179,9 +179,6 @@ class Acting:
         self._name = name
         self._log = log
 
-    def next_timer(self) -> float:
-        return self.due
-
     def handle_timer(self, now: float) -> None:
         self._log.append(self._name)
 

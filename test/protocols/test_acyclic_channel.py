@@ -104,7 +104,7 @@ def test_what_is_held_back_is_begun_as_late_as_possible() -> None:
         begun.append(line.channel.now)
         return [(yield 'word')]
     line.channel.run(asking(), line.results.append, 1.0, Priority.CONTROL)
-    assert line.channel.next_timer() == 2.0
+    assert line.channel.due == 2.0
     assert line.asks('stop', now=1.1, priority=Priority.STOP) == ['stop']
     assert line.answer('', 1.2) == []
     assert begun == []
@@ -117,7 +117,7 @@ def test_a_stop_has_the_exchange_under_way_make_room_which_was_no_attempt() -> N
     assert line.asks('read', now=1.0) == ['read']
     line.asks('stop', now=1.01, priority=Priority.STOP)
     line.channel.make_room(1.01)
-    assert line.channel.next_timer() == pytest.approx(1.01 + STOP_PATIENCE)
+    assert line.channel.due == pytest.approx(1.01 + STOP_PATIENCE)
     assert line.at(1.0601) == ['stop']
     assert line.answer('', 1.07) == ['read'], 'its own late answer is as good'
     assert line.at(1.1701) == ['read'], 'it has its second attempt all the same'
@@ -146,7 +146,7 @@ def test_forgotten_question_is_not_asked_again_before_its_answer_would_have_come
     assert line.asks('A', now=1.06) == []
     assert line.asks('B', now=1.06, priority=Priority.USERS) == ['B'], 'others go on'
     line.answer('', 1.07)
-    assert line.channel.next_timer() == pytest.approx(1.2)
+    assert line.channel.due == pytest.approx(1.2)
     assert line.at(1.2001) == ['A']
 
 
@@ -258,7 +258,7 @@ class TestStopsInQuarantine:
         lose(line, 2)
         line.asks('A', now=1.01, priority=Priority.STOP)
         assert line.answer('first', 1.02) == ['B']
-        assert line.channel.next_timer() == pytest.approx(1.12)
+        assert line.channel.due == pytest.approx(1.12)
         assert line.at(1.1201) == ['A']
         assert line.answer('second', 1.13) == ['A']
         assert line.answer('third', 1.14) == []
@@ -300,7 +300,7 @@ class TestStopsInQuarantine:
         line.answer('', 1.02)
         line.answer('', 1.03)
         assert line.asks('A', now=1.04) == []
-        assert line.channel.next_timer() == pytest.approx(1.22)
+        assert line.channel.due == pytest.approx(1.22)
 
     def test_where_answers_do_not_say_what_they_answer_a_stop_waits(self) -> None:
         line = Line()

@@ -221,12 +221,12 @@ def test_a_drive_that_ran_and_reports_nothing_gets_its_stop_three_times_more(
     ask(control, ControlAction.ENABLE)
     output = AcyclicOutput(control, policy, 0)
     tell(output, control, 10.0)
-    assert output.next_timer() == math.inf, 'that is not repeated'
+    assert output.again_at == math.inf, 'that is not repeated'
     ask(control, ControlAction.DISABLE)
     tell(output, control, 10.0)
     told = []
-    while output.next_timer() < math.inf:
-        now = output.next_timer()
+    while output.again_at < math.inf:
+        now = output.again_at
         assert output.handle_timer(now)
         assert output.word_due(now)
         told.append(round(1000 * (now - 10.0)))
@@ -244,7 +244,7 @@ def test_a_pulse_leaves_as_often_as_it_has_to() -> None:
         assert output.next() == 0
         output.written(0, RESET, now)
         assert output.word_left(now, RESET)
-        due = output.next_timer()
+        due = output.again_at
         assert due == (math.inf if now == 10.04 else pytest.approx(now + 0.02))
         assert not output.handle_timer(now + 0.01)
         assert output.handle_timer(now + 0.021) is (now < 10.04)
@@ -257,9 +257,9 @@ def test_a_word_that_the_bus_refused_is_written_again_soon() -> None:
     output.word_refused(RUN, 10.02)
     assert output.word == OFF, 'that was another one'
     output.word_refused(OFF, 10.02)
-    assert (output.word, output.next_timer()) == (None, 10.02)
+    assert (output.word, output.again_at) == (None, 10.02)
     output.word_begun(OFF)
-    assert output.next_timer() == math.inf
+    assert output.again_at == math.inf
 
 
 def test_a_word_that_left_while_another_one_became_current_does_not_count() -> None:

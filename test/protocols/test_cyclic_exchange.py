@@ -26,9 +26,7 @@ class Silent:
     """A channel with nothing to do, for a family without acyclic frames."""
 
     waiting = 0
-
-    def next_timer(self) -> float:
-        return math.inf
+    due = math.inf
 
     def advance(self, now: float) -> None:
         pass
@@ -194,7 +192,7 @@ def test_nothing_is_left_of_an_exchange_that_was_stopped() -> None:
     talk.exchange.stop_soon(10.03)
     assert talk.session.answers.book.missed_in_row == 1
     talk.exchange.stop()
-    assert talk.exchange.next_timer() == math.inf
+    assert talk.exchange.due == math.inf
     assert talk.exchange.cycles_left == -1
     assert talk.session.answers.book.missed_in_row == 0
     talk.answer(10.04)

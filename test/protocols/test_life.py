@@ -49,16 +49,16 @@ def test_procedures_and_times_come_back() -> None:
 
     runner.start(script(), 10.0)
     assert channel.steps == ['first']
-    assert runner.next_timer() == math.inf
+    assert runner.due == math.inf
     channel.answer('found', 11.0)
-    assert runner.next_timer() == 12
+    assert runner.due == 12
     runner.handle_timer(11.9)
     assert seen == ['found']
     runner.handle_timer(12.5)
     assert channel.steps == ['second']
     channel.answer(None, 13.0)
     assert seen == ['found', 12.5, None]
-    assert runner.next_timer() == math.inf
+    assert runner.due == math.inf
 
 
 def test_another_life_ends_the_one_before() -> None:
@@ -89,7 +89,7 @@ def test_life_that_waits_is_ended_too() -> None:
     runner.start(waiting(), 10.0)
     runner.stop()
     runner.handle_timer(12.0)
-    assert runner.next_timer() == math.inf
+    assert runner.due == math.inf
     assert channel.asked == []
 
 
@@ -105,7 +105,7 @@ def test_script_may_begin_another_life() -> None:
 
     runner.start(first(), 10.0)
     assert channel.asked == []
-    assert runner.next_timer() == 20.0
+    assert runner.due == 20.0
 
 
 def test_channel_that_was_cleared_is_not_waited_for() -> None:

@@ -158,13 +158,14 @@ class Node:
 
     def handle_timer(self, now: float) -> Change:
         """Do what is due."""
-        if now >= self.next_timer():
+        if now >= self.due:
             self.heartbeat_lost = True
             return Change.HEARTBEAT_LOST
         return Change.NONE
 
-    def next_timer(self) -> float:
-        """Return when ``handle_timer`` wants to be called."""
+    @property
+    def due(self) -> float:
+        """When ``handle_timer`` wants to be called; infinity: never."""
         if (self.state is None or self.heartbeat_lost or self.without_content
                 or self.heartbeat_timeout <= 0.0):
             return math.inf

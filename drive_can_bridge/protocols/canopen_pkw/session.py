@@ -437,7 +437,7 @@ class PkwSession(Session):
             self._course.handle_timer(now)
             if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
                 self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
-            if self.control is not None and now >= self.control.next_timer():
+            if self.control is not None and now >= self.control.due:
                 self.control.handle_timer(now)
                 self.control_changed(now)
             self.neutral_stop.handle_timer(now)
@@ -459,13 +459,13 @@ class PkwSession(Session):
         return math.inf if self._exchange.reading else self._exchange.timer.due
 
     def next_timer(self) -> float:
-        soonest = self._channel.next_timer()
+        soonest = self._channel.due
         if self.stage is not Stage.RUNNING:
             return soonest
-        soonest = min(soonest, self._round_due, self._course.next_timer(),
-                      self._node.next_timer(), self.setpoints.expires_at,
-                      self.neutral_stop.next_timer())
-        return soonest if self.control is None else min(soonest, self.control.next_timer())
+        soonest = min(soonest, self._round_due, self._course.due,
+                      self._node.due, self.setpoints.expires_at,
+                      self.neutral_stop.due)
+        return soonest if self.control is None else min(soonest, self.control.due)
 
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:

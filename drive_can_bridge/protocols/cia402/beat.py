@@ -275,8 +275,9 @@ class FreeSync:
     def __init__(self, session: InStep, beat: Beat) -> None:
         self._session, self._beat = session, beat
 
-    def next_timer(self) -> float:
-        """Return when SYNC is due."""
+    @property
+    def due(self) -> float:
+        """When SYNC is due."""
         if self._beat.by_rounds or self._session.stage is Stage.IDLE:
             return math.inf
         return self._beat.due
@@ -296,23 +297,20 @@ class BridgeHeartbeat:
 
     :param node: node-ID of the bridge.
     :param interval: s between two of them.
+    :ivar due: when the next one is.
     """
 
     def __init__(self, node: int, interval: float) -> None:
         self._frame = network.encode_heartbeat(node, network.NmtState.OPERATIONAL)
         self._interval = interval
-        self._due = self._sent_at = self._longest_at = -math.inf
+        self.due = self._sent_at = self._longest_at = -math.inf
         self._longest = 0.0
-
-    def next_timer(self) -> float:
-        """Return when the next one is due."""
-        return self._due
 
     def beat(self, outbox: Outbox, now: float) -> None:
         """Send one, if it is due."""
-        if now >= self._due:
-            self._due = now + self._interval if now > self._due + self._interval else (
-                self._due + self._interval)
+        if now >= self.due:
+            self.due = now + self._interval if now > self.due + self._interval else (
+                self.due + self._interval)
             outbox.put(self._frame)
             gap = now - self._sent_at
             if gap < math.inf and (gap > self._longest or now > self._longest_at + GAP_TIME):

@@ -76,7 +76,7 @@ class Homing:
         self._timeout: float = session.configuration.options.homing_timeout
         self._request: ControlRequest | None = None
         self._step = Step.NONE
-        self._deadline = math.inf
+        self.due = math.inf
         self._standing = rules.standing
         self._latches = [Band(place_of(each.parameter, each.measured))
                          for each in session.setpoints.held]
@@ -111,22 +111,18 @@ class Homing:
         self._request, self._failure = request, NOTHING
         self._session.interlock.hold(True)
         self._rules.homing_bits = 0
-        self._deadline = now + self._timeout
+        self.due = now + self._timeout
         self._go(Step.LOWERING)
-
-    def next_timer(self) -> float:
-        """Return when it has lasted too long."""
-        return self._deadline
 
     def handle_timer(self, now: float) -> None:
         """End what lasts too long."""
-        if now < self._deadline:
+        if now < self.due:
             return
         if self._step is not Step.LATCHING:
             self._now = now
             self._end(sentences.homing_timed_out(self._timeout, self._step.value))
             return
-        self._deadline = math.inf
+        self.due = math.inf
         failure = together((
             self._failure, self._session.setpoints.untold_text or sentences.homing_moves_on()))
         self._machine.drop(failure)     # in its mode it would jump back
@@ -207,7 +203,7 @@ class Homing:
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
         drive, self._failure = self._session.configuration, failure
-        self._deadline = self._now + max(   # it may have to brake first
+        self.due = self._now + max(   # it may have to brake first
             drive.control_timeout + LONG, _LATCHING_PERIODS * drive.period)
         self._rules.homing_bits = 0
         self._stay.clear()
@@ -235,7 +231,7 @@ class Homing:
                 not self._failure or self._standing.stands):
             setpoints.measure(self._stay[0], driven=False)
             self._standing.end()
-            self._deadline = math.inf
+            self.due = math.inf
             self._go(Step.HOLDING)
 
     def _left(self, failure: Sentence) -> None:
@@ -257,7 +253,7 @@ class Homing:
         if self._request is not None:
             self._answer_stopped()
         self._rules.homing_bits = 0
-        self._deadline = math.inf
+        self.due = math.inf
         # a mode that changes now would change how the drive brakes
         if states.state_of(status) not in states.MOVING and self._step is not Step.LEAVING and (
                 self._now >= self._write_at):
@@ -316,6 +312,6 @@ class Homing:
 
     def _finish(self) -> None:
         self._rules.homing_bits = None
-        self._deadline, self._write_at, self.not_back = math.inf, -math.inf, NOTHING
+        self.due, self._write_at, self.not_back = math.inf, -math.inf, NOTHING
         self._go(Step.NONE)
         self._session.interlock.hold(False)

@@ -93,11 +93,12 @@ class Heartbeats:
         if stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
             self._session.heartbeat_lost(now)
 
-    def next_timer(self) -> float:
-        """Return when one is due, or overdue."""
+    @property
+    def due(self) -> float:
+        """When one is due, or overdue."""
         stage = self._session.stage
-        own = math.inf if self._beat is None or stage is Stage.IDLE else self._beat.next_timer()
-        return min(own, self._node.next_timer()) if stage is Stage.RUNNING else own
+        own = math.inf if self._beat is None or stage is Stage.IDLE else self._beat.due
+        return min(own, self._node.due) if stage is Stage.RUNNING else own
 
     def stop(self) -> None:
         """Send none on account of this drive: the stage says it."""
@@ -577,7 +578,7 @@ class Cia402Session(Session):
             self._looking = True
             self._channel.run(self._look_at_mode(), self._looked, now)
         elif control.pending and self._error_code is None and (
-                now > control.next_timer() - 0.5 * self.configuration.control_timeout):
+                now > control.due - 0.5 * self.configuration.control_timeout):
             self._looking = True
             self._channel.run(self._look_at_error(), self._looked, now)
 

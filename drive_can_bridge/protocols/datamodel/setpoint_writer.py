@@ -91,13 +91,14 @@ class ControlByNumber:
 
     def look_soon(self, now: float) -> None:
         """Read the status now, unless that is under way: a word waits for it."""
-        if now < self._watch.next_timer() < math.inf:
+        if now < self._watch.due < math.inf:
             self._look(now)
 
-    def next_timer(self) -> float:
-        """Return when the status is to be looked at, or a word to be written again."""
-        look_at = self._watch.next_timer()
-        return look_at if self._word is None else min(look_at, self._output.next_timer())
+    @property
+    def due(self) -> float:
+        """When the status is to be looked at, or a word to be written again."""
+        look_at = self._watch.due
+        return look_at if self._word is None else min(look_at, self._output.again_at)
 
     def handle_timer(self, now: float) -> None:
         """Do what is due."""
@@ -251,9 +252,10 @@ class SetpointWriter:
             self._session.see_to_control_word(now)
         self.write(now)
 
-    def next_timer(self) -> float:
-        """Return when :meth:`handle_timer` wants to be called; infinity: never."""
-        again_at = math.inf if self._slot is None else self._output.next_timer()
+    @property
+    def due(self) -> float:
+        """When :meth:`handle_timer` wants to be called; infinity: never."""
+        again_at = math.inf if self._slot is None else self._output.again_at
         return min(again_at, self._transactor.free_at) if self._output.waiting else again_at
 
     def _raws(self, *, neutral: bool = False) -> list[int]:

@@ -28,7 +28,7 @@ def test_nothing_is_known_of_a_node_that_has_not_said_anything() -> None:
     assert watched.free_at == 10.0
     assert watched.facts()['nmt_state'] == 'unknown'
     assert watched.refusal(10.0) == ''
-    assert watched.next_timer() == math.inf
+    assert watched.due == math.inf
 
 
 def test_a_node_that_is_started_is_free_a_moment_later() -> None:
@@ -100,9 +100,9 @@ def test_what_was_heard_before_the_beginning_still_counts() -> None:
 
 def test_heartbeat_time_out() -> None:
     watched = node(heartbeat_timeout=0.5)
-    assert watched.next_timer() == math.inf, 'watched from the first one'
+    assert watched.due == math.inf, 'watched from the first one'
     hears(watched, OPERATIONAL, 11.0)
-    assert watched.next_timer() == 11.5
+    assert watched.due == 11.5
     assert watched.handle_timer(11.499) is Change.NONE
     hears(watched, OPERATIONAL, 11.4)
     assert watched.handle_timer(11.5) is Change.NONE
@@ -111,7 +111,7 @@ def test_heartbeat_time_out() -> None:
     assert watched.handle_timer(12.5) is Change.NONE, 'told once'
     assert hears(watched, OPERATIONAL, 13.0) is Change.OPERATIONAL
     assert not watched.heartbeat_lost
-    assert watched.next_timer() == 13.5
+    assert watched.due == 13.5
 
 
 def test_heartbeats_are_watched_after_boot_up_too() -> None:
@@ -123,7 +123,7 @@ def test_heartbeats_are_watched_after_boot_up_too() -> None:
 def test_heartbeats_are_not_watched_by_default() -> None:
     watched = node()
     hears(watched, OPERATIONAL, 11.0)
-    assert watched.next_timer() == math.inf
+    assert watched.due == math.inf
     assert watched.handle_timer(1000.0) is Change.NONE
 
 
@@ -170,5 +170,5 @@ def test_forgetting() -> None:
     watched.receive_emergency(OVERLOAD)
     hears(watched, PRE_OPERATIONAL, 11.0)
     watched.forget()
-    assert (watched.state, watched.emergency, watched.next_timer()) == (None, None, math.inf)
+    assert (watched.state, watched.emergency, watched.due) == (None, None, math.inf)
     assert watched.free_at == math.inf

@@ -126,7 +126,7 @@ def test_write_first_waits_for_its_eeprom() -> None:
     line = Line()
     line.writes((30, True))
     line.transactor.write_first(Write(52, (1,), True), nobody, 1.001)
-    assert line.channel.next_timer() == pytest.approx(1.02)
+    assert line.channel.due == pytest.approx(1.02)
     assert line.at(1.0199) == []
     assert line.at(1.0201) == ['52!']
 
@@ -138,7 +138,7 @@ def test_what_stops_a_drive_waits_for_spacing_only() -> None:
     line.transactor.write_now(Write(52, (0,), False), nobody, 1.01)
     line.transactor.write_now(Write(50, (0,), False), nobody, 1.01)
     assert line.sent() == ['52!']
-    assert line.channel.next_timer() == pytest.approx(1.011)
+    assert line.channel.due == pytest.approx(1.011)
     assert line.at(1.0111) == ['50!']
     assert line.transactor.outstanding is not None
 
@@ -184,7 +184,7 @@ def test_clear_forgets_everything_but_the_eeprom() -> None:
     line.transactor.write_first(Write(52, (1,), False), lambda: None, 1.0)
     assert line.channel.waiting_users == 1
     line.channel.clear()
-    assert line.channel.next_timer() == math.inf
+    assert line.channel.due == math.inf
     assert line.channel.waiting_users == 0
     assert line.at(2.0) == []
     assert line.results == ['done']
@@ -198,7 +198,7 @@ def test_the_pause_of_the_eeprom_begins_when_the_write_has_left() -> None:
     line.channel.run(line.writing(((30, True),)), line.results.append, 1.0)
     assert line.sent(1.009) == ['30!']  # the bus was busy
     assert line.reads(30, now=1.02) == []
-    assert line.channel.next_timer() == pytest.approx(1.029)
+    assert line.channel.due == pytest.approx(1.029)
 
 
 # -- where the exchange itself goes through the channel -------------------------------------------
@@ -247,10 +247,10 @@ def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     line.transactor.write_first(Write(52, (1,), False), nobody, 1.01)
     assert line.sent() == ['52!']
     line.transactor.write_first(Write(52, (0,), False), nobody, 1.0105)
-    assert line.channel.next_timer() == pytest.approx(1.011)
+    assert line.channel.due == pytest.approx(1.011)
     assert line.at(1.011) == ['52!']
     assert line.transactor.outstanding is not None
-    assert line.channel.next_timer() == pytest.approx(1.1)
+    assert line.channel.due == pytest.approx(1.1)
 
 
 def test_a_round_waits_for_one_attempt_and_its_silence_at_most() -> None:
@@ -265,7 +265,7 @@ def test_silence_after_a_read_that_nobody_answered() -> None:
     line = Line(quarantine=0.3, attempts=1)
     line.reads(1, 2)
     assert line.at(1.1) == []
-    assert line.channel.next_timer() == pytest.approx(1.4)
+    assert line.channel.due == pytest.approx(1.4)
     line.channel.disturbed(1.35)
     assert line.at(1.6) == []
     assert line.at(1.6501) == ['2?']
