@@ -7,7 +7,7 @@ import re
 import pytest
 
 from drive_can_bridge.cli import main as front_end
-from drive_can_bridge.core import complaints, sentences
+from drive_can_bridge.core.codes import CODES
 
 ROOT = Path(__file__).resolve().parents[1]
 #: what is not said: what is said for it
@@ -30,7 +30,7 @@ def test_docs(page: Path) -> None:
 
 
 def test_the_catalogue() -> None:
-    wrong = {row.code: found for rows in (sentences.CODES, complaints.CODES)
+    wrong = {row.code: found for rows in CODES.values()
              for row in rows.values() if (found := wrong_in(' '.join((*row.texts, row.do))))}
     assert wrong == {}
 

@@ -16,12 +16,11 @@ from string import Formatter
 from types import ModuleType
 
 from drive_can_bridge.cli.command import complain, FAILED, print_json, say
-from drive_can_bridge.core import complaints, sentences
+from drive_can_bridge.core import sentences
+from drive_can_bridge.core.codes import CODES, MODULES
 from drive_can_bridge.core.messages import Text
 from drive_can_bridge.core.text import counted, printable
 
-#: what the rows of a catalogue are about
-ABOUT: dict[str, ModuleType] = {'drives and buses': sentences, 'files': complaints}
 PAGE = Path('docs', 'messages.md')
 #: codes that are named, and rows that are shown, where none is the one
 _NEAREST = 5
@@ -45,7 +44,7 @@ drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempt
 In `<brackets>` stands what changes; several texts of a code are its forms. `messages.md#not_armed`
 leads to the row of that code.
 
-Made by `python -m drive_can_bridge.cli.explain`, of `core/sentences.py` and `core/complaints.py`.
+Made by `python -m drive_can_bridge.cli.explain`, of the rows that `core/codes.py` names.
 """
 _FILES = """
 # What can be wrong with a parameter file or a profile
@@ -65,7 +64,7 @@ def define(parser: ArgumentParser) -> None:
         'texts (what changes in <brackets>), do.')
     parser.add_argument('code', metavar='CODE', nargs='+', help=(  # type: ignore[attr-defined]
         'such as not_armed, or a text')).completer = (
-        lambda **_: sorted({**sentences.CODES, **complaints.CODES}))
+        lambda **_: _codes())
     parser.add_argument('--json', action='store_true', help='a JSON document a line')
 
 
@@ -85,7 +84,7 @@ def run(args: Namespace) -> int:
         complain(f'and {len(rows) - _NEAREST} more: give more words')
     if not rows:
         near = difflib.get_close_matches(
-            text, sorted({**sentences.CODES, **complaints.CODES}), _NEAREST)
+            text, _codes(), _NEAREST)
         complain(f'drive_can explain: {printable(text)}: no such code' + (
             f', did you mean {" or ".join(near)}?' if near else '; docs/messages.md has them all'))
     return 0 if rows else FAILED
@@ -93,13 +92,17 @@ def run(args: Namespace) -> int:
 
 def rows_of(text: str) -> list[tuple[str, Text]]:
     """Return the rows of a code, of words of a text, or of a line, and what they are about."""
-    return [(about, module.CODES[text]) for about, module in ABOUT.items()
-            if text in module.CODES] or _with_words(text) or _said_in(text)
+    return [(about, rows[text]) for about, rows in CODES.items()
+            if text in rows] or _with_words(text) or _said_in(text)
+
+
+def _codes() -> list[str]:
+    return sorted({code for rows in CODES.values() for code in rows})
 
 
 def _rows() -> Iterator[tuple[str, Text]]:
-    for about, module in ABOUT.items():
-        for row in module.CODES.values():
+    for about, rows in CODES.items():
+        for row in rows.values():
             if row is not sentences.uncoded:
                 yield about, row
 
@@ -137,8 +140,12 @@ def _pieces(text: str) -> Iterator[str]:
 
 def page() -> str:
     """Return the text of the page."""
-    of_drives = sorted(_sections(sentences), key=lambda section: not section[0].startswith('Diag'))
-    of_files = _sections(complaints)
+    of_drives = sorted(
+        [section for about, modules in MODULES.items() if about != 'files'
+         for module in modules for section in _sections(module, '')],
+        key=lambda section: not section[0].startswith('Diag'))
+    of_files = [section for module in MODULES['files']
+                for section in _sections(module, 'files: ')]
     lines = [_HEAD]
     for sections in (of_drives, of_files):
         lines += [f'* [{title}](#{_slug(title)})' for title, _ in sections]
@@ -151,13 +158,13 @@ def page() -> str:
     return re.sub('\n{3,}', '\n\n', '\n'.join(lines)) + '\n'
 
 
-def _sections(module: ModuleType) -> list[tuple[str, list[Text]]]:
+def _sections(module: ModuleType, prefix: str) -> list[tuple[str, list[Text]]]:
     """Return what stands below each heading of a catalogue."""
     sections: list[tuple[str, list[Text]]] = []
     for line in inspect.getsource(module).splitlines():
         heading, row = _HEADING.fullmatch(line), _ROW.match(line)
         if heading:
-            title = heading[1] if module is sentences else f'files: {heading[1]}'
+            title = f'{prefix}{heading[1]}'
             sections.append((title[:1].upper() + title[1:], []))
         elif row and row[1] != sentences.uncoded.code:
             sections[-1][1].append(module.CODES[row[1]])

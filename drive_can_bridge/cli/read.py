@@ -12,7 +12,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.sentences import code_of
+from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.text import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',

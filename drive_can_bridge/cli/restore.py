@@ -17,6 +17,7 @@ from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.text import counted, printable, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
@@ -289,7 +290,7 @@ def _is_volatile(drive: Drive, parameter: Parameter) -> bool:
 def _print_outcome(drive: Drive, name: str, ok: bool, found: Value | None, wanted: Value,
                    reason: str) -> None:
     print_json({'drive': drive.name, 'parameter': name, 'ok': ok, 'found': found,
-                'wanted': wanted, 'reason': reason, 'code': sentences.code_of(reason)})
+                'wanted': wanted, 'reason': reason, 'code': code_of(reason)})
 
 
 def _with_unit(drive: Drive, name: str, value: Value) -> str:

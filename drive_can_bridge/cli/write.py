@@ -12,9 +12,9 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
+from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.core.requests import FailureKind
-from drive_can_bridge.core.sentences import code_of
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have

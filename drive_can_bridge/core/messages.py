@@ -74,6 +74,13 @@ def together(said: Iterable[Sentence]) -> Sentence:
     return Sentence('; '.join(parts), parts[0].code, {'parts': parts})
 
 
+def around(said: str, before: str = '', behind: str = '') -> Sentence:
+    """Put a place before a sentence, or something behind it; it stays what it is to programs."""
+    text = f'{before}{said}{behind}'
+    return (Sentence(text, said.code, said.fields, said.kind) if isinstance(said, Sentence)
+            else Sentence(text))
+
+
 class Text:
     """
     A row of the catalogue; a call with its fields returns the sentence.

@@ -9,8 +9,7 @@ docs/messages.md is made of them.
 from collections.abc import Mapping
 from enum import Enum
 
-from drive_can_bridge.core import messages
-from drive_can_bridge.core.messages import catalogue, Sentence, Text
+from drive_can_bridge.core.messages import catalogue, Text
 
 
 class Absence(Enum):
@@ -1156,10 +1155,3 @@ acknowledged_not_taken = Text(
 
 #: all sentences there are, by their codes
 CODES = catalogue(globals())
-
-
-def code_of(text: str) -> str:
-    """Return the code of a text for people, also where it came through ROS; '': it has none."""
-    if isinstance(text, Sentence) and text.row not in (None, uncoded):
-        return text.code
-    return messages.code_of(text, CODES.values()) if text else ''

@@ -10,6 +10,7 @@ on them that the other process does not know are nobody's business.
 
 from collections.abc import Iterable, Sequence
 
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.locks import Held, holder, HostLock, take
@@ -73,4 +74,4 @@ def _in_words(held: Held, what: str, advice: str) -> InUse:
     if held.who not in ('', BRIDGE):
         process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
         advice = 'wait until it is done, or end it'
-    return InUse(f'{what} is used by {process}; {advice}')
+    return InUse(bus_sentences.in_use(what=what, process=process, advice=advice))

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import bus_sentences, sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
 from drive_can_bridge.core.lateness import Answers, Lateness
@@ -29,7 +29,7 @@ from drive_can_bridge.ros.drive_node import control_state, DriveNode
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.middleware import publisher
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
+from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import ADVICE_DISTURBED, BUS_OFF, BusError
 from drive_can_bridge.transport.failures import with_outlook
 from drive_can_bridge.transport.known_adapters import traits_of
@@ -176,7 +176,7 @@ class BusReporter:
             message = sentences.frames_overflowed(new.overflowed)
         elif new_failures:
             level = DiagnosticStatus.WARN
-            why = REFUSED_FRAMES if new.refused > 0 else link.last_error
+            why = bus_sentences.adapter_refuses_frames() if new.refused > 0 else link.last_error
             message = sentences.frames_not_sent(new_failures, why)
         elif self._load > LOAD_WARNING:
             level = DiagnosticStatus.WARN

@@ -17,6 +17,7 @@ import stat
 import termios
 from typing import NamedTuple
 
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 
@@ -140,8 +141,7 @@ class DeviceLock:
             self._close()
             if getattr(error, 'errno', None) not in (errno.EBUSY, errno.EWOULDBLOCK):
                 return
-            raise BusUnavailable(f'the serial port is used by {holder}; a drive has one master: '
-                                 f'end that first', taken=True) from None
+            raise BusUnavailable(bus_sentences.port_in_use(holder=holder), taken=True) from None
 
     def keep_out(self) -> None:
         """Let nobody open the device any more; a process that has it open keeps it."""

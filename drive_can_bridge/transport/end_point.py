@@ -10,13 +10,6 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
 
-#: what is told of an adapter that does not take what it was handed
-REFUSED_FRAMES = 'the adapter refuses frames'
-#: and of one that hands them back
-ECHOES = ('the adapter hands back what it was handed to send: one frame is dropped for each; look '
-          'for a setting of it that ends this')
-
-
 class Counts(NamedTuple):
     """
     What went wrong on a bus, as far as its adapter tells. Can be added and subtracted.

@@ -24,6 +24,8 @@ Bytes count only when the class that they belong to is set.
 
 from typing import NamedTuple
 
+from drive_can_bridge.core import bus_sentences
+
 TX_TIMEOUT = 0x001
 LOST_ARBITRATION = 0x002
 CONTROLLER = 0x004
@@ -74,10 +76,9 @@ _WIRES = {
 }
 
 #: what to do when nobody acknowledges
-ADVICE_ALONE = ('no other node acknowledges: check that one is switched on, cable, termination '
-                'and bit rate')
-ADVICE_DISTURBED = 'check cable, shield, termination and bit rate'
-ADVICE_OVERFLOW = 'frames were lost: less traffic, or a faster machine'
+ADVICE_ALONE = bus_sentences.nobody_acknowledges()
+ADVICE_DISTURBED = bus_sentences.bus_is_disturbed()
+ADVICE_OVERFLOW = bus_sentences.frames_were_lost()
 
 
 class BusError(NamedTuple):
@@ -123,7 +124,7 @@ def decode_error_frame(classes: int, data: bytes) -> BusError:
         advice = advice or ADVICE_DISTURBED
     if classes & TRANSCEIVER:
         texts.append(_transceiver(details[4]))
-        advice = advice or 'check the wires between transceiver and bus'
+        advice = advice or bus_sentences.look_at_wires()
     if classes & LOST_ARBITRATION:
         texts.append(f'lost arbitration in bit {details[0]}' if details[0] else 'lost arbitration')
     if classes & TX_TIMEOUT:

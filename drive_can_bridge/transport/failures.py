@@ -9,19 +9,21 @@ children, whatever a vendor's library throws.
 import errno
 import struct
 
+from drive_can_bridge.core import bus_sentences
+from drive_can_bridge.core.bus_sentences import BusLoss
+from drive_can_bridge.core.messages import around, Sentence
 from drive_can_bridge.core.text import printable
 
 #: what comes of reading a packet that is torn, or none
 _CONTENT = (TypeError, ValueError, LookupError, struct.error)
-_GONE = 'is gone: unplugged?'
-_NO_SOCKETCAN = ('this kernel has no SocketCAN: "modprobe can_raw" loads it where there is one '
-                 '(some containers and virtual machines have none)')
 
 
 def in_words(error: BaseException) -> str:
-    """Return one readable line for any exception."""
+    """Return one readable line for any exception: its sentence, if it has one."""
+    if error.args and isinstance(error.args[0], Sentence):
+        return error.args[0]
     if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
-        return _NO_SOCKETCAN
+        return bus_sentences.no_socketcan()
     text = printable(' '.join(str(error).split()))
     return text or type(error).__name__
 
@@ -30,19 +32,14 @@ def with_cause(error: BaseException) -> str:
     """Return what an adapter says, with the reason that it may keep to itself."""
     text, cause = in_words(error), error.__cause__
     reason = in_words(cause) if cause is not None else ''
-    return text if reason in text else f'{text}: {reason}'
-
-
-def gone(adapter: str) -> str:
-    """Say that an adapter that was there is not any more."""
-    return f'adapter {adapter} {_GONE}'
+    return text if reason in text else around(text, behind=f': {reason}')
 
 
 def with_outlook(reason: str, period: float) -> str:
     """Add to the reason why a bus is down what becomes of it."""
-    if reason.endswith(_GONE):
-        return f'{reason} Goes on by itself when it is back'
-    return f'{reason}; tried again every {period:g} s'
+    if isinstance(reason, Sentence) and reason.kind is BusLoss.UNPLUGGED:
+        return bus_sentences.down_until_back(reason=reason)
+    return bus_sentences.down_and_tried(reason=reason, period=period)
 
 
 def is_malformed(error: BaseException) -> bool:

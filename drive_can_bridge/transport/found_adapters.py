@@ -15,6 +15,7 @@ import can
 import can.interfaces
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.adapters import detected, quiet
 from drive_can_bridge.transport.kernel_interfaces import kernel_interfaces, KernelInterface
@@ -71,7 +72,7 @@ def _of_kernel(each: KernelInterface) -> Found:
     rate = f'{each.bitrate} bit/s' if each.bitrate else 'no bit rate'
     kinds = {'can': 'a CAN controller', 'vcan': 'virtual, no hardware', 'vxcan': 'a tunnel'}
     parts = [state, *([rate] if each.kind == 'can' else []), kinds.get(each.kind, each.kind)]
-    remarks = [] if each.up else [f'switch it on: {each.how_up}']
+    remarks: list[str] = [] if each.up else [bus_sentences.switch_on(each.how_up)]
     return Found('socketcan', each.name, ', '.join(filter(None, parts)),
                  {'bitrate': each.bitrate} if each.bitrate else {}, 'socketcan', state,
                  each.bitrate, remarks=remarks)
@@ -84,13 +85,13 @@ def _of_port(port: str) -> Found:
     if usb is not None:
         what += f', USB {usb.number}'
         what += f', serial number {usb.serial}' if usb.serial else ''
-    remarks = []
+    remarks: list[str] = []
     if row is None:
-        remarks.append('what is behind this port does not show: an SLCAN adapter is written so')
+        remarks.append(bus_sentences.behind_port_unknown())
     if timer is not None and timer.seconds > _SHORT:
-        remarks.append(f'keeps what it receives for {1e3 * timer.seconds:g} ms: {timer.remedy}')
+        remarks.append(bus_sentences.port_keeps(1e3 * timer.seconds, timer.remedy))
     if os.path.exists(port) and not os.access(port, os.R_OK | os.W_OK):
-        remarks.append('this user may not open it: sudo usermod -aG dialout $USER, log in again')
+        remarks.append(bus_sentences.port_not_allowed())
     return Found('slcan' if row is None else row.interface, port, what,
                  adapter='' if row is None else row.name,
                  latency=None if timer is None else timer.seconds, remarks=remarks)

@@ -17,6 +17,8 @@ from typing import Any
 
 import can
 
+from drive_can_bridge.core import bus_sentences
+from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.serial_writer import Below, SerialWriter
 
 #: s that it may take to connect, with all that the gateway has to say first
@@ -87,7 +89,7 @@ class Gateway(can.BusABC):
             raise
 
     def _connect(self, host: str, port: int, deadline: float) -> socket.socket:
-        reason: OSError = GatewayError(f'{self._where} does not answer')
+        reason: OSError = GatewayError(bus_sentences.gateway_silent(gateway=self._where))
         for family, kind, protocol, _, address in socket.getaddrinfo(
                 host, port, type=socket.SOCK_STREAM):
             opened = socket.socket(family, kind, protocol)
@@ -102,8 +104,9 @@ class Gateway(can.BusABC):
             except OSError as error:
                 opened.close()
                 reason = GatewayError(
-                    f'{self._where} refuses' if error.errno == errno.ECONNREFUSED else
-                    f'{self._where}: {error.strerror}')
+                    bus_sentences.gateway_refuses(gateway=self._where)
+                    if error.errno == errno.ECONNREFUSED else
+                    bus_sentences.gateway_failed(gateway=self._where, why=error.strerror))
         raise reason
 
     def _expect(self, answer: str, channel: str, deadline: float) -> None:
@@ -113,14 +116,18 @@ class Gateway(can.BusABC):
             try:
                 self._text += self._receive()
             except TimeoutError:
-                raise GatewayError(f'{self._where} does not answer') from None
+                raise GatewayError(
+                    bus_sentences.gateway_silent(gateway=self._where)) from None
             if len(self._text) > _MESSAGE_MAX:
-                raise GatewayError(f'{self._where} is no socketcand')
+                raise GatewayError(bus_sentences.gateway_of_other_kind(gateway=self._where))
         message, self._text = self._text.split(b'>', 1)
         words = message.decode('latin-1').strip(' <')
         if words != answer:
-            raise GatewayError(f'{self._where} refuses channel {channel}: {words}'
-                               if answer == 'ok' else f'{self._where} is no socketcand')
+            raise GatewayError(
+                bus_sentences.gateway_refuses_channel(
+                    gateway=self._where, channel=channel, words=printable(words))
+                if answer == 'ok' else
+                bus_sentences.gateway_of_other_kind(gateway=self._where))
 
     def _receive(self) -> bytes:
         try:
@@ -128,7 +135,7 @@ class Gateway(can.BusABC):
         except ConnectionResetError:
             data = b''
         if not data:
-            raise GatewayError(f'{self._where} has closed the connection')
+            raise GatewayError(bus_sentences.gateway_closed(gateway=self._where))
         if self._tune:
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         return data

@@ -12,6 +12,7 @@ import socket
 import struct
 from typing import NamedTuple
 
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.text import printable
 
 #: linux/if_arp.h, linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h
@@ -111,15 +112,14 @@ def why_lost(name: str, index: int) -> str:
     if not index_of(name):
         other = name_of(index) if index else ''
         if other:
-            return (f'interface {name} is called {other} now: write it as channel, or '
-                    f'"ip link set {other} down", "ip link set {other} name {name}"')
+            return bus_sentences.interface_renamed(name=name, other=other)
         if index:
-            return f'interface {name} is gone: unplugged, or deleted'
-        names = ', '.join(each.name for each in kernel_interfaces())
-        return f'there is no interface {name}; CAN interfaces here: {names or "none"}'
+            return bus_sentences.interface_gone(name=name)
+        return bus_sentences.interface_unknown(
+            name=name, names=[each.name for each in kernel_interfaces()])
     found = kernel_interface(name)
     if found is not None and not found.up:
-        return f'interface {name} is down: {found.how_up}'
+        return bus_sentences.interface_down(name=name, how_up=found.how_up)
     return ''
 
 

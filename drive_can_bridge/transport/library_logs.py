@@ -4,6 +4,7 @@
 from collections.abc import Callable
 import logging
 
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.text import printable
 
 #: lines of libraries that are looked at in a second; the others are counted
@@ -47,7 +48,7 @@ class LibraryLogs(logging.Handler):
         if now - self._since >= 1.0:
             left_out, self._count, self._since = self._count - LINES_MAX, 0, now
             if left_out > 0:
-                self._say('left out', f'{left_out} more lines of libraries left out')
+                self._say('left out', bus_sentences.library_lines_left_out(left_out))
         self._count += 1
         if self._count > LINES_MAX:
             return
@@ -78,4 +79,4 @@ class Few:
         if told < self.MOST:
             self._write(line)
         elif told == self.MOST:
-            self._write(f'{line} (more like it are not shown)')
+            self._write(bus_sentences.more_not_shown(line))

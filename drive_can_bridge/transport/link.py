@@ -22,9 +22,11 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame, Route
+from drive_can_bridge.core.messages import around
 from drive_can_bridge.transport.bus_identity import device_of, is_absent
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import ADVICE_ALONE, BUS_OFF, BusError
@@ -39,12 +41,8 @@ BLOCKED_TIMEOUTS = 4
 BLOCKED_AFTER = 0.05
 #: looks, and s between them, at the name of a device that has failed
 _GOING, _MOMENT = 10, 0.01
-#: what is told of an attempt that has not come back
-NOT_GIVEN_BACK = 'the adapter or its library does not come back from opening it'
 #: s after which an attempt to open that has not come back is told
 OPEN_TIMEOUT = 2.0
-#: why nothing is sent through a port that is not known to work
-NOT_READ_YET = 'not read yet'
 
 
 class LinkListener(Protocol):
@@ -241,7 +239,7 @@ class Link:
             self._no_room_since = now
         limit = max(BLOCKED_TIMEOUTS * self._send_timeout, BLOCKED_AFTER)
         if not self._heard or now - self._no_room_since >= limit:
-            self._blocked = f'{self.last_error}; {ADVICE_ALONE}'
+            self._blocked = around(self.last_error, behind=f'; {ADVICE_ALONE}')
 
     @property
     def is_open(self) -> bool:
@@ -304,7 +302,7 @@ class Link:
         opened = False
         while not self._closing:
             try:
-                self._loss = NOT_READ_YET
+                self._loss = bus_sentences.not_read_yet()   # it is not known to work
                 port = self._open_in_time()
                 if port is None or self._ended():
                     return
@@ -360,7 +358,7 @@ class Link:
         if not self._closing:   # asked behind the assignment: stop() rings what is there then
             attempt.ended.wait(self._now() + OPEN_TIMEOUT)
         while not attempt.over and not self._closing:
-            self._report(f'{self.bus.place}: {NOT_GIVEN_BACK}')
+            self._report(around(bus_sentences.not_given_back(), f'{self.bus.place}: '))
             attempt.ended.wait()
         self._port = port = attempt.take(give_up=self._closing)
         return port

@@ -16,18 +16,19 @@ from typing import Any
 import can
 
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core import complaints
+from drive_can_bridge.core import bus_sentences, complaints
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import (
     EXTENDED_IDENTIFIER_MAX, Frame, Route, STANDARD_IDENTIFIER_MAX,
 )
+from drive_can_bridge.core.messages import around, together
 from drive_can_bridge.transport.adapters import check_channel
 from drive_can_bridge.transport.bus_identity import (
     adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES,
 )
 from drive_can_bridge.transport.echo import Echo, Verdict
-from drive_can_bridge.transport.end_point import Counts, ECHOES, EndPoint, REFUSED_FRAMES
+from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
 )
@@ -129,7 +130,7 @@ class Port(EndPoint):
                 self._malformed()
                 return None
             self._lost = True
-            raise BusUnavailable(f'receive: {with_cause(error)}') from error
+            raise BusUnavailable(bus_sentences.receive_failed(with_cause(error))) from error
         if message is None:
             self._earliest = self._now()
             if self._earliest - began < timeout:
@@ -137,7 +138,8 @@ class Port(EndPoint):
             self._limit_line()
             if self._answers is not None and self._answers.takes_nothing(self._earliest):
                 self._lost = True
-                raise BusUnavailable(f'{REFUSED_FRAMES}; {ADVICE_ALONE}')
+                raise BusUnavailable(together(
+                    [bus_sentences.adapter_refuses_frames(), ADVICE_ALONE]))
             return None
         self._early = 0
         now = self._now()
@@ -175,7 +177,7 @@ class Port(EndPoint):
             received = raw.receive(timeout)
         except (OSError, ValueError) as error:      # ValueError: somebody has closed it
             self._lost = True
-            raise BusUnavailable(f'receive: {in_words(error)}') from error
+            raise BusUnavailable(bus_sentences.receive_failed(in_words(error))) from error
         now = self._now()
         if received is None:
             self._earliest = now
@@ -201,7 +203,7 @@ class Port(EndPoint):
         if echo.verdict is not Verdict.ECHOES:      # perhaps: nobody's
             self.rejected_frames += 1
         elif before is not echo.verdict and self.tell is not None:
-            self.tell(ECHOES)
+            self.tell(bus_sentences.adapter_echoes())
         return False
 
     def _age_of(self, stamp: float, now: float) -> float:
@@ -231,8 +233,7 @@ class Port(EndPoint):
         if now - self._early_since <= (
                 _EARLY_TIME if self._below is None else _EARLY_SILENCE):
             self._lost = True
-            raise BusUnavailable('receive: the adapter has nothing, and does not wait: its other '
-                                 'end has closed')
+            raise BusUnavailable(bus_sentences.other_end_closed())
         self._early = 0
 
     def await_answers(self, bitrate: int) -> None:
@@ -271,7 +272,7 @@ class Port(EndPoint):
     def _send(self, message: can.Message, timeout: float) -> None:
         try:
             if self._socket is not None and not self._socket.has_room(timeout):
-                raise TransportError('send: transmit queue full')
+                raise TransportError(bus_sentences.queue_full())
             if self._writer is None:
                 self._bus.send(message, timeout)
             else:
@@ -283,12 +284,12 @@ class Port(EndPoint):
         except TransportError:
             raise
         except can.CanTimeoutError as error:
-            raise TransportError(f'send: {in_words(error)}') from error
+            raise TransportError(bus_sentences.send_failed(in_words(error))) from error
         except Exception as error:  # whatever an adapter throws: the bus is lost
             if is_full_queue(error):
-                raise TransportError('send: transmit queue full') from error
+                raise TransportError(bus_sentences.queue_full()) from error
             self._lost = True
-            raise BusUnavailable(f'send: {with_cause(error)}') from error
+            raise BusUnavailable(bus_sentences.send_failed(with_cause(error))) from error
 
     def _send_directly(self, raw: RawSocket, frame: Frame, timeout: float) -> None:
         try:
@@ -296,10 +297,10 @@ class Port(EndPoint):
         except (OSError, ValueError) as error:
             if not is_full_queue(error):
                 self._lost = True
-                raise BusUnavailable(f'send: {in_words(error)}') from error
+                raise BusUnavailable(bus_sentences.send_failed(in_words(error))) from error
             sent = False
         if not sent:
-            raise TransportError('send: transmit queue full')
+            raise TransportError(bus_sentences.queue_full())
 
     def shorten_queue(self, frames: int) -> None:
         """Let about so many frames wait in the kernel at most, where that can be set."""
@@ -347,8 +348,7 @@ class Port(EndPoint):
         self._malformed_in_row += 1
         if self._malformed_in_row >= _MALFORMED_MAX:
             self._lost = True
-            raise BusUnavailable(f'receive: {_MALFORMED_MAX} malformed frames in a row, check the '
-                                 f'settings of the adapter')
+            raise BusUnavailable(bus_sentences.malformed_in_row(count=_MALFORMED_MAX))
         self._forget_line()
 
     def _limit_line(self) -> None:
@@ -379,7 +379,7 @@ class Port(EndPoint):
             self.controller = error.state
         if error.state == BUS_OFF:
             self.bus_off_count += 1
-            raise BusUnavailable(f'{error.text}; {error.advice}')
+            raise BusUnavailable(around(error.advice, f'{error.text}; '))
 
 
 def open_port(bus: BusConfiguration, clock: Clock, routes: Sequence[Route] = (), *,
@@ -397,12 +397,12 @@ def open_port(bus: BusConfiguration, clock: Clock, routes: Sequence[Route] = (),
     where = bus.place
     reason = check_channel(bus.interface, bus.channel)
     if reason is not None:
-        raise BusMisconfigured(f'{where}: {reason}')
+        raise BusMisconfigured(around(reason, f'{where}: '))
     device = device_of(bus)
     try:
         lock = None if device is None else DeviceLock(device)
     except BusUnavailable as error:
-        raise BusUnavailable(f'{where}: {error}', taken=error.taken) from None
+        raise BusUnavailable(around(in_words(error), f'{where}: '), taken=error.taken) from None
     try:
         port = _open(bus, clock, routes, lock, where)
     except BaseException:
@@ -444,13 +444,13 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         reason = in_words(error)
         if is_undefined(error):
             reason = complaints.driver_missing(interface=bus.interface, why=reason)
-        text = f'{where}: {reason}'
+        text: str = around(reason, f'{where}: ')
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error
         if bus.interface == 'socketcan':
             text = why_lost(str(bus.channel), 0) or text
         elif is_absence(error) and is_absent(bus):
-            text = f'adapter {adapter_of(bus)} is not there: check its plug and its name'
+            text = bus_sentences.adapter_not_there(adapter=adapter_of(bus))
         raise BusUnavailable(text) from error
     try:
         # SocketCAN opens an interface that is down; the first look tells
@@ -461,7 +461,7 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
     except BusUnavailable as error:
         port.close()
         why = why_lost(str(bus.channel), 0) if bus.interface == 'socketcan' else ''
-        raise BusUnavailable(why or f'{where}: {in_words(error)}') from error
+        raise BusUnavailable(why or around(in_words(error), f'{where}: ')) from error
     return port
 
 
@@ -484,9 +484,8 @@ def _check_carrier(channel: str) -> None:
     except (OSError, ValueError):
         return  # not known: the interface is down, or has another name in this place
     if carrier.strip() == '0':
-        raise BusUnavailable(
-            f'bus-off; {ADVICE_DISTURBED}; "ip link set {channel} down" and "up" start the '
-            f'controller again, "type can restart-ms 100" lets it do so by itself')
+        raise BusUnavailable(bus_sentences.controller_bus_off(
+            advice=ADVICE_DISTURBED, channel=channel))
 
 
 def _abandon(error: BaseException) -> None:

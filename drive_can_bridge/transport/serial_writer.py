@@ -21,6 +21,9 @@ import select
 import socket
 from typing import Any
 
+from drive_can_bridge.core import bus_sentences
+from drive_can_bridge.core.messages import NOTHING, Sentence
+
 #: what ends a line or packet that was begun and never finished, whatever is lacking, so that
 #: nothing comes of it. On an adapter in which nothing was begun it is a question, or noise.
 #: On USBtin and LAWICEL a *whole* line that lacks only its end goes out all the same: they do not
@@ -83,7 +86,7 @@ class AdapterAnswers:
         """How many commands of the opening were answered; some adapters answer none."""
         return len(self._said)
 
-    def refusal(self, bitrate: int) -> str:
+    def refusal(self, bitrate: int) -> Sentence:
         """
         End the opening: say what was refused; '': nothing that is known.
 
@@ -91,14 +94,15 @@ class AdapterAnswers:
         """
         commands, self._commands = self._commands or [], None
         if len(self._said) < len(commands):
-            return ''
+            return NOTHING
         # what came first may be about something before
         said = list(zip(commands, self._said[-len(commands):]))
         if any(refused and command[0] in 'Ss' and before == 'C'
                for (command, refused), (before, _) in zip(said[1:], said)):
-            return f'the adapter refuses bit rate {bitrate}'
+            return bus_sentences.adapter_refuses_bitrate(bitrate=bitrate)
         openings = [refused for command, refused in said if command in 'OL']
-        return 'the adapter does not open' if openings and all(openings) else ''
+        return (bus_sentences.adapter_not_opening() if openings and all(openings)
+                else NOTHING)
 
     def sent(self) -> None:
         """Record a frame that was written."""
@@ -161,7 +165,7 @@ class SerialWriter:
         while rest:
             left = max(deadline - self._now(), 0.0)
             if not select.select([], [self._descriptor], [], left)[1]:
-                raise TimeoutError('the adapter takes no more data')
+                raise TimeoutError(bus_sentences.adapter_takes_no_data())
             try:
                 rest = rest[os.write(self._descriptor, rest):]
             except BlockingIOError:
@@ -176,7 +180,7 @@ class SerialWriter:
         # asked for each time: when the port is closed, the next thing opened gets the number
         descriptor: int | None = self._port.fd
         if descriptor is None:
-            raise OSError(errno.EBADF, 'the port was closed')
+            raise OSError(errno.EBADF, bus_sentences.port_was_closed())
         return descriptor
 
 

@@ -12,6 +12,7 @@ from functools import partial
 import can
 
 from drive_can_bridge.clock import Clock, Mailbox
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable
 from drive_can_bridge.core.frame import Record, RecordKind
@@ -114,7 +115,7 @@ class Tap:
             try:
                 if self._port is None:
                     self._port = self._open()
-                    self._complain(f'bus {self.bus.name}: open again')
+                    self._complain(bus_sentences.bus_open_again(bus=self.bus.name))
                 while not self._closing:
                     self._listen(self._port)
             except BusMisconfigured as error:   # the adapter is another one now

@@ -1,9 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """What has become of the adapter of a bus that was lost, in words."""
 
+from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.transport.bus_identity import adapter_of
-from drive_can_bridge.transport.failures import gone, in_words
+from drive_can_bridge.transport.failures import in_words
 from drive_can_bridge.transport.kernel_interfaces import index_of, why_lost
 
 
@@ -32,4 +33,6 @@ class Whereabouts:
         """
         if self._bus.interface == 'socketcan':
             return why_lost(str(self._bus.channel), self._number) or in_words(error)
-        return gone(adapter_of(self._bus)) if absent else in_words(error)
+        if absent:
+            return bus_sentences.adapter_gone(adapter=adapter_of(self._bus))
+        return in_words(error)

@@ -10,6 +10,7 @@ import pytest
 from drive_can_bridge.cli import explain
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.core import complaints, sentences
+from drive_can_bridge.core.codes import CODES
 
 
 def test_the_page_is_current() -> None:
@@ -20,11 +21,11 @@ def test_the_page_is_current() -> None:
 
 def test_the_page_has_every_code() -> None:
     text = explain.page()
-    missing = [code for prefix, module in (('', sentences), ('file-', complaints))
-               for code in module.CODES if f'<a id="{prefix}{code}"></a>`{code}` |' not in text]
+    missing = [code for about, rows in CODES.items() for code in rows
+               if f'<a id="{"file-" * (about == "files")}{code}"></a>`{code}` |' not in text]
     assert missing == ['uncoded'], 'which stands for the text of something else'
     anchors = re.findall('<a id="(.*?)">', text)
-    assert len(anchors) == len(set(anchors)) == len(sentences.CODES) + len(complaints.CODES) - 1
+    assert len(anchors) == len(set(anchors)) == sum(map(len, CODES.values())) - 1
 
 
 def test_the_contents_lead_to_headings() -> None:
@@ -80,10 +81,10 @@ def test_words_of_a_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert shown.out.count('what to do') == 5 and 'more: give more words' in shown.err
 
 
-@pytest.mark.parametrize('about', list(explain.ABOUT))
+@pytest.mark.parametrize('about', list(CODES))
 def test_each_text_leads_to_its_row(about: str) -> None:
     """Whatever stands for what changes, and before it."""
-    for row in explain.ABOUT[about].CODES.values():
+    for row in CODES[about].values():
         changing = re.compile(f'<({"|".join(row.fields)})>')
         for form in explain.forms(row):
             if sum(map(str.isalpha, changing.sub('', form))) >= 6:

@@ -17,12 +17,13 @@ import pytest
 from saying import says
 
 from drive_can_bridge.core import complaints, sentences
-from drive_can_bridge.core.messages import NOTHING, Sentence, Text, together
+from drive_can_bridge.core.codes import code_of, MODULES
+from drive_can_bridge.core.messages import around, NOTHING, Sentence, Text, together
 from drive_can_bridge.core.sentences import Absence
 
 TESTS = Path(__file__).parents[1]
 PRODUCT = TESTS.parent / 'drive_can_bridge'
-CATALOGUES = {each.__name__: each.CODES for each in (complaints, sentences)}
+CATALOGUES = {each.__name__: each.CODES for modules in MODULES.values() for each in modules}
 
 #: modules of stories about configurations; elsewhere ``says`` is mostly a sentence of a drive
 STORIES = [*(TESTS / 'configuration').glob('test_*.py'),
@@ -94,7 +95,14 @@ def test_several_things_in_one_line() -> None:
     assert together([second, NOTHING]) is second and together([]) is NOTHING
 
 
-@pytest.mark.parametrize('module', [complaints, sentences])
+def test_what_stands_around_a_sentence_changes_its_text_only() -> None:
+    said = around(sentences.no_answer(0.1, 3), 'lift: ', '; look')
+    assert said == 'lift: no answer in 0.1 s, 3 attempts; look'
+    assert said == says('no_answer', attempts=3) and code_of(said) == 'no_answer'
+    assert around('mere text', 'lift: ').code == ''
+
+
+@pytest.mark.parametrize('module', [each for modules in MODULES.values() for each in modules])
 def test_every_row_has_words_and_advice_and_stands_once(module: ModuleType) -> None:
     for code, row in module.CODES.items():
         assert row.do and all(row.texts), code
@@ -104,6 +112,12 @@ def test_every_row_has_words_and_advice_and_stands_once(module: ModuleType) -> N
     assert len(names) == len(set(names))
 
 
+def test_a_code_stands_in_one_module() -> None:
+    for modules in MODULES.values():
+        codes = [code for module in modules for code in module.CODES]
+        assert len(codes) == len(set(codes))
+
+
 @cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding='utf-8'))
@@ -111,8 +125,7 @@ def parsed(path: Path) -> ast.Module:
 
 def rows_named_in(tree: ast.Module, module: str) -> Iterator[tuple[ast.expr, str, Text | None]]:
     """Return what names a row of the catalogue: the expression, the code, the row."""
-    own: dict[str, str] = {'sentences': 'drive_can_bridge.core.sentences',
-                           'complaints': 'drive_can_bridge.core.complaints'}
+    own = {name.rpartition('.')[2]: name for name in CATALOGUES}
     names = {code: (code, row) for code, row in CATALOGUES.get(module, {}).items()}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module in CATALOGUES:
@@ -200,7 +213,6 @@ OTHER_TEXTS = {
     'panel/drive_page.py': 'a refusal without its remedy',
     'protocols/canopen_pkw/observer.py': 'a frame',
     'protocols/canopen_pkw/pkw.py': 'a frame',
-    'transport/failures.py': 'what becomes of a bus, added to why it is down',
 }
 
 
@@ -251,7 +263,7 @@ def test_which_looks_are_found(line: str) -> None:
     ('interrupted', ''),        # of two commands
     (sentences.interrupted(), 'interrupted'), (sentences.uncoded('bus down'), 'bus_down')])
 def test_the_code_of_a_text_that_came_through_ros(text: str, code: str) -> None:
-    assert sentences.code_of(text) == code
+    assert code_of(text) == code
 
 
 def test_a_kind_is_that_of_the_form_and_a_sentence_gets_further_fields() -> None:

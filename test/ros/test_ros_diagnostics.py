@@ -19,7 +19,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.ros import diagnostics
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
 from drive_can_bridge.transport import link
-from drive_can_bridge.transport.end_point import Counts, REFUSED_FRAMES
+from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.failures import with_outlook
 
 BUS, DRIVE = 'drive_can_bridge: bus main', 'drive_can_bridge: drive conveyor'
@@ -155,7 +155,8 @@ def test_frames_that_the_adapter_refused_afterwards_were_not_sent(
     link.frames_sent, link.send_failures = 1000, 1
     report = bus.report(clock().now())
     assert (report.level, report.message) == (
-        DiagnosticStatus.WARN, says('frames_not_sent', frames=4, why=REFUSED_FRAMES))
+        DiagnosticStatus.WARN,
+        says('frames_not_sent', frames=4, why=says('adapter_refuses_frames')))
     assert report.facts['send_failures'] == '4'
     assert 997 <= int(report.facts['frames_sent']) < 1100
     assert bus.report(clock().now()).level == DiagnosticStatus.OK

@@ -19,12 +19,12 @@ import can
 from clocks import REAL
 from literal_adapters import Attached, Socketcand
 import pytest
+from saying import says
 from test_gateway import received
 
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusUnavailable
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.transport.end_point import ECHOES
 from drive_can_bridge.transport.port import open_port, Port
 
 pytestmark = pytest.mark.usefixtures('threads')
@@ -213,7 +213,7 @@ def test_an_echo_is_told_once_and_dropped(name: str, peer: Callable[..., Peer]) 
             assert port.receive(0.005) is None or not known
         if known and number >= 60:
             break
-    assert told == [ECHOES]
+    assert told == [says('adapter_echoes')]
     there.say(LINES[name].whole)
     assert received(port) == FRAME
     port.close()
@@ -233,5 +233,5 @@ def test_an_echo_of_a_gateway(peer: Callable[..., Peer]) -> None:
             assert port.receive(0.005) is None or not known
         if known and number >= 60:
             break
-    assert told == [ECHOES]
+    assert told == [says('adapter_echoes')]
     port.close()

@@ -6,10 +6,10 @@ from collections import deque
 import can
 from clocks import HandClock
 import pytest
+from saying import says
 
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.transport.end_point import ECHOES
 from drive_can_bridge.transport.port import Port
 
 ANSWER = Frame(0x103FFFF0, bytes(8), True)
@@ -78,7 +78,7 @@ def test_an_adapter_that_echoes() -> None:
     bench = Bench()
     for number in range(20):
         assert bench.cycle(number, sent(number), ANSWER) == [ANSWER]
-        assert bench.told == ([ECHOES] if number == 19 else [])
+        assert bench.told == ([says('adapter_echoes')] if number == 19 else [])
     rejected = bench.port.rejected_frames
     # one is dropped for each, and no more
     assert bench.cycle(20, sent(20), ANSWER, sent(20)) == [ANSWER, sent(20)]
@@ -87,7 +87,7 @@ def test_an_adapter_that_echoes() -> None:
     assert bench.cycle(32, after=0.019) == []
     assert bench.hear(sent(32), sent(32)) == [sent(32)]
     assert bench.hear(sent(30)) == [sent(30)]
-    assert bench.told == [ECHOES]
+    assert bench.told == [says('adapter_echoes')]
     assert bench.port.rejected_frames == rejected
 
 
@@ -136,7 +136,7 @@ def test_a_frame_that_was_refused_has_no_echo() -> None:
     bench = Bench()
     for number in range(0, 40, 2):
         bench.cycle(number, sent(number))
-    assert bench.told == [ECHOES]
+    assert bench.told == [says('adapter_echoes')]
     bench.wire.refuses = True
     with pytest.raises(TransportError, match='no room'):
         bench.port.send(sent(99), 0.01)

@@ -6,9 +6,8 @@ import errno
 import can
 import pytest
 
-from drive_can_bridge.transport.failures import (
-    gone, in_words, is_misconfiguration, with_outlook,
-)
+from drive_can_bridge.core.bus_sentences import adapter_gone
+from drive_can_bridge.transport.failures import in_words, is_misconfiguration, with_outlook
 
 
 def wrapped(cause: Exception) -> Exception:
@@ -35,7 +34,7 @@ def test_what_will_never_work_and_what_may_later(error: Exception, *, never: boo
 
 
 @pytest.mark.parametrize(('reason', 'period', 'told'), [
-    (gone('/dev/ttyACM0'), 1.0,
+    (adapter_gone('/dev/ttyACM0'), 1.0,
      'adapter /dev/ttyACM0 is gone: unplugged? Goes on by itself when it is back'),
     ('no such device', 0.5, 'no such device; tried again every 0.5 s')])
 def test_what_becomes_of_a_bus_that_is_down(reason: str, period: float, told: str) -> None:

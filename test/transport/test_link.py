@@ -11,13 +11,14 @@ import pytest
 from waiting import pause, wait_for
 from world import World
 
+from drive_can_bridge.core import bus_sentences
+from drive_can_bridge.core.bus_sentences import adapter_gone
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport import link as link_module
 from drive_can_bridge.transport.end_point import Counts
 from drive_can_bridge.transport.error_frames import BusError
-from drive_can_bridge.transport.failures import gone
 from drive_can_bridge.transport.link import Link, RECEIVE_TIMEOUT
 from drive_can_bridge.transport.port import open_port
 
@@ -356,7 +357,7 @@ def test_attempt_that_a_library_does_not_give_back(
     monkeypatch.setattr(bench.link, '_open', slowly)
     bench.port.coming.append(BusUnavailable('gone'))
     wait_for(lambda: len(bench.listener.told) == 3)
-    assert bench.listener.told[2] == f'lost: {BUS.place}: {link_module.NOT_GIVEN_BACK}'
+    assert bench.listener.told[2] == f'lost: {BUS.place}: {bus_sentences.not_given_back()}'
     assert bench.clock.now() - tried[0] == pytest.approx(2.0, abs=0.05)
     assert bench.link.wait_first_attempt(0.0)
     pause(50.0)
@@ -558,7 +559,7 @@ def test_reconnections_leave_no_descriptors(bench: World, monkeypatch: pytest.Mo
     link.stop()
     assert after <= before + 1
     assert listener.told == [f'lost: {link.last_error}']
-    assert gone(bus.channel) not in link.last_error     # it never was there
+    assert adapter_gone(bus.channel) not in link.last_error     # it never was there
 
 
 def test_an_adapter_that_is_unplugged_is_told_once(make: Callable[..., Bench],
@@ -572,7 +573,7 @@ def test_an_adapter_that_is_unplugged_is_told_once(make: Callable[..., Bench],
         'receive: device reports readiness to read but returned no data'))
     wait_for(lambda: len(bench.ports) == 2)
     wait_for(lambda: len(bench.listener.told) == 3)
-    assert bench.listener.told == ['opened', f'lost: {gone(str(device))}', 'opened']
+    assert bench.listener.told == ['opened', f'lost: {adapter_gone(str(device))}', 'opened']
     # one that fails while it is there is another matter
     device.touch()
     bench.ports[1].coming.append(BusUnavailable('overheated'))
