@@ -8,7 +8,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import Event, ProcessDataReceived, RequestCompleted
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, Value
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage, Value
 from drive_can_bridge.core.profile import ControlTable, Profile, StatusPattern
 from drive_can_bridge.core.requests import (
     Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
@@ -17,7 +17,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
 
-RO, RW, WO = Access.READ_ONLY, Access.READ_WRITE, Access.WRITE_ONLY
+RO, RW, WO = AccessMode.READ_ONLY, AccessMode.READ_WRITE, AccessMode.WRITE_ONLY
 RAM, EEPROM = Storage.RAM, Storage.EEPROM
 BOOL, INT16, UINT16 = ParameterType.BOOL, ParameterType.INT16, ParameterType.UINT16
 INT32 = ParameterType.INT32

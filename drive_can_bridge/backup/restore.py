@@ -74,7 +74,7 @@ _FEW = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SettingChange:
     """
     A setting that is not as in the file, or a mode that the drive was left in.
 
@@ -136,8 +136,8 @@ class RestorePlan:
     :param absent: settings that it says it does not have.
     """
 
-    changes: tuple[Change, ...]
-    kept: tuple[Change, ...]
+    changes: tuple[SettingChange, ...]
+    kept: tuple[SettingChange, ...]
     same: tuple[str, ...]
     words: Mapping[str, int]
     wanted: Mapping[str, Value]
@@ -210,8 +210,8 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
     :param outcomes: of :func:`names_to_read`.
     """
     bits = mode_bits(drive.facts.restore)
-    changes: list[Change] = []
-    kept: list[Change] = []
+    changes: list[SettingChange] = []
+    kept: list[SettingChange] = []
     same, unread, absent = [], [], []
     words: dict[str, int] = {}
     there: dict[str, int] = {}
@@ -234,8 +234,8 @@ def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcom
             in_file = parameter.word_from_raw(raw_in_file(parameter, value))
             left_alone = why_left_alone(drive, name, include_protected=include_protected)
         word = bits.get(name, _NO_MODE).to_write(found, in_file if left_alone is None else found)
-        change = Change(name, parameter, value, word,   # type: ignore[arg-type]
-                        outcome.value, left_alone, not_all=in_file != word)
+        change = SettingChange(name, parameter, value, word,   # type: ignore[arg-type]
+                               outcome.value, left_alone, not_all=in_file != word)
         if left_alone is None and (name in settings or word != found):
             words[name], wanted[name] = word, change.value
         if word != found:
@@ -445,7 +445,7 @@ class Restorer:
         return self._attempted and not (self._stopped or self._result.enabled)
 
     def _rounds(self) -> None:
-        pending: Sequence[Change] = self._pending
+        pending: Sequence[SettingChange] = self._pending
         while pending:
             self._write_all(pending)
             if self._lost or self._stopped or self._result.enabled:
@@ -460,7 +460,7 @@ class Restorer:
                     self._result.written.remove(change.name)
         self._attempted = True
 
-    def _write_all(self, changes: Sequence[Change]) -> None:
+    def _write_all(self, changes: Sequence[SettingChange]) -> None:
         for change in changes:
             if self._may_not_write():
                 return
@@ -497,7 +497,7 @@ class Restorer:
         if name not in self._result.written:
             self._result.written.append(name)
 
-    def _differing(self, changes: Sequence[Change]) -> list[Change]:
+    def _differing(self, changes: Sequence[SettingChange]) -> list[SettingChange]:
         outcomes = self._drive.read(*(change.name for change in changes))
         return [change for change in changes
                 if not _is(outcomes[change.name], self._plan.words[change.name])]

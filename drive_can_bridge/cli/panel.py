@@ -62,7 +62,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     if ended():     # what follows takes seconds, too
         return False
     try:
-        from drive_can_bridge.panel.access import Access, is_loopback, Role
+        from drive_can_bridge.panel.access import is_loopback, PanelAccess, Role
         from drive_can_bridge.panel.feed import Feed
         from drive_can_bridge.panel.pages import application, Setting
         from drive_can_bridge.panel.server import address, listen, serve
@@ -72,7 +72,7 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     if ended():
         return False
     listener = listen(args.host, args.port)
-    access = Access(host=args.host, port=listener.getsockname()[1])
+    access = PanelAccess(host=args.host, port=listener.getsockname()[1])
     model = Model(args.namespace)
     source = MonitorClient(model, budget=BUDGET)
     place = environment.in_words()

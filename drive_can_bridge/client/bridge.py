@@ -13,7 +13,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
+    AccessMode, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.requests import kind_of
 from drive_can_bridge.core.roles import Role
@@ -34,7 +34,7 @@ def parameter_of(message: Described, *, listed: bool = True) -> Parameter | None
             type=WireType(facts['type']) if 'type' in facts else WireType.UINT32,
             number=_number(facts, 'number'), scale=float(facts.get('scale', 1.0)),
             offset=float(facts.get('offset', 0.0)), unit=facts.get('unit', ''),
-            access=Access(facts['access']),
+            access=AccessMode(facts['access']),
             storage=Storage(facts['storage']) if 'storage' in facts else None,
             minimum=minimum, maximum=maximum,
             subindex=_number(facts, 'subindex'), index=_number(facts, 'index'),

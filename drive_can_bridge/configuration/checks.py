@@ -24,7 +24,7 @@ from drive_can_bridge.core.configuration import (
     JointConfiguration, Quantity, si_factor)
 from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.parameters import Access, Parameter, Storage, ValueKind
+from drive_can_bridge.core.parameters import AccessMode, Parameter, Storage, ValueKind
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.text import duration_text, nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
@@ -703,8 +703,8 @@ def _direction_problem(key: str, parameter: Parameter) -> Sentence:
     name = parameter.name
     if key == 'cyclic_response':
         return complaints.write_only(
-            name=name) if parameter.access is Access.WRITE_ONLY else NOTHING
-    if parameter.access is Access.READ_ONLY:
+            name=name) if parameter.access is AccessMode.WRITE_ONLY else NOTHING
+    if parameter.access is AccessMode.READ_ONLY:
         return complaints.read_only(name=name)
     if parameter.storage is Storage.EEPROM:
         return complaints.kept_in_eeprom(name=name)

@@ -19,7 +19,7 @@ from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.parameters import (
-    Access, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind)
+    AccessMode, Parameter, ParameterType, STEP_TOLERANCE, Storage, Value, ValueKind)
 from drive_can_bridge.core.profile import (
     ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern)
 from drive_can_bridge.core.text import show
@@ -33,7 +33,7 @@ RESERVED = frozenset((
 ))
 #: what the values of a parameter's keys become
 _MADE: dict[str, Callable[[Any], Any]] = {
-    'type': ParameterType, 'access': Access, 'storage': Storage,
+    'type': ParameterType, 'access': AccessMode, 'storage': Storage,
     'bits': lambda bits: tuple(bits.items()), 'values': lambda given: (),
     **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum', 'arming_tolerance'), float)}
 #: what reads as the name of a parameter that stands in no profile

@@ -71,7 +71,7 @@ class Operation:
     held: bool = False
 
 
-class Answers:
+class ControlAnswers:
     """The outcomes of requests until somebody takes them."""
 
     def __init__(self) -> None:
@@ -142,7 +142,7 @@ class ControlMachine:
         self._seen_enabled: set[str] = set()    # who reported it, knowing that word
         self._disregard = Disregard(timeout)
         self._operation: Operation | None = None
-        self._answers = Answers()
+        self._answers = ControlAnswers()
         self.take_completed = self._answers.take
         self._notes: list[Sentence] = []
 

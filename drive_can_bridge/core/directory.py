@@ -12,11 +12,12 @@ from dataclasses import replace
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage, ValueKind
+from drive_can_bridge.core.parameters import (
+    AccessMode, Parameter, ParameterType, Storage, ValueKind)
 from drive_can_bridge.core.text import nearest, printable
 
 # Strictest first: where several listed parameters have one address, a raw name obeys them all.
-_ACCESS = (Access.READ_ONLY, Access.WRITE_ONLY, Access.READ_WRITE)
+_ACCESS = (AccessMode.READ_ONLY, AccessMode.WRITE_ONLY, AccessMode.READ_WRITE)
 _STORAGE = (Storage.EEPROM, None, Storage.RAM)
 #: bits of an integer that are looked at; no type has as many
 _BITS_MAX = 64

@@ -14,7 +14,7 @@ _SPREAD, _SHARE = 0.002, 0.25
 _ANSWERING = 0.005
 
 
-class Answers(NamedTuple):
+class AnswerTiming(NamedTuple):
     """
     How the answers of a drive come.
 
@@ -39,7 +39,7 @@ class Lateness:
         self.shared = False
         self._before: dict[str, int] = {}
 
-    def look(self, drives: Mapping[str, Answers]) -> None:
+    def look(self, drives: Mapping[str, AnswerTiming]) -> None:
         """Take the answers of all drives of the bus as they are now."""
         here = {name: each for name, each in drives.items() if each.online}
         late = [each.period + each.late_by for name, each in here.items()
@@ -48,7 +48,7 @@ class Lateness:
         self.shared = (len(late) == len(here) > 1
                        and max(late) - min(late) <= max(_SPREAD, _SHARE * max(late)))
 
-    def told(self, bus: str, answers: Answers, traits: AdapterTraits | None) -> Sentence:
+    def told(self, bus: str, answers: AnswerTiming, traits: AdapterTraits | None) -> Sentence:
         """Say of an answer that was late what makes it so."""
         if traits is not None and traits.latency > 0.001 and (
                 answers.period + answers.late_by <= traits.latency + _ANSWERING):

@@ -90,7 +90,7 @@ _KIND_WORDS = {ValueKind.DOUBLE: 'a number', ValueKind.INTEGER: 'an integer',
                ValueKind.BOOL: 'true or false'}
 
 
-class Access(Enum):
+class AccessMode(Enum):
     """What a user may do with a parameter."""
 
     READ_ONLY = 'ro'
@@ -141,7 +141,7 @@ class Parameter:
     scale: float = 1.0
     offset: float = 0.0
     unit: str = ''
-    access: Access = Access.READ_WRITE
+    access: AccessMode = AccessMode.READ_WRITE
     storage: Storage | None = None
     minimum: float | None = None
     maximum: float | None = None
@@ -173,12 +173,12 @@ class Parameter:
     @property
     def readable(self) -> bool:
         """Can be read by a service."""
-        return self.access is not Access.WRITE_ONLY
+        return self.access is not AccessMode.WRITE_ONLY
 
     @property
     def writable(self) -> bool:
         """Can be written by a service or command."""
-        return self.access is not Access.READ_ONLY
+        return self.access is not AccessMode.READ_ONLY
 
     @property
     def stores(self) -> bool:

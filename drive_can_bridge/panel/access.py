@@ -75,7 +75,7 @@ class Entry:
     cookie: str | None = None
 
 
-class Access:
+class PanelAccess:
     """
     The rules of one panel.
 
@@ -230,7 +230,7 @@ class Gate:
     :param app: sees only those who may come in; their role is ``scope[ROLE]``.
     """
 
-    def __init__(self, app: ASGIApp, access: Access) -> None:
+    def __init__(self, app: ASGIApp, access: PanelAccess) -> None:
         self.app = app
         self._access = access
 

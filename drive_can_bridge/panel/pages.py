@@ -32,7 +32,7 @@ from drive_can_bridge.monitor.snapshot import (
 from drive_can_bridge.monitor.summary import (
     counts, FEW, in_order, principal, Tone, tone_of, Trouble, troubles,
 )
-from drive_can_bridge.panel.access import Access, Gate, plain_page, ROLE, Role
+from drive_can_bridge.panel.access import Gate, PanelAccess, plain_page, ROLE, Role
 from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
@@ -320,7 +320,7 @@ class Setting:
     allow_writes: bool = False
 
 
-def application(feed: Feed, access: Access, setting: Setting) -> ASGIApp:
+def application(feed: Feed, access: PanelAccess, setting: Setting) -> ASGIApp:
     """Make the web application; it runs the feed."""
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

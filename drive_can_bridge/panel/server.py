@@ -19,7 +19,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.panel.access import Access, ENTER, Entry, Role
+from drive_can_bridge.panel.access import ENTER, Entry, PanelAccess, Role
 
 #: what is the matter with a port, not with the address
 _OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
@@ -63,7 +63,7 @@ class Connection(H11Protocol):
     :param outside: those that have shown no token yet, the oldest first; of all connections.
     """
 
-    def __init__(self, outside: dict['Connection', None], access: Access, *args: Any,
+    def __init__(self, outside: dict['Connection', None], access: PanelAccess, *args: Any,
                  **options: Any) -> None:
         super().__init__(*args, **options)
         self._outside = outside
@@ -207,7 +207,7 @@ def log_to_standard_error(clock: Clock) -> None:
         logger.setLevel(level)
 
 
-def serve(app: ASGIApp, listener: socket.socket, access: Access, clock: Clock, *,
+def serve(app: ASGIApp, listener: socket.socket, access: PanelAccess, clock: Clock, *,
           ended: Callable[[], bool], ready: Callable[[], None]) -> None:
     """
     Serve until the end; then the port is closed, however far this had come.

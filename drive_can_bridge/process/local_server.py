@@ -33,7 +33,7 @@ _TAKE_MAX, _STRANGERS_HEARD = 16, 4
 STOPPING = ('stop', 'pass')
 
 
-class Asked:
+class LocalRequest:
     """
     What a caller has asked.
 
@@ -144,7 +144,7 @@ class LocalServer:
     :param keep_share: returns what pauses when it is time to; called after each piece of work.
     """
 
-    def __init__(self, listener: socket.socket, serve: Callable[[Asked], None], *,
+    def __init__(self, listener: socket.socket, serve: Callable[[LocalRequest], None], *,
                  open_to_all: bool, report: Callable[[str], None],
                  prepare_thread: Callable[[], object],
                  keep_share: Callable[[], Callable[[], None]], clock: Clock) -> None:
@@ -291,7 +291,7 @@ class LocalServer:
     def _begin(self, caller: _Caller, message: list[str]) -> None:
         version, action, words = message[0], ''.join(message[1:2]), message[2:]
         caller.busy, caller.has_asked = action or '?', True
-        asked = Asked(caller, action, words, trusted=not self._is_strange(caller))
+        asked = LocalRequest(caller, action, words, trusted=not self._is_strange(caller))
         if version != VERSION:
             asked.refuse(f'version {VERSION} is understood here')
         elif action not in STOPPING and not asked.trusted:

@@ -112,7 +112,7 @@ def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
         value_text(parameter.value_from_raw(found)), value_text(parameter.value_from_raw(wanted))))
 
 
-class Access(ABC, Generic[SpanT, StepT, ReplyT]):
+class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
     """
     The parameters of one drive: serves the requests of users in their turn on its channel.
 

@@ -16,7 +16,7 @@ from drive_can_bridge.protocols.exchange_book import CycleTimer, ExchangeBook
 from drive_can_bridge.protocols.slack import Slack
 
 
-class Answers:
+class CycleAnswers:
     """
     The answers of one drive.
 

@@ -23,7 +23,7 @@ from typing import Generic, Protocol, TypeVar
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.stop_duty import CYCLE, Happened
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.exchange_book import CycleTimer
 
 #: cyclic frames with neutral setpoints that are sent before a drive is left alone
@@ -90,7 +90,7 @@ class CyclicExchange(Generic[TelegramT]):
     :ivar again: this cycle follows one of which the bus has not taken everything.
     """
 
-    def __init__(self, answers: Answers, teller: Teller[TelegramT], *,
+    def __init__(self, answers: CycleAnswers, teller: Teller[TelegramT], *,
                  slot: int | None) -> None:
         self.audience = [answers]
         self.timer: CycleTimer = answers.book.timer
@@ -179,7 +179,7 @@ class CyclicExchange(Generic[TelegramT]):
             self._session.commands_expired(now)
         return expired
 
-    def settle(self, answers: Answers, now: float) -> None:
+    def settle(self, answers: CycleAnswers, now: float) -> None:
         """End the exchange with one drive, for the next begins; those of a stop are close."""
         answers.settle(now, early=self.cycles_left < 0 and answers.book.early(now))
 
@@ -222,7 +222,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     # -- sending ----------------------------------------------------------------------------------
 
-    def put(self, frame: Frame, *to: Answers) -> None:
+    def put(self, frame: Frame, *to: CycleAnswers) -> None:
         """
         Hand out a frame of the cycle that has begun.
 
@@ -260,7 +260,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._raws = raws
         return Cycle(self._teller.encode_cycle(raws), word, runs)
 
-    def _left(self, to: Iterable[Answers], sent: bool, now: float) -> None:
+    def _left(self, to: Iterable[CycleAnswers], sent: bool, now: float) -> None:
         """
         Record a frame.
 

@@ -104,7 +104,7 @@ STOP_MAX = 1.0
 HELD_MAX = 5.0
 
 
-class Asked(NamedTuple):
+class PendingCycle(NamedTuple):
     """
     A cycle that waits for its answer, or may still get one.
 
@@ -144,8 +144,8 @@ class ExchangeBook:
         self.awaiting = False
         self.stale = 0
         self.stop_shown = False
-        self._asked: deque[Asked] = deque()
-        self._given_up: deque[Asked] = deque()  # before those
+        self._asked: deque[PendingCycle] = deque()
+        self._given_up: deque[PendingCycle] = deque()  # before those
         self._came = 0              # answers since the last cycle
         self._steady = False        # the one before was answered once
         self._heard_at = -math.inf
@@ -188,7 +188,7 @@ class ExchangeBook:
             self._given_up.clear()
         self._steady, self._came = steady, 0
         self._forget_older(now)
-        self._asked.append(Asked(now, -1 if runs else self._runs))
+        self._asked.append(PendingCycle(now, -1 if runs else self._runs))
 
     def early(self, now: float) -> bool:
         """Tell whether what waits has had no time yet: only a cycle brought forward is so near."""

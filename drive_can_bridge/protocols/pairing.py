@@ -141,7 +141,7 @@ class AnswerWatch:
         return due if due > now else math.inf   # NaN: nothing is under way
 
 
-class Asked(NamedTuple):
+class RequestContent(NamedTuple):
     """
     What a request is about.
 
@@ -173,7 +173,7 @@ class Requests(Generic[Key]):
                  content: Callable[[Any, Sequence[int] | None], Content], *,
                  plan: Sequence[Hashable] = (), setpoints: Container[Hashable] = (),
                  missing: str = '') -> None:
-        self.about: dict[Key, Asked] = {}
+        self.about: dict[Key, RequestContent] = {}
         self.round = RoundWatch(plan, observer.observed)
         self._observer = observer
         self._timeout = timeout
@@ -199,7 +199,7 @@ class Requests(Generic[Key]):
         writes = words is not None
         cyclic = span in self._setpoints if writes else self.round.asked(span, now)
         self._observer.observed.requests += not cyclic
-        asked = Asked(span, writes, Kind.CYCLIC if cyclic else Kind.PARAMETER, title)
+        asked = RequestContent(span, writes, Kind.CYCLIC if cyclic else Kind.PARAMETER, title)
         if key is not None:
             self.about.pop(key, None)
             self.about[key] = asked
@@ -211,7 +211,7 @@ class Requests(Generic[Key]):
         self._tell(now, Direction.REQUEST, asked, words, remark=wrong,
                    verdict=Verdict.SUSPICIOUS if wrong else Verdict.NORMAL)
 
-    def answer(self, key: Key, asked: Asked, now: float, words: Sequence[int] | None, *,
+    def answer(self, key: Key, asked: RequestContent, now: float, words: Sequence[int] | None, *,
                refusal: str = '', wrong: str = '', remark: str = '',
                parts: Sequence[Hashable] = ()) -> None:
         """
@@ -273,7 +273,8 @@ class Requests(Generic[Key]):
         before = now < self._certain_from and key not in self.about
         return Verdict.NORMAL if before else Verdict.UNASKED, math.nan
 
-    def _tell(self, now: float, direction: Direction, asked: Asked, words: Sequence[int] | None,
+    def _tell(self, now: float, direction: Direction, asked: RequestContent,
+              words: Sequence[int] | None,
               **more: Any) -> None:
         self._observer.tell(now, direction, asked.kind, asked.title or _TITLES[asked.writes],
                             *self._content(asked.span, words), **more)

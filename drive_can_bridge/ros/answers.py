@@ -28,7 +28,7 @@ CALLERS_MAX = 50
 WAITING_MAX = 2
 
 
-class Answers:
+class ServiceAnswers:
     """
     Sends answers. From any thread.
 

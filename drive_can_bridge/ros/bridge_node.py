@@ -46,7 +46,7 @@ from drive_can_bridge.core.text import printable
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.memory import reserve
 from drive_can_bridge.process.scheduling import raise_priority
-from drive_can_bridge.ros.answers import Answers
+from drive_can_bridge.ros.answers import ServiceAnswers
 from drive_can_bridge.ros.bridge_runtime import BridgeRuntime
 from drive_can_bridge.ros.diagnostics import Diagnostics
 from drive_can_bridge.ros.drive_node import DriveNode
@@ -230,7 +230,7 @@ class BridgeNode(LifecycleNode):
         if why_relayed or why_not_by_hand():
             spinner.part()
         self._relayed = bool(why_relayed)
-        self._answers = Answers(rcl, voice.warn, clock)
+        self._answers = ServiceAnswers(rcl, voice.warn, clock)
         self._requests = Requests(rcl, voice.warning, voice.error, self.context, clock)
         self._open_bus = open_bus
         self._spinner = spinner

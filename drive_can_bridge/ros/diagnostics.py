@@ -18,7 +18,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import bus_sentences, sentences
 from drive_can_bridge.core.events import DriveState
 from drive_can_bridge.core.frame import STUFFING
-from drive_can_bridge.core.lateness import Answers, Lateness
+from drive_can_bridge.core.lateness import AnswerTiming, Lateness
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
@@ -351,10 +351,10 @@ class DriveReporter:
         return sentences.not_armed(wanted)
 
 
-def _answers(drive: DriveNode) -> Answers:
+def _answers(drive: DriveNode) -> AnswerTiming:
     session = drive.session
-    return Answers(session.statistics.late, session.statistics.late_by,
-                   session.configuration.period, session.online)
+    return AnswerTiming(session.statistics.late, session.statistics.late_by,
+                        session.configuration.period, session.online)
 
 
 class StatusMessage:

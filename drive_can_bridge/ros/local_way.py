@@ -18,7 +18,7 @@ from rcl_interfaces.srv import (
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
-from drive_can_bridge.process.local_server import Asked, LocalServer
+from drive_can_bridge.process.local_server import LocalRequest, LocalServer
 from drive_can_bridge.process.local_stop import does_not_answer
 from drive_can_bridge.process.local_way import (
     ANYWHERE, is_pattern, meant, Rubbish, value_of, value_text)
@@ -63,7 +63,7 @@ class LocalWay:
                  drives: Mapping[str, DriveNode], order: Sequence[str], *,
                  seen: Callable[[], tuple[list[str], list[str]]],
                  get: Callable[[Any, Any], Any], spinner: ExecutorThread,
-                 pass_on: Callable[[OthersStop, Asked], None],
+                 pass_on: Callable[[OthersStop, LocalRequest], None],
                  warn: Callable[[str], None], clock: Clock) -> None:
         self._domain = domain
         self._name = name
@@ -92,7 +92,7 @@ class LocalWay:
         if self._server is not None:
             self._server.stop()
 
-    def serve(self, asked: Asked) -> None:
+    def serve(self, asked: LocalRequest) -> None:
         """Begin to answer. In the thread that listens: nothing may wait here."""
         if asked.action == 'stop':
             self._stop(asked)
@@ -110,7 +110,7 @@ class LocalWay:
 
     # -- what a hand does -------------------------------------------------------------------------
 
-    def _stop(self, asked: Asked) -> None:
+    def _stop(self, asked: LocalRequest) -> None:
         place, words = ''.join(asked.words[:1]), asked.words[1:]
         if _is_costly(asked.words):
             asked.refuse(sentences.too_many_patterns())
@@ -123,7 +123,7 @@ class LocalWay:
                       {drive.full_name: drive for drive in list(self._drives.values())
                        if meant(words, drive.full_name)}, introduce=True)
 
-    def _pass(self, asked: Asked) -> None:
+    def _pass(self, asked: LocalRequest) -> None:
         """Have a stop passed on to those of the bridges that are seen: anybody may name any."""
         stop = OthersStop.of(asked.words)
         if _is_costly(stop.words):
@@ -143,7 +143,7 @@ class LocalWay:
         known = {drive.full_name: drive for drive in list(self._drives.values())}
         return {name: known.get(name) for name in names}
 
-    def _command(self, asked: Asked, action: ControlAction,
+    def _command(self, asked: LocalRequest, action: ControlAction,
                  drives: Mapping[str, DriveNode | None], *, introduce: bool = False) -> None:
         """Have drives do something, all at once; the last one that is done ends it."""
         left, counting = len(drives) + 1, threading.Lock()
@@ -170,7 +170,7 @@ class LocalWay:
             self._introduce(asked)      # takes a moment: drives come first
         done()
 
-    def _introduce(self, asked: Asked) -> None:
+    def _introduce(self, asked: LocalRequest) -> None:
         """Say who this is, which drives there are, and which other bridges."""
         bridges, drives = self._around()
         asked.answer('drives', *(self._drives[name].full_name for name in self._order
@@ -187,7 +187,7 @@ class LocalWay:
 
     # -- parameters -------------------------------------------------------------------------------
 
-    def _call(self, asked: Asked) -> None:
+    def _call(self, asked: LocalRequest) -> None:
         node, words = ''.join(asked.words[:1]), asked.words[1:]
         drive = self._named([node])[node]
         try:

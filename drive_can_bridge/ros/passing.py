@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core import sentences
-from drive_can_bridge.process.local_server import Asked
+from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_stop import Answer, RUNNING
 from drive_can_bridge.ros.client.control import Stop
 from drive_can_bridge.ros.client.search import LOOK_PERIOD
@@ -81,7 +81,7 @@ class _Way:
     """
 
     def __init__(self, find_end: Callable[[], NodeEnd], wanted: OthersStop,
-                 asked: list[Asked], now: float) -> None:
+                 asked: list[LocalRequest], now: float) -> None:
         self.wanted = wanted
         self.asked = asked
         self.began = now
@@ -150,13 +150,13 @@ class Passing:
         self._node, self._warn = node, warn
         self._end_of: NodeEnd | None = None
         self._clock = clock
-        self._mail: Mailbox[tuple[OthersStop, Asked] | None] = Mailbox(clock)
-        self._waiting: list[tuple[OthersStop, Asked]] = []
+        self._mail: Mailbox[tuple[OthersStop, LocalRequest] | None] = Mailbox(clock)
+        self._waiting: list[tuple[OthersStop, LocalRequest]] = []
         self._under_way: list[_Way] = []
         self._ending = False
         self._thread: Worker | None = None
 
-    def begin(self, wanted: OthersStop, asked: Asked) -> None:
+    def begin(self, wanted: OthersStop, asked: LocalRequest) -> None:
         """Pass a stop on. From one thread."""
         if self._thread is None:
             self._thread = self._clock.worker(self._run, 'passing on')
@@ -209,7 +209,7 @@ class Passing:
 
     def _begin_what_may(self, now: float) -> None:
         """Begin what waits, and may; whoever wants the same at the same time shares it."""
-        together: dict[OthersStop, list[Asked]] = {}
+        together: dict[OthersStop, list[LocalRequest]] = {}
         for wanted, asked in self._waiting:
             together.setdefault(wanted, []).append(asked)
         self._waiting = []

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.simulation import quantities
@@ -61,7 +61,7 @@ class Standard(NamedTuple):
     """An object of the standard: its type, whether it may be written, and what is in a new one."""
 
     type: ParameterType
-    access: Access
+    access: AccessMode
     initial: int = 0
 
 
@@ -73,7 +73,7 @@ def _standard(text: str) -> dict[Place, Standard]:
             where, kind, access, *initial = row.split()
             index, _, subindex = where.partition('.')
             found[int(index, 16), int(subindex or '0', 16)] = Standard(
-                _TYPES[kind], Access(access), int(initial[0], 0) if initial else 0)
+                _TYPES[kind], AccessMode(access), int(initial[0], 0) if initial else 0)
     return found
 
 

@@ -10,7 +10,7 @@ from drive_can_bridge.backup.restore import Restorer, RestoreResult
 from drive_can_bridge.client.drive import Drive, DriveFacts, Enabled, ReadOutcome, WriteOutcome
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.core.parameters import Access, Parameter, Value
+from drive_can_bridge.core.parameters import AccessMode, Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
@@ -70,7 +70,7 @@ class ScriptedDrive(Drive):
                        table),
             ParameterDirectory({name: Parameter(name, number=number) for number, name in
                                 enumerate(FILE, 30)} | {STORE: Parameter(
-                                    STORE, number=60, access=Access.WRITE_ONLY)},
+                                    STORE, number=60, access=AccessMode.WRITE_ONLY)},
                                lambda name: None))
         self.registers = {**dict.fromkeys(SETTINGS, 1), 'mode': OTHER}
         self._stores = stores

@@ -11,7 +11,7 @@ from saying import says
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Access, ParameterType, ValueKind
+from drive_can_bridge.core.parameters import AccessMode, ParameterType, ValueKind
 from drive_can_bridge.protocols.datamodel.extended import encode_read_request, encode_write
 from drive_can_bridge.protocols.datamodel.family import DataModelExtended
 from drive_can_bridge.protocols.families import FAMILIES
@@ -68,7 +68,7 @@ def test_raw_names(drive: DriveConfiguration, offset: int, name: str, number: in
     assert (found and found.number) == number
     assert found is None or (found.name, found.type, found.scaled, found.storage, found.listed,
                              found.access, found.kind) == (
-        name, ParameterType.UINT16, False, None, False, Access.READ_WRITE, ValueKind.INTEGER)
+        name, ParameterType.UINT16, False, None, False, AccessMode.READ_WRITE, ValueKind.INTEGER)
 
 
 @pytest.mark.parametrize('offset', [-123, 65532])

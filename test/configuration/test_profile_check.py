@@ -10,7 +10,7 @@ from configuration_builders import (
 import pytest
 from saying import says
 
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 CASES = [
@@ -248,7 +248,7 @@ def test_good_profile(tmp_path: Path) -> None:
         'ramp', number=30, scale=0.01, unit='s', storage=Storage.EEPROM, minimum=0.01,
         maximum=60.0, scaled=True)
     assert profile.parameters['status'] == Parameter(
-        'status', number=211, access=Access.READ_ONLY, bits=(('ready', 0), ('fault', 3)))
+        'status', number=211, access=AccessMode.READ_ONLY, bits=(('ready', 0), ('fault', 3)))
     assert profile.parameters['angle'] == Parameter(
         'angle', ParameterType.INT16, number=54, unit='deg', scaled=True)
     assert profile.control == ControlTable(

@@ -12,7 +12,7 @@ from saying import says
 
 from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import ValueRefused
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.families import FAMILIES
 
 
@@ -49,8 +49,8 @@ def test_raw_name_of_a_listed_parameter_obeys_its_rules() -> None:
     ((RW, RAM), (RW, RAM), (RW, RAM)),
 ])
 def test_two_listed_parameters_with_one_number(
-        first: tuple[Access, Storage | None], second: tuple[Access, Storage | None],
-        wanted: tuple[Access, Storage | None]) -> None:
+        first: tuple[AccessMode, Storage | None], second: tuple[AccessMode, Storage | None],
+        wanted: tuple[AccessMode, Storage | None]) -> None:
     raw = directory(*(
         parameter(name, 70, access=access, storage=storage)
         for name, (access, storage) in (('a', first), ('b', second)))).find('p70')

@@ -4,15 +4,15 @@
 from saying import says
 
 from drive_can_bridge.core.adapter import AdapterTraits
-from drive_can_bridge.core.lateness import Answers, Lateness
+from drive_can_bridge.core.lateness import AnswerTiming, Lateness
 
 CANABLE = AdapterTraits('CANable 1')
 FTDI = AdapterTraits('LAWICEL CANUSB', 0.016, 'echo 1 | sudo tee /sys/latency_timer')
 
 
 def answers(late: int, late_by: float = 0.004, period: float = 0.01, *,
-            online: bool = True) -> Answers:
-    return Answers(late, late_by, period, online)
+            online: bool = True) -> AnswerTiming:
+    return AnswerTiming(late, late_by, period, online)
 
 
 def test_all_drives_by_the_same_time_is_the_adapter() -> None:

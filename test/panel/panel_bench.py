@@ -30,7 +30,7 @@ from world import World, world
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.panel import actions
-from drive_can_bridge.panel.access import Access, Role
+from drive_can_bridge.panel.access import PanelAccess, Role
 from drive_can_bridge.panel.feed import Feed
 from drive_can_bridge.panel.pages import application, Setting
 from drive_can_bridge.panel.server import log_to_standard_error, LOGGERS
@@ -140,7 +140,7 @@ class House(Visitors):
         self.bridge = Bridge(directory, FILE.format(directory=directory))
         self.bridge.begin()
         KEPT.update(self.bridge.node.drives.values())
-        access = Access(port=PORT)
+        access = PanelAccess(port=PORT)
         self.tokens = {role.value: access.tokens[role] for role in Role}
         model = Model('')
         self._source = MonitorClient(model)

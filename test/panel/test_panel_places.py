@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
-from drive_can_bridge.panel.access import Access, Role
+from drive_can_bridge.panel.access import PanelAccess, Role
 from drive_can_bridge.panel.server import (
     Connection, CONNECTIONS_MAX, FIRST_BYTE, KEPT_FOR_OPERATORS, OUTSIDE_MAX,
 )
@@ -62,7 +62,7 @@ class House:
 
     def comes(self) -> tuple[Connection, Wire]:
         wire: Any = Wire()
-        connection = Connection(self._outside, Access(port=0), self._config, self._state, {},
+        connection = Connection(self._outside, PanelAccess(port=0), self._config, self._state, {},
                                 _loop=self)    # type: ignore[arg-type]
         connection.connection_made(wire)
         return connection, wire

@@ -43,7 +43,7 @@ importlib.import_module(__name__)
 @pytest.mark.parametrize('wanted', [1, 2], ids=['before it serves', 'while it begins to'])
 def test_a_server_that_is_to_end_before_it_is_there(wanted: int) -> None:
     pytest.importorskip('nicegui')
-    from drive_can_bridge.panel.access import Access
+    from drive_can_bridge.panel.access import PanelAccess
     from drive_can_bridge.panel.server import listen, serve
     looks, ready = [], []
 
@@ -51,7 +51,8 @@ def test_a_server_that_is_to_end_before_it_is_there(wanted: int) -> None:
         looks.append(1)
         return len(looks) >= wanted
     listener = listen('127.0.0.1', 0)
-    serve(_application, listener, Access(port=0), REAL, ended=ended, ready=lambda: ready.append(1))
+    serve(_application, listener, PanelAccess(port=0), REAL, ended=ended,
+          ready=lambda: ready.append(1))
     assert ready == []
 
 

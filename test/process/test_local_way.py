@@ -16,7 +16,7 @@ import pytest
 
 from drive_can_bridge import __version__
 from drive_can_bridge.process import local_server, presence
-from drive_can_bridge.process.local_server import Asked, LocalServer
+from drive_can_bridge.process.local_server import LocalRequest, LocalServer
 from drive_can_bridge.process.local_way import (
     ASKED_MAX, Inbound, Line, matches, meant, PACKET, packets_of, Rubbish, value_of, value_text)
 from drive_can_bridge.process.presence import bridges, Presence
@@ -82,20 +82,20 @@ class Host:
 
     def __init__(self, *, open_to_all: bool = True) -> None:
         self.presence = Presence(3, '/cell/bridge')
-        self.asked: list[Asked] = []
+        self.asked: list[LocalRequest] = []
         self.reports: list[str] = []
-        self.serve: Callable[[Asked], None] = self.echo
+        self.serve: Callable[[LocalRequest], None] = self.echo
         self.server = LocalServer(
             self.presence.socket, self._serve, open_to_all=open_to_all,
             report=self.reports.append, prepare_thread=lambda: None,
             keep_share=lambda: lambda: None, clock=REAL)
 
-    def _serve(self, asked: Asked) -> None:
+    def _serve(self, asked: LocalRequest) -> None:
         self.asked.append(asked)
         self.serve(asked)
 
     @staticmethod
-    def echo(asked: Asked) -> None:
+    def echo(asked: LocalRequest) -> None:
         """Say what was asked."""
         asked.answer(asked.action, *asked.words)
         asked.end()
@@ -202,7 +202,7 @@ def test_a_caller_that_does_not_read_costs_nobody_anything(
         host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_server, 'UNREAD_PATIENCE', 0.2)
 
-    def flood(asked: Asked) -> None:
+    def flood(asked: LocalRequest) -> None:
         for _ in range(3000 if asked.action == 'much' else 1):
             asked.answer('x' * 1000)
         asked.end()
@@ -267,7 +267,7 @@ def test_a_caller_that_has_gone_is_answered_all_the_same(host: Host) -> None:
 
 
 def test_a_defect_in_an_answer_is_told_and_the_next_is_served(host: Host) -> None:
-    def fail(asked: Asked) -> None:
+    def fail(asked: LocalRequest) -> None:
         raise ValueError('broken')
     host.serve = fail
     line = host.call()
@@ -340,7 +340,7 @@ def test_a_bridge_of_a_stranger_is_not_believed(
 def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> None:
     goes_on = threading.Event()
 
-    def wait(asked: Asked) -> None:
+    def wait(asked: LocalRequest) -> None:
         goes_on.wait(60.0)
         host.echo(asked)
     host.serve = wait
@@ -361,7 +361,7 @@ def test_what_nobody_waits_for_any_more_is_not_done_but_a_stop(host: Host) -> No
 def test_ours_are_heard_before_strangers(host: Host) -> None:
     goes_on = threading.Event()
 
-    def wait(asked: Asked) -> None:
+    def wait(asked: LocalRequest) -> None:
         goes_on.wait(60.0)
         host.echo(asked)
     host.serve = wait

@@ -8,7 +8,7 @@ from import_builders import bring_in, told
 import pytest
 from transcripts import stories
 
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage
 from drive_can_bridge.profiles import catalogue
 from drive_can_bridge.profiles.catalogue import ImportFailed
 from drive_can_bridge.profiles.csv_import import WrongColumns
@@ -47,7 +47,7 @@ RESULT = {
         description='Speed setpoint'),
     'actual_speed': Parameter(
         'actual_speed', ParameterType.INT16, number=209, scale=0.1, unit='rpm',
-        access=Access.READ_ONLY, scaled=True, description='Actual speed'),
+        access=AccessMode.READ_ONLY, scaled=True, description='Actual speed'),
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 from transcripts import stories
 
 from drive_can_bridge.cli.main import main
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage
 
 #: index with sub-index, name in the file, data type, access, further keys
 OBJECTS = (
@@ -68,7 +68,7 @@ def test_standard_objects_have_their_names(tmp_path: Path) -> None:
     # what stores is said nowhere in the file: 65766173h, "save"
     assert [(step.parameter, step.bits) for step in made.profile.restore.after] == [
         ('store_parameters', 0x65766173)]
-    assert made.parameters['store_parameters'].access is Access.WRITE_ONLY
+    assert made.parameters['store_parameters'].access is AccessMode.WRITE_ONLY
 
 
 def test_units_of_the_standard_and_of_the_file(tmp_path: Path) -> None:

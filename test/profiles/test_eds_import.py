@@ -9,7 +9,7 @@ from import_builders import bring_in, Outcome, told
 import pytest
 from transcripts import stories
 
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType, Storage
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType, Storage
 from drive_can_bridge.profiles.catalogue import ImportFailed
 
 TOLD = stories(__file__, 'imports.yaml')
@@ -131,7 +131,7 @@ def test_everything_that_an_entry_can_have(tmp_path: Path) -> None:
     assert made.parameters['flag'].type is ParameterType.BOOL
     assert made.parameters['temperatures_2'] == Parameter(
         'temperatures_2', ParameterType.INT16, index=0x2010, subindex=2,
-        access=Access.READ_ONLY, description='Temperatures_2')
+        access=AccessMode.READ_ONLY, description='Temperatures_2')
     assert made.parameters['mode'].type is ParameterType.UINT16
     assert [name for name, each in made.parameters.items() if each.protected] == [
         'producer_heartbeat_time']
@@ -206,7 +206,7 @@ def test_a_key_that_is_odd_costs_no_entry(tmp_path: Path, old: str, new: str,
 
 def test_what_no_key_says_is_read_only(tmp_path: Path) -> None:
     made = bring(tmp_path, 'AccessType=rww\n', '')
-    assert made.parameters['ramp_time'].access is Access.READ_ONLY
+    assert made.parameters['ramp_time'].access is AccessMode.READ_ONLY
 
 
 def test_a_record_without_a_head(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 
 REQUEST = 0x10
@@ -51,7 +51,7 @@ class Plain(Session):
         super().__init__(configuration, ControlMachine(CONTROL, timeout=2.0))
         server: RequestServer = Silent()
         self.services = DriveServices(self, server)
-        self.answers = Answers(self, silence='no answer', advice='the plug')
+        self.answers = CycleAnswers(self, silence='no answer', advice='the plug')
         self.exchange = CyclicExchange(self.answers, self, slot=0)
         self.look_after(self.exchange, channel=Silent())
 

@@ -16,7 +16,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import ReadRequest, RetryPolicy, WriteRequest
 from drive_can_bridge.protocols.channel import Channel, Priority
-from drive_can_bridge.protocols.cia402.channel import Ask, SdoTransactor
+from drive_can_bridge.protocols.cia402.channel import SdoTransactor, Transfer
 from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Read
 from drive_can_bridge.protocols.families import FAMILIES
 
@@ -191,7 +191,7 @@ class Sdo:
         word = parameter('word', None, index=0x6040, subindex=0)
         self.channel: Channel[Any, Any] = Channel(
             SdoTransactor(5, self.outbox, RetryPolicy(TIMEOUT, attempts=1), LastSent((word,))))
-        self.lost = self.step = Ask(0x6040, 0, bytes(2))
+        self.lost = self.step = Transfer(0x6040, 0, bytes(2))
         self.told = '2B40600000000000'
         self.answers = {
             self.told: bytes.fromhex('6040600000000000'),

@@ -12,7 +12,7 @@ import pytest
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.client import local
 from drive_can_bridge.process import local_stop
-from drive_can_bridge.process.local_server import Asked
+from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_way import Inbound, packets_of, VERSION
 from drive_can_bridge.process.presence import bridges, Present, SWITCH
 from drive_can_bridge.ros.client import calls, search
@@ -68,7 +68,7 @@ class Line:
         if self._bridge is not None:
             caller: Any = self
             runtime: Any = self._bridge.node._runtime
-            runtime.local_way.serve(Asked(
+            runtime.local_way.serve(LocalRequest(
                 caller, message[1], message[2:], trusted=self._trusted))
 
     def say(self, message: Sequence[str], *, last: bool = False) -> None:

@@ -19,7 +19,7 @@ from waiting import clock
 from world import World
 
 from drive_can_bridge.ros import bridge_node
-from drive_can_bridge.ros.answers import Answers, WAITING_MAX
+from drive_can_bridge.ros.answers import ServiceAnswers, WAITING_MAX
 from drive_can_bridge.ros.rcl import services as rcl_module
 from drive_can_bridge.ros.rcl.incoming import PolledGroup
 from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
@@ -69,15 +69,15 @@ def _told() -> list[str]:
 
 
 @contextmanager
-def sending(rcl: Any, told: list[str]) -> Iterator[Answers]:
+def sending(rcl: Any, told: list[str]) -> Iterator[ServiceAnswers]:
     """Have answers sent by this."""
-    answers = Answers(rcl, lambda _, text: told.append(text), clock())
+    answers = ServiceAnswers(rcl, lambda _, text: told.append(text), clock())
     yield answers
     answers.stop()
 
 
 @pytest.fixture(name='answers')
-def _answers(told: list[str]) -> Iterator[Answers]:
+def _answers(told: list[str]) -> Iterator[ServiceAnswers]:
     with sending(RclServices(), told) as answers:
         yield answers
 
@@ -169,7 +169,7 @@ def test_others_are_answered_as_ever_and_as_by_rclpy(
 class Caller:
     """A service in a thread of its own, and somebody who calls it."""
 
-    def __init__(self, client: Client, context: ClientContext, answers: Answers,
+    def __init__(self, client: Client, context: ClientContext, answers: ServiceAnswers,
                  name: str) -> None:
         self.client = client
         self.errors: list[str] = []
@@ -195,7 +195,7 @@ class Caller:
 
 
 @contextmanager
-def called(client: Client, context: ClientContext, answers: Answers,
+def called(client: Client, context: ClientContext, answers: ServiceAnswers,
            name: str) -> Iterator[Caller]:
     """Offer a service, and call it."""
     caller = Caller(client, context, answers, name)
@@ -206,7 +206,8 @@ def called(client: Client, context: ClientContext, answers: Answers,
 
 
 @pytest.fixture(name='caller')
-def _caller(client: Client, _client_context: ClientContext, answers: Answers) -> Iterator[Caller]:
+def _caller(client: Client, _client_context: ClientContext,
+            answers: ServiceAnswers) -> Iterator[Caller]:
     with called(client, _client_context, answers, '~/asked') as caller:
         yield caller
 
@@ -248,7 +249,7 @@ def test_rclpy_takes_and_answers_where_anything_is_other_than_expected(
 
 @REAL_DDS
 def test_rclpy_goes_on_where_headers_are_other_than_expected(
-        client: Client, _client_context: ClientContext, answers: Answers,
+        client: Client, _client_context: ClientContext, answers: ServiceAnswers,
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rcl_module, '_NUMBER_MAX', 0)
     with called(client, _client_context, answers, '~/other_header') as caller:
@@ -348,13 +349,13 @@ def _rcl() -> FakeRcl:
 
 
 @pytest.fixture(name='late_answers')
-def _late_answers(bench: World, rcl: FakeRcl, told: list[str]) -> Iterator[Answers]:
+def _late_answers(bench: World, rcl: FakeRcl, told: list[str]) -> Iterator[ServiceAnswers]:
     with sending(rcl, told) as answers:
         yield answers
 
 
 def test_a_client_out_of_reach_delays_others_once(
-        rcl: FakeRcl, late_answers: Answers, told: list[str]) -> None:
+        rcl: FakeRcl, late_answers: ServiceAnswers, told: list[str]) -> None:
     answers = late_answers
     service: Any = FakeService()
     answers.send(service, 0, b'lost')
@@ -377,7 +378,7 @@ def test_a_client_out_of_reach_delays_others_once(
 
 
 def test_what_waits_for_clients_out_of_reach_does_not_outlast_the_end(
-        rcl: FakeRcl, late_answers: Answers) -> None:
+        rcl: FakeRcl, late_answers: ServiceAnswers) -> None:
     answers = late_answers
     service: Any = FakeService()
     for number in range(3):

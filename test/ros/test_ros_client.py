@@ -23,7 +23,7 @@ from drive_can_bridge.client.bridge import BridgedDrive
 from drive_can_bridge.client.drive import Drive, Enabled
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError, SilentBridge, WhichBridge
-from drive_can_bridge.core.parameters import Access, Storage
+from drive_can_bridge.core.parameters import AccessMode, Storage
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.ros.client import calls, search
 
@@ -90,7 +90,7 @@ def _values(conveyor: Drive, bridge: Bridge) -> None:
         (325, 3.25), (325, 325), (15000, 1500.0), (0, False)]
     raw = conveyor.find('p30')
     assert raw is not None
-    assert (raw.listed, raw.access, raw.storage) == (False, Access.READ_WRITE, Storage.EEPROM)
+    assert (raw.listed, raw.access, raw.storage) == (False, AccessMode.READ_WRITE, Storage.EEPROM)
 
 
 RAMP_RANGE = '0.01 to 60 s'

@@ -13,7 +13,7 @@ from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.statistics import DriveStatistics
 from drive_can_bridge.protocols.canopen.network import Emergency, encode_emergency
-from drive_can_bridge.protocols.canopen.node import Node
+from drive_can_bridge.protocols.canopen.node import WatchedNode
 from drive_can_bridge.ros import log as log_module
 
 FLIPS = 400
@@ -54,7 +54,7 @@ def test_what_flips_is_summed_up_and_a_danger_is_told_meanwhile(lift: Any, clien
 
 def test_emergencies_that_vary_are_a_few_lines_and_a_sum(lift: Any, client: Client) -> None:
     told = [Emergency(0x2300 + number) for number in range(200)]
-    node, report = Node(5, heartbeat_timeout=0.0), Reporter(DriveStatistics(), NOTHING)
+    node, report = WatchedNode(5, heartbeat_timeout=0.0), Reporter(DriveStatistics(), NOTHING)
     for emergency in told:
         node.take_emergency(encode_emergency(5, emergency).data, report)
     with lift.exchange.lock:

@@ -12,7 +12,7 @@ from simulation_builders import RULES
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import EXTENDED_IDENTIFIER_MAX, Frame
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.simulation.canopen_pkw import SimulatedPkwDrive
 
@@ -216,8 +216,8 @@ class TestMailbox:
             assert answer[12:] == code
 
     def test_write_only_and_read_only(self) -> None:
-        parameters = {'key': Parameter('key', number=10, access=Access.WRITE_ONLY),
-                      'name': Parameter('name', number=11, access=Access.READ_ONLY)}
+        parameters = {'key': Parameter('key', number=10, access=AccessMode.WRITE_ONLY),
+                      'name': Parameter('name', number=11, access=AccessMode.READ_ONLY)}
         made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
                     response=('name',))
         assert made.ask('505#0A00002500000000', 0.1) == ['485#0A00004E01000106']
@@ -404,7 +404,7 @@ class TestMotor:
             'speed_setpoint': Parameter('speed_setpoint', number=10, type=ParameterType.INT16,
                                         minimum=-100.0, maximum=100.0, scaled=True, unit='rpm'),
             'actual_speed': Parameter('actual_speed', number=455, type=ParameterType.INT16,
-                                      access=Access.READ_ONLY, scaled=True, unit='rpm')}
+                                      access=AccessMode.READ_ONLY, scaled=True, unit='rpm')}
         made = Ltmr(Profile('table', '/table.yaml', '', ('canopen_pkw',), parameters),
                     request=('speed_setpoint',), response=('actual_speed',))
         made.write(10, 50, 1.0)

@@ -21,7 +21,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Access
+from drive_can_bridge.core.parameters import AccessMode
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Finding
 from drive_can_bridge.resources import config_file
@@ -93,7 +93,7 @@ TOLD = {'inverter': bare(INVERTER), 'starter': STARTER, 'axis': AXIS, 'lift': LI
 def test_cannord_arrays_and_others_of_the_profile_come_first() -> None:
     table = (parameter('ramp', 400), parameter('curve', 401, subindex=2),
              parameter('set_1', 402), parameter('set_2', 402, subindex=1),
-             parameter('order', 403, access=Access.WRITE_ONLY))
+             parameter('order', 403, access=AccessMode.WRITE_ONLY))
     bench = Bench(lambda frame: [])
     bench.probe(replace(INVERTER, profile=replace(
         INVERTER.profile, parameters={each.name: each for each in table})))

@@ -28,7 +28,7 @@ from drive_can_bridge.protocols.transactor import Transactor
 
 
 @dataclass(frozen=True)
-class Ask:
+class ParameterTask:
     """
     A task for the inverter.
 
@@ -41,7 +41,7 @@ class Ask:
     value: int = 0
 
 
-class Reply(NamedTuple):
+class TaskResult(NamedTuple):
     """
     What became of a task.
 
@@ -55,11 +55,11 @@ class Reply(NamedTuple):
     sent: bool = True
 
 
-SILENT = Reply(None)
-NOT_SENT = Reply(None, sent=False)
+SILENT = TaskResult(None)
+NOT_SENT = TaskResult(None, sent=False)
 
 
-class TaskTransactor(Transactor[Ask, Reply]):
+class TaskTransactor(Transactor[ParameterTask, TaskResult]):
     """
     Hands tasks to the inverter, and tells which response belongs to them.
 
@@ -75,7 +75,7 @@ class TaskTransactor(Transactor[Ask, Reply]):
         self._layout, self._outbox = layout, outbox
         self._identifier, self._extended = identifier, extended
 
-    def begin(self, step: Ask, now: float) -> None:
+    def begin(self, step: ParameterTask, now: float) -> None:
         self.silent = SILENT
         self.expect(step, now + self.retry.timeout)
 
@@ -86,7 +86,7 @@ class TaskTransactor(Transactor[Ask, Reply]):
         payload = self._layout.encode(step.task, step.number, step.index, step.value)
         self._outbox.put(Frame(self._identifier, payload, self._extended), left)
 
-    def receive(self, answer: bytes, now: float) -> Reply:
+    def receive(self, answer: bytes, now: float) -> TaskResult:
         response, task = self._layout.decode(answer), self.step
         if task is None:
             raise Unasked('parameter response that nobody asked for')
@@ -96,30 +96,30 @@ class TaskTransactor(Transactor[Ask, Reply]):
                           f'task {task.task} for P{task.number}.{task.index}')
         if task.task.writes and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
-            self.silent = Reply(None, response)
+            self.silent = TaskResult(None, response)
             raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
                                       'another value')
         self.finish()
-        return Reply(response)
+        return TaskResult(response)
 
-    def answers(self, answer: bytes, step: Ask) -> bool:
+    def answers(self, answer: bytes, step: ParameterTask) -> bool:
         """Tell whether a response may be that to a task that was given up."""
         return _belongs(self._layout.decode(answer), step)
 
-    def attempts(self, step: Ask) -> int:
+    def attempts(self, step: ParameterTask) -> int:
         return 1 if step.task.writes else self.retry.attempts
 
-    def unanswered(self, step: Ask, reply: Reply) -> bool:
+    def unanswered(self, step: ParameterTask, reply: TaskResult) -> bool:
         return reply is self.silent
 
-    def key(self, step: Ask) -> Hashable:
+    def key(self, step: ParameterTask) -> Hashable:
         return step.number      # a late refusal may not say of which element
 
 
-TaskChannel = Channel[Ask, Reply]
+TaskChannel = Channel[ParameterTask, TaskResult]
 
 
-def _belongs(response: ParameterFrame, task: Ask) -> bool:
+def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:
     """Tell whether a response answers a task, as far as its address is concerned."""
     if response.number != task.number:
         return False
@@ -129,7 +129,7 @@ def _belongs(response: ParameterFrame, task: Ask) -> bool:
     return response.identifier in task.task.responses and response.index == task.index
 
 
-def _echoes(response: ParameterFrame, task: Ask) -> bool:
+def _echoes(response: ParameterFrame, task: ParameterTask) -> bool:
     """Tell whether a response to a write holds the value that was written."""
     # the high half of a word says nothing
     width = 0xFFFFFFFF if response.double else 0xFFFF

@@ -27,7 +27,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.session import Session, Stage
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.identifiers import broadcast_identifier
 from drive_can_bridge.protocols.cannord.process_data import (
@@ -49,7 +49,7 @@ class Member:
 
     session: Session
     identifier: int
-    answers: Answers
+    answers: CycleAnswers
     samples: Samples
 
 
@@ -147,7 +147,7 @@ class Group:
     def last_cycle_left(self, now: float) -> None:
         self.exchange.end_stop()
 
-    def _put(self, identifier: int, payloads: list[bytes], *to: Answers) -> None:
+    def _put(self, identifier: int, payloads: list[bytes], *to: CycleAnswers) -> None:
         for payload in payloads:
             self.exchange.put(Frame(identifier, payload, self._extended), *to)
 

@@ -22,7 +22,7 @@ from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
-from drive_can_bridge.protocols.pairing import Asked, CYCLES_WAITED, CyclicWatch, Requests
+from drive_can_bridge.protocols.pairing import CYCLES_WAITED, CyclicWatch, RequestContent, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -155,7 +155,7 @@ class CannordObserver(DriveObserver):
         fits = asked is None or refused or response in task.responses
         valued = response not in _ANSWER_TITLES
         self._requests.answer(
-            key, Asked(span, task.writes, title=_ANSWER_TITLES.get(response, '')), now,
+            key, RequestContent(span, task.writes, title=_ANSWER_TITLES.get(response, '')), now,
             (frame.answered,) if valued else None,
             refusal=error_text(frame.word) if refused else '',
             wrong='' if fits else f'response {int(response)} to task {int(task)}',

@@ -13,8 +13,8 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, NOT_SENT, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne, read_back
-from drive_can_bridge.protocols.cannord.channel import Ask, Reply, TaskChannel
+from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess, read_back
+from drive_can_bridge.protocols.cannord.channel import ParameterTask, TaskChannel, TaskResult
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, Response, Task, WRITE_TASKS)
 from drive_can_bridge.protocols.cannord.process_data import Samples
@@ -41,7 +41,7 @@ def write_refusal(parameter: Parameter) -> Sentence:
     return PROCESS_DATA_ONLY if parameter.number is None else NOTHING
 
 
-class TaskAccess(Access[Parameter, Ask, Reply]):
+class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
     """
     Parameters by number and sub-index, one a task.
 
@@ -57,7 +57,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         self._persist = persist
         self._signed = signed
 
-    def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
+    def read(self, span: Parameter) -> Generator[ParameterTask, TaskResult, Found]:
         answer = yield from self._ask(span)
         if isinstance(answer, Failure):
             return answer
@@ -66,7 +66,7 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             return Failure(FailureKind.REFUSED, _width_text(span, double=double))
         return (answer.answered,)
 
-    def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Generator[ParameterTask, TaskResult, Outcomes]:
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
@@ -84,7 +84,8 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
+    def _write(self, parameter: Parameter, raw: int) -> Generator[ParameterTask, TaskResult,
+                                                                  Outcome]:
         """
         Write one parameter; the response acknowledges it.
 
@@ -108,16 +109,17 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
             parameter, WRITE_TASKS[array, double, persistent], raw, attempts=1)
         return answer if isinstance(answer, Failure) else Written()
 
-    def _ask(self, parameter: Parameter) -> Generator[Ask, Reply, ParameterFrame | Failure]:
+    def _ask(self, parameter: Parameter) -> Generator[ParameterTask, TaskResult,
+                                                      ParameterFrame | Failure]:
         """Read one parameter."""
         return self._carry_out(
             parameter, Task.READ if parameter.subindex is None else Task.READ_ARRAY)
 
     def _carry_out(self, parameter: Parameter, task: Task, value: int = 0,
                    attempts: int | None = None,
-                   ) -> Generator[Ask, Reply, ParameterFrame | Failure]:
+                   ) -> Generator[ParameterTask, TaskResult, ParameterFrame | Failure]:
         """Have a task done; return the response, or why there is none that does."""
-        reply = yield Ask(task, parameter.number or 0, parameter.subindex or 0, value)
+        reply = yield ParameterTask(task, parameter.number or 0, parameter.subindex or 0, value)
         if reply.response is not None:
             if reply.response.identifier != Response.REFUSED:
                 return reply.response
@@ -132,11 +134,12 @@ class TaskAccess(Access[Parameter, Ask, Reply]):
         return self.retry.unanswered(attempts)
 
 
-def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Ask, Reply, Failure]:
+def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[ParameterTask,
+                                                                          TaskResult, Failure]:
     """Say why the drive refused; where an element does not exist, also how many there are."""
     text = error_text(response.word)
     if response.word == WRONG_INDEX and parameter.subindex is not None:
-        reply = yield Ask(Task.READ_ELEMENTS, parameter.number or 0)
+        reply = yield ParameterTask(Task.READ_ELEMENTS, parameter.number or 0)
         answer = reply.response
         if answer is not None and answer.identifier == Response.ELEMENTS:
             return Failure(FailureKind.REFUSED, sentences.no_such_element(

@@ -33,7 +33,7 @@ from drive_can_bridge.core.requests import Outcomes, Request
 from drive_can_bridge.core.roles import publish_it, Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskTransactor
 from drive_can_bridge.protocols.cannord.control import make_control
@@ -102,7 +102,8 @@ class CannordSession(Session):
         self._broadcasts = broadcasts(drive.station, extended=self._extended)
         self._timeout = TimeoutWatch(drive, access, self.report)
         self.services = DriveServices(self, access)
-        self._answers = Answers(self, silence=_SILENCE, advice=_ADVICE, in_turn=not group.alone)
+        self._answers = CycleAnswers(self, silence=_SILENCE, advice=_ADVICE,
+                                     in_turn=not group.alone)
         group.join(Member(self, request_identifier, self._answers, self._samples))
         self._cycles = self._answers if self._led else group.exchange
         self.look_after(self._cycles, channel=self._channel)

@@ -21,7 +21,7 @@ Bits 14 and 15 choose the parameter set (:func:`parameter_set_bits`).
 from enum import Enum
 
 from drive_can_bridge.core.errors import LocalProtocolError
-from drive_can_bridge.core.parameters import Access, Parameter
+from drive_can_bridge.core.parameters import AccessMode, Parameter
 
 READY = 0x047E
 RUN = 0x047F
@@ -65,10 +65,10 @@ STATUS_WORD = 'status_word'
 FAULT_BIT = 0x0008
 
 STATUS_PARAMETER = Parameter(
-    name=STATUS_WORD, access=Access.READ_ONLY, bits=tuple(STATUS_BITS.items()),
+    name=STATUS_WORD, access=AccessMode.READ_ONLY, bits=tuple(STATUS_BITS.items()),
     description='Status word of the inverter')
 CONTROL_PARAMETER = Parameter(
-    name='control_word', access=Access.WRITE_ONLY, description='Control word of the inverter')
+    name='control_word', access=AccessMode.WRITE_ONLY, description='Control word of the inverter')
 
 
 class State(Enum):

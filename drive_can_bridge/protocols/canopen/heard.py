@@ -12,7 +12,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import Absence
 from drive_can_bridge.protocols.canopen.network import NmtState
-from drive_can_bridge.protocols.canopen.node import Node
+from drive_can_bridge.protocols.canopen.node import WatchedNode
 
 #: s for which something that arrived counts
 HEARD_TIME = 3.0
@@ -42,7 +42,7 @@ class Heard:
         """Record one that cannot be understood."""
         self._wrong, self._wrong_at = what, now
 
-    def instead_of(self, advice: Sentence, node: Node, now: float) -> Sentence:
+    def instead_of(self, advice: Sentence, node: WatchedNode, now: float) -> Sentence:
         """Return what to say: the advice, unless that speaks of silence and something arrives."""
         came, wrong = now - self._at <= HEARD_TIME, now - self._wrong_at <= HEARD_TIME
         if advice.kind not in (Absence.SILENT, Absence.NO_HEARTBEAT) or not (came or wrong):

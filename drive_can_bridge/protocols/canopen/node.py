@@ -42,7 +42,7 @@ BELIEF_INTERVALS = 3.0
 INTERVAL_MAX = 65.535
 
 
-class Change(Enum):
+class NodeChange(Enum):
     """What a frame or the passage of time says of a node."""
 
     NONE = 'nothing new'
@@ -53,7 +53,7 @@ class Change(Enum):
     HEARTBEAT_LOST = 'heartbeats ceased'
 
 
-class Node:
+class WatchedNode:
     """
     One node, watched.
 
@@ -97,7 +97,7 @@ class Node:
 
     # -- input ------------------------------------------------------------------------------------
 
-    def receive_heartbeat(self, state: NmtState, now: float) -> Change:
+    def receive_heartbeat(self, state: NmtState, now: float) -> NodeChange:
         """Take a boot-up frame or heartbeat."""
         was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
@@ -110,7 +110,7 @@ class Node:
             self.free_at = now + START_PAUSE
             if self._interval is not None:
                 self.free_at = self._blocked_until = now + self._belief
-            return Change.RESTARTED
+            return NodeChange.RESTARTED
         self.without_content = False
         if self._interval is None:
             self._interval = 0.0
@@ -120,9 +120,9 @@ class Node:
         if state is NmtState.OPERATIONAL:
             waited, self.free_at = now < self.free_at, min(self.free_at, now)
             self._blocked_until = -math.inf
-            return Change.OPERATIONAL if waited or recovered else Change.NONE
+            return NodeChange.OPERATIONAL if waited or recovered else NodeChange.NONE
         self.free_at = self._blocked_until = now + self._belief
-        return Change.STILL_NOT if was_blocked else Change.NOT_OPERATIONAL
+        return NodeChange.STILL_NOT if was_blocked else NodeChange.NOT_OPERATIONAL
 
     def take_empty_heartbeat(self, report: Reporter, now: float) -> None:
         """Take a heartbeat without content, and tell the first."""
@@ -156,12 +156,12 @@ class Node:
             lasts = self.emergency is not None
             report.note(Noted(text, warning=lasts, new=lasts))
 
-    def handle_timer(self, now: float) -> Change:
+    def handle_timer(self, now: float) -> NodeChange:
         """Do what is due."""
         if now >= self.due:
             self.heartbeat_lost = True
-            return Change.HEARTBEAT_LOST
-        return Change.NONE
+            return NodeChange.HEARTBEAT_LOST
+        return NodeChange.NONE
 
     @property
     def due(self) -> float:

@@ -18,7 +18,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
-from drive_can_bridge.protocols.pairing import Asked, Requests
+from drive_can_bridge.protocols.pairing import RequestContent, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -86,14 +86,14 @@ class PkwObserver(DriveObserver):
             parts=addresses.instead_of(asked.span, self._wanted))
 
     def _meant(self, message: Message, now: float, direction: Direction,
-               title: str) -> Asked | None:
+               title: str) -> RequestContent | None:
         """Return what a message is about; None: its function does not exist, which was told."""
         meaning = message.meaning
         if meaning is None:
             self.tell(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
                       remark=f'unknown function {message.code:02X}h')
             return None
-        return Asked(Span(message.address, meaning.count), meaning.writes)
+        return RequestContent(Span(message.address, meaning.count), meaning.writes)
 
     def _refusal(self, message: Message) -> str:
         return pkw.describe(pkw.code_from_words(message.words, self._abort_order))

@@ -11,7 +11,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.requests import NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
-from drive_can_bridge.protocols.access import Access, Found, Item
+from drive_can_bridge.protocols.access import Found, Item, ParameterAccess
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     Answered, Read, Refused, Reply, Silence, Step, Write,
@@ -26,7 +26,7 @@ NOT_TOGETHER = sentences.not_in_one_frame(
 # -- parameters of users --------------------------------------------------------------------------
 
 
-class RegisterAccess(Access[Span, Step, Reply]):
+class RegisterAccess(ParameterAccess[Span, Step, Reply]):
     """Parameters by register or object; adjacent registers share a request."""
 
     def read(self, span: Span) -> Generator[Step, Reply, Found]:

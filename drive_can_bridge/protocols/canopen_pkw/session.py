@@ -49,7 +49,8 @@ from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
-from drive_can_bridge.protocols.canopen.node import Change, Node, START_PERIOD, START_SPACING
+from drive_can_bridge.protocols.canopen.node import (
+    NodeChange, START_PERIOD, START_SPACING, WatchedNode)
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
@@ -178,7 +179,7 @@ class PkwSession(Session):
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
         self._layout = Layout(options.layout)
-        self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
+        self._node = WatchedNode(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._heard = Heard('no complete round of reads')
         self._started_at = -math.inf    # by NMT, the last time
         self._transactor = MailboxTransactor(
@@ -303,21 +304,21 @@ class PkwSession(Session):
 
     def _take_heartbeat(self, state: NmtState, now: float) -> None:
         change = self._node.receive_heartbeat(state, now)
-        if self.stage is not Stage.RUNNING or change is Change.NONE:
+        if self.stage is not Stage.RUNNING or change is NodeChange.NONE:
             return
         self._exchange.slack.heartbeat(self._node.silent_for)
-        if change is Change.OPERATIONAL:
+        if change is NodeChange.OPERATIONAL:
             self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
         else:       # before a stop: the node hears that only when it was started
             self._look_for_it(now, max(now, self._started_at + START_SPACING))
-        if change is Change.RESTARTED:
+        if change is NodeChange.RESTARTED:
             self.report.note(Noted(sentences.booted()))
             self._exchange.slack.forget()
             reason = sentences.device_restarted()
             self._close(reason, Failure(
                 FailureKind.NO_ANSWER, sentences.no_answer_because(reason)), now)
             self.report.advise(sentences.restarted_waiting())
-        elif change is Change.NOT_OPERATIONAL:
+        elif change is NodeChange.NOT_OPERATIONAL:
             reason = self._node.refusal(now)
             self._close(reason, Failure(
                 FailureKind.OFFLINE, sentences.drive_offline_because(reason)), now)
@@ -435,7 +436,7 @@ class PkwSession(Session):
     def handle_timer(self, now: float) -> None:
         if self.stage is Stage.RUNNING:
             self._course.handle_timer(now)
-            if self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+            if self._node.handle_timer(now) is NodeChange.HEARTBEAT_LOST:
                 self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
             if self.control is not None and now >= self.control.due:
                 self.control.handle_timer(now)

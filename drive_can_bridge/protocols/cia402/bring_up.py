@@ -24,10 +24,10 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import Happened
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
-from drive_can_bridge.protocols.canopen.node import Node, START_PAUSE
+from drive_can_bridge.protocols.canopen.node import START_PAUSE, WatchedNode
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.beat import Beat
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
@@ -67,7 +67,7 @@ class BringUp:
     :ivar moving: in which state it was found, where nobody has seen it leave that since.
     """
 
-    def __init__(self, session: Session, node: Node, rules: DriveRules, channel: SdoChannel,
+    def __init__(self, session: Session, node: WatchedNode, rules: DriveRules, channel: SdoChannel,
                  limits: LimitCheck, beat: Beat | None) -> None:
         drive = session.configuration
         self._session, self._node, self._rules = session, node, rules
@@ -105,7 +105,7 @@ class BringUp:
     def run(self) -> Procedure:
         """Do it; returns an :class:`Outcome`."""
         self._asked_at = min(self._asked_at, self._channel.now)
-        reply = yield Ask(states.STATUS_WORD)
+        reply = yield Transfer(states.STATUS_WORD)
         if silent(reply):
             if self._node.heard_at > self._asked_at:
                 yield from self._tell_blindly(attempts=1)
@@ -128,12 +128,12 @@ class BringUp:
             return end.outcome
         return Outcome(Found.READY, status=status)
 
-    def _once_more(self) -> Generator[Ask, Reply, int]:
+    def _once_more(self) -> Generator[Transfer, TransferResult, int]:
         """Look again at what nobody looked at meanwhile; return the status word."""
         while True:
             yield from self._beats()
             status = yield from self._stand_still(
-                (yield from self._transfer(Ask(states.STATUS_WORD))))
+                (yield from self._transfer(Transfer(states.STATUS_WORD))))
             if not self._node.ceased:
                 return status
 
@@ -147,7 +147,7 @@ class BringUp:
 
     # -- the steps --------------------------------------------------------------------------------
 
-    def _stand_still(self, reply: Reply) -> Generator[Ask, Reply, int]:
+    def _stand_still(self, reply: TransferResult) -> Generator[Transfer, TransferResult, int]:
         """
         Disable a drive that is found enabled, before anything else is touched.
 
@@ -185,8 +185,8 @@ class BringUp:
                 word = wanted
                 refusal = yield from self._put(states.CONTROL_WORD, 0, word, 2)
             looks += 1
-            yield Ask(pause=LOOK_PERIOD)
-            reply = yield from self._transfer(Ask(states.STATUS_WORD))
+            yield Transfer(pause=LOOK_PERIOD)
+            reply = yield from self._transfer(Transfer(states.STATUS_WORD))
         self._found = NOTHING
         self.moving, self._disabled = None, True
         self._rules.known_disabled()
@@ -198,9 +198,9 @@ class BringUp:
         if self._beat is not None and not self._beat.opened and self._stopped_at == math.inf:
             self._stopped_at = self._channel.now
             word = DISABLE_WORDS[self._options.disable_word].to_bytes(2, 'little')
-            yield Ask(states.CONTROL_WORD, 0, word, attempts=attempts)
+            yield Transfer(states.CONTROL_WORD, 0, word, attempts=attempts)
 
-    def _brakes(self) -> Generator[Ask, Reply, bool]:
+    def _brakes(self) -> Generator[Transfer, TransferResult, bool]:
         """Tell whether a quick stop takes its course."""
         standing = self._rules.standing
         standing.quick_stop_option = yield from self._read(
@@ -241,7 +241,7 @@ class BringUp:
         else:       # it may send them as it is
             self.tell(refusal)
 
-    def _look_at_objects(self, status: Reply) -> Procedure:
+    def _look_at_objects(self, status: TransferResult) -> Procedure:
         """See that all is there that is to be mapped, and that limits are not without effect."""
         drive = self._drive
         without_effect = self._limits.found((yield from read_mapped(
@@ -254,7 +254,7 @@ class BringUp:
         if self._node.ceased:
             self._session.report.advise(sentences.no_heartbeat(self._node.heartbeat_timeout))
             while self._node.ceased:
-                yield Ask(pause=LOOK_PERIOD)
+                yield Transfer(pause=LOOK_PERIOD)
 
     def _start(self) -> Procedure:
         """Have the node take PDOs, or wait until somebody else does."""
@@ -263,21 +263,21 @@ class BringUp:
         if self._options.nmt_start:
             self._nmt(NmtCommand.START)
             self.started_at = self._channel.now
-            yield Ask(pause=START_PAUSE)
+            yield Transfer(pause=START_PAUSE)
             yield from self._becomes_operational()
         elif self._waits_for_start and self._node.state is not None:
             self._session.report.advise(sentences.node_state(self._node.state.text))
             while self._waits_for_start:
-                yield Ask(pause=LOOK_PERIOD)
+                yield Transfer(pause=LOOK_PERIOD)
 
     def _sync_begins(self, beat: Beat) -> Procedure:
         """Wait until there is SYNC: a drive that watches it needs it when it is started."""
         while not beat.opened:
             self._session.report.advise(sentences.sync_not_begun())
-            yield Ask(pause=LOOK_PERIOD)
+            yield Transfer(pause=LOOK_PERIOD)
         pause = beat.before_start(self._channel.now) if self._options.nmt_start else 0.0
         if pause:
-            yield Ask(pause=pause)
+            yield Transfer(pause=pause)
 
     def _becomes_operational(self) -> Procedure:
         """Wait for what shows that the node is operational; for a heartbeat, if it sends them."""
@@ -294,7 +294,7 @@ class BringUp:
             if now >= until:
                 raise End(Outcome(Found.SILENT, sentences.node_state(
                     (said or NmtState.PRE_OPERATIONAL).text)))
-            yield Ask(pause=LOOK_PERIOD)
+            yield Transfer(pause=LOOK_PERIOD)
 
     def starting(self, now: float) -> bool:
         """Tell whether the node may still be on its way to operational."""
@@ -330,7 +330,7 @@ class BringUp:
             if setpoints.known:
                 return
             self._session.report.advise(setpoints.untold_text)
-            yield Ask(pause=5 * LOOK_PERIOD)
+            yield Transfer(pause=5 * LOOK_PERIOD)
 
     def _choose_mode(self) -> Procedure:
         number, name = self._mode.number, self._options.mode
@@ -366,7 +366,7 @@ class BringUp:
         elif self._options.mapping == 'configure' and self._options.heartbeat_producer > 0:
             for _ in range(_LOOKS):     # whether it may be written, a heartbeat says
                 if self._node.state is None:
-                    yield Ask(pause=self._options.heartbeat_producer / 2)
+                    yield Transfer(pause=self._options.heartbeat_producer / 2)
         if self._beat is not None:
             yield from self._sync()
         yield from self._pdos.set_up()

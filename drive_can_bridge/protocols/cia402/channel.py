@@ -30,7 +30,7 @@ _TIMED_OUT, _TOO_LONG, _BROKEN_OFF = 0x05040000, 0x05040005, 0x08000000
 
 
 @dataclass(frozen=True)
-class Ask:
+class Transfer:
     """
     A transfer.
 
@@ -50,7 +50,7 @@ class Ask:
     again: bool = False
 
 
-class Reply(NamedTuple):
+class TransferResult(NamedTuple):
     """
     What became of a transfer.
 
@@ -86,10 +86,10 @@ class Reply(NamedTuple):
         return int.from_bytes(content, 'little')
 
 
-SILENT, NOT_SENT, DONE = Reply(), Reply(sent=False), Reply(b'')
+SILENT, NOT_SENT, DONE = TransferResult(), TransferResult(sent=False), TransferResult(b'')
 
 
-class SdoTransactor(Transactor[Ask, Reply]):
+class SdoTransactor(Transactor[Transfer, TransferResult]):
     """
     Does one transfer at a time.
 
@@ -113,9 +113,9 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self._abandoned = False                     # no further one is asked for
         self._padded: bool | None = None            # four bytes answer everything
         # the last upload that nothing has answered yet, and until when something may
-        self._open_upload: tuple[Ask | None, float] = None, -math.inf
+        self._open_upload: tuple[Transfer | None, float] = None, -math.inf
 
-    def begin(self, step: Ask, now: float) -> None:
+    def begin(self, step: Transfer, now: float) -> None:
         self._collected = None
         if step.pause:
             self.silent = DONE
@@ -138,7 +138,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
             else sdo.encode_download(self._node, step.index, step.subindex, step.data)
         self._outbox.put(frame, left)
 
-    def receive(self, answer: bytes, now: float) -> Reply | bool:
+    def receive(self, answer: bytes, now: float) -> TransferResult | bool:
         found, step = self.decode(answer), self.step
         if found.kind is Kind.SEGMENT:
             return self._take_segment(found, now)
@@ -156,7 +156,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
             return self._ask_segment(now)
         self.finish()
         if found.kind is Kind.ABORT:
-            return Reply(abort=found.number)
+            return TransferResult(abort=found.number)
         if found.object == (STATUS_WORD, 0) and found.kind is Kind.UPLOADED and found.last:
             self._padded = len(found.data) > 2
         return self._answered(found.data, sized=found.last)
@@ -169,7 +169,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         """
         return sdo.decode(Direction.RESPONSE, answer, segments=self._collected is not None)
 
-    def answers(self, answer: bytes, step: Ask) -> bool:
+    def answers(self, answer: bytes, step: Transfer) -> bool:
         """
         Tell whether a response may be that to a transfer that was given up.
 
@@ -177,7 +177,7 @@ class SdoTransactor(Transactor[Ask, Reply]):
         """
         return _belongs(sdo.decode(Direction.RESPONSE, answer), step)
 
-    def _take_segment(self, found: Message, now: float) -> Reply | bool:
+    def _take_segment(self, found: Message, now: float) -> TransferResult | bool:
         if self._collected is None or found.toggle != self._toggle:
             raise RemoteProtocolError('SDO segment out of turn')
         self._collected += found.data
@@ -190,10 +190,10 @@ class SdoTransactor(Transactor[Ask, Reply]):
         self.finish()
         return self._answered(data, sized=True)
 
-    def _answered(self, data: bytes, *, sized: bool) -> Reply:
-        return Reply(data, sized=sized, padded=self._padded)
+    def _answered(self, data: bytes, *, sized: bool) -> TransferResult:
+        return TransferResult(data, sized=sized, padded=self._padded)
 
-    def _ask_segment(self, now: float) -> Reply | bool:
+    def _ask_segment(self, now: float) -> TransferResult | bool:
         if self._abandoned:
             self.forget()
             return SILENT
@@ -202,12 +202,12 @@ class SdoTransactor(Transactor[Ask, Reply]):
             Kind.SEGMENT_WANTED, None, toggle=self._toggle)))
         return True
 
-    def _give_up(self, code: int, step: Ask | None) -> None:
+    def _give_up(self, code: int, step: Transfer | None) -> None:
         if step is not None:
             self._outbox.put(sdo.request(self._node, Message(
                 Kind.ABORT, (step.index, step.subindex), number=code)))
 
-    def handle_timer(self, now: float) -> Reply | bool:
+    def handle_timer(self, now: float) -> TransferResult | bool:
         if self._collected is not None and self.busy and now >= self.deadline:
             self._give_up(_TIMED_OUT, self.step)    # the drive waits for the next segment
         return super().handle_timer(now)
@@ -221,36 +221,36 @@ class SdoTransactor(Transactor[Ask, Reply]):
             self._give_up(_BROKEN_OFF, self.step)
         super().forget()
 
-    def attempts(self, step: Ask) -> int:
+    def attempts(self, step: Transfer) -> int:
         if step.attempts is not None or step.pause:
             return step.attempts or 1
         return self.retry.attempts if step.data is None else 1
 
-    def unanswered(self, step: Ask, reply: Reply) -> bool:
+    def unanswered(self, step: Transfer, reply: TransferResult) -> bool:
         return reply is SILENT
 
-    def again(self, step: Ask) -> bool:
+    def again(self, step: Transfer) -> bool:
         return step.again
 
-    def repeatable(self, step: Ask, *, users: bool) -> bool:
+    def repeatable(self, step: Transfer, *, users: bool) -> bool:
         return not users or step.data is None
 
-    def aside(self, is_late: Callable[[Hashable], bool]) -> Ask | None:
-        return next((Ask(*place, attempts=1, timeout=min(STOP_PATIENCE, self.retry.timeout))
+    def aside(self, is_late: Callable[[Hashable], bool]) -> Transfer | None:
+        return next((Transfer(*place, attempts=1, timeout=min(STOP_PATIENCE, self.retry.timeout))
                      for place in ASIDE if not is_late(place)), None)
 
     def abandon(self, until: float) -> None:
         self._abandoned = self.busy
         self.deadline = min(self.deadline, until)
 
-    def key(self, step: Ask) -> Hashable | None:
+    def key(self, step: Transfer) -> Hashable | None:
         return None if step.pause else (step.index, step.subindex)
 
 
-SdoChannel = Channel[Ask, Reply]
+SdoChannel = Channel[Transfer, TransferResult]
 
 
-def _belongs(found: Message, step: Ask) -> bool:
+def _belongs(found: Message, step: Transfer) -> bool:
     if step.pause:
         return False
     place = step.index, step.subindex

@@ -32,7 +32,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, place_of, STILL
 
@@ -263,8 +263,8 @@ class Homing:
                               self._written, self._now)
 
     @staticmethod
-    def _write(mode: int, attempts: int = 1) -> Generator[Ask, Reply, Sentence]:
-        reply = yield Ask(states.MODE, 0, mode.to_bytes(1, 'little'), attempts=attempts)
+    def _write(mode: int, attempts: int = 1) -> Generator[Transfer, TransferResult, Sentence]:
+        reply = yield Transfer(states.MODE, 0, mode.to_bytes(1, 'little'), attempts=attempts)
         return NOTHING if reply.data is not None else sentences.mode_refused(mode)
 
     def _written(self, failure: Sentence) -> None:
@@ -281,19 +281,19 @@ class Homing:
     def _change(self, mode: int, then: Callable[[Sentence], None]) -> None:
         step = self._step
 
-        def look() -> Generator[Ask, Reply, Sentence]:
+        def look() -> Generator[Transfer, TransferResult, Sentence]:
             if failure := (yield from self._write(mode)):
                 return failure
             until = self._channel.now + self._session.configuration.control_timeout
             while self._step is step and self._machine.operating and self._channel.now < until:
-                shown = yield Ask(states.MODE_SHOWN)
+                shown = yield Transfer(states.MODE_SHOWN)
                 if shown.abort is not None or shown.data and shown.data[0] == mode:
                     break
-                yield Ask(pause=LOOK_PERIOD)
+                yield Transfer(pause=LOOK_PERIOD)
             else:
                 return sentences.mode_refused(mode)
             if mode == states.HOMING_MODE:
-                method = (yield Ask(states.HOMING_METHOD)).data
+                method = (yield Transfer(states.HOMING_METHOD)).data
                 self._on_the_spot = method is not None and method[:1] in _ON_THE_SPOT
             return NOTHING
         # PDOs do not pass through the channel: its own time may be that of long ago

@@ -22,7 +22,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.mapped import named
 
 #: s that a drive may take to show what it was sent
@@ -124,12 +124,12 @@ class LimitCheck:
         raw = self._sent.raws[limit.place]
         return None if raw is None else limit.parameter.word_from_raw(raw)
 
-    def _look(self, limit: _Limit) -> Generator[Ask, Reply, None]:
+    def _look(self, limit: _Limit) -> Generator[Transfer, TransferResult, None]:
         """Read one until it shows what is sent, or for so long that it never will."""
         parameter, tried, until = limit.parameter, set[int](), math.inf
         length = pdo.width(parameter)
         while True:
-            reply = yield Ask(parameter.index or 0, parameter.subindex or 0, attempts=1)
+            reply = yield Transfer(parameter.index or 0, parameter.subindex or 0, attempts=1)
             now, sent = self._channel.now, self._word(limit)
             if sent is None or reply.abort is not None:
                 limit.looked_for, limit.over = sent, True
@@ -143,7 +143,7 @@ class LimitCheck:
                 if in_effect or now >= until:
                     self._judge(limit, shown, sent, in_effect=in_effect)
                     return
-            yield Ask(pause=LOOK_PERIOD)
+            yield Transfer(pause=LOOK_PERIOD)
 
     def _judge(self, limit: _Limit, shown: int, sent: int, *, in_effect: bool) -> None:
         first, limit.looked_for = limit.looked_for is None, sent

@@ -15,7 +15,7 @@ from drive_can_bridge.core.messages import Sentence, together
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects
 from drive_can_bridge.protocols.cia402.pdo import Pdo
 
@@ -25,8 +25,8 @@ def named(parameter: Parameter) -> str:
     return f'{parameter.name} ({at_object(parameter.index or 0, parameter.subindex or 0)})'
 
 
-def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: Reply,
-                ) -> Generator[Ask, Reply, dict[Parameter, int]]:
+def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: TransferResult,
+                ) -> Generator[Transfer, TransferResult, dict[Parameter, int]]:
     """
     Read all that PDOs are to carry.
 
@@ -40,7 +40,7 @@ def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: Reply,
     found: dict[Parameter, int] = {}
     missing: list[Sentence] = []
     for place, parameter in wanted.items():
-        reply = yield from objects.transfer(Ask(*place))
+        reply = yield from objects.transfer(Transfer(*place))
         length = pdo.width(parameter)
         if reply.abort in sdo.ABSENT:
             missing.append(sentences.of_object(named(parameter), sentences.no_such_object()))

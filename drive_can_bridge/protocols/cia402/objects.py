@@ -14,9 +14,9 @@ from typing import Any
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 
-Procedure = Generator[Ask, Reply, Any]
+Procedure = Generator[Transfer, TransferResult, Any]
 
 
 class Found(Enum):
@@ -70,7 +70,7 @@ class Objects:
         """The drive says that it has no such object as was asked for last."""
         return self.abort in sdo.ABSENT
 
-    def transfer(self, ask: Ask) -> Generator[Ask, Reply, Reply]:
+    def transfer(self, ask: Transfer) -> Generator[Transfer, TransferResult, TransferResult]:
         """Do one transfer. :raises End: nobody answers."""
         reply = yield ask
         if silent(reply):
@@ -79,14 +79,14 @@ class Objects:
         return reply
 
     def read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
-             ) -> Generator[Ask, Reply, 'int | None']:
+             ) -> Generator[Transfer, TransferResult, 'int | None']:
         """
         Read a number; None: the drive refuses.
 
         :param length: its bytes, where the drive does not tell, or answers with four always.
         :raises End: nobody answers.
         """
-        reply = yield from self.transfer(Ask(index, subindex))
+        reply = yield from self.transfer(Transfer(index, subindex))
         if reply.data is None:
             return None
         word = reply.word(length, signed=signed)
@@ -94,7 +94,7 @@ class Objects:
         return int.from_bytes(data, 'little', signed=signed)
 
     def put(self, index: int, subindex: int, value: int, length: int, meant: str = '',
-            ) -> Generator[Ask, Reply, Sentence]:
+            ) -> Generator[Transfer, TransferResult, Sentence]:
         """
         Write a number; return the refusal.
 
@@ -102,7 +102,7 @@ class Objects:
         :raises End: nobody answers.
         """
         data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
-        reply = yield from self.transfer(Ask(index, subindex, data, attempts=self._attempts))
+        reply = yield from self.transfer(Transfer(index, subindex, data, attempts=self._attempts))
         return NOTHING if reply.abort is None else sentences.object_refused(
             what=at_object(index, subindex), why=sdo.describe(reply.abort), meant=meant)
 
@@ -113,7 +113,7 @@ class Objects:
             raise differs(refusal)
 
 
-def silent(reply: Reply) -> bool:
+def silent(reply: TransferResult) -> bool:
     """Tell whether nobody answered."""
     return reply.data is None and reply.abort is None
 

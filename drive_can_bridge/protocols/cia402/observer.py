@@ -23,7 +23,7 @@ from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict)
 from drive_can_bridge.protocols.pairing import (
-    AnswerWatch, Asked, CYCLES_WAITED, CyclicWatch, Requests)
+    AnswerWatch, CYCLES_WAITED, CyclicWatch, RequestContent, Requests)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -156,7 +156,8 @@ class Cia402Observer(DriveObserver):
             self._take_segment(answer, now)
             return
         self._end_transfer(now)
-        asked = self._requests.about.get(place) or Asked(place, answer.kind is Said.DOWNLOADED)
+        asked = self._requests.about.get(place) or RequestContent(place,
+                                                                  answer.kind is Said.DOWNLOADED)
         self._writes = answer.kind is Said.DOWNLOADED
         if answer.kind is Said.UPLOAD_BEGUN or self._writes and self._begun == place:
             self._transfer, self._text = place, b''

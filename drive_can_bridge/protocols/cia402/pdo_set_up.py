@@ -8,7 +8,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos, same_mapping
 
@@ -57,7 +57,7 @@ class PdoSetUp:
         return (pdo.SYNCHRONOUS,) if transmit else (pdo.SYNCHRONOUS, *event)
 
     def _compare(self, wanted: Pdo, *, transmit: bool, written: bool = False,
-                 ) -> Generator[Ask, Reply, tuple[Sentence, int]]:
+                 ) -> Generator[Transfer, TransferResult, tuple[Sentence, int]]:
         """
         Return what differs, and the COB-ID as it is.
 
@@ -87,7 +87,7 @@ class PdoSetUp:
                     return _difference(at, subindex, time, value), identifier
         return NOTHING, identifier
 
-    def _other_content(self, wanted: Pdo) -> Generator[Ask, Reply, Sentence]:
+    def _other_content(self, wanted: Pdo) -> Generator[Transfer, TransferResult, Sentence]:
         """Return in what a PDO holds something else, by its meaning."""
         mapping, needed = wanted.communication + pdo.MAPPING_OFFSET, len(wanted.entries)
         count = yield from self._objects.read(mapping, 0, 1)
@@ -116,7 +116,7 @@ class PdoSetUp:
                 (pdo.EVENT_TIMER, round(1000 * self._drive.period))]
 
     def _write(self, wanted: Pdo, identifier: int, *, transmit: bool,
-               ) -> Generator[Ask, Reply, Sentence]:
+               ) -> Generator[Transfer, TransferResult, Sentence]:
         """
         Write one PDO, in the order that all devices take.
 
@@ -144,7 +144,8 @@ class PdoSetUp:
             raise differs(refusal, remedy)
         return fixed
 
-    def _map(self, wanted: Pdo, undo: list[tuple[int, int]]) -> Generator[Ask, Reply, Sentence]:
+    def _map(self, wanted: Pdo,
+             undo: list[tuple[int, int]]) -> Generator[Transfer, TransferResult, Sentence]:
         """
         Write what a PDO holds, unless it holds that: it may be fixed.
 
@@ -177,7 +178,7 @@ class PdoSetUp:
         return NOTHING
 
     def _put_entry(self, wanted: Pdo, place: int, content: int,
-                   ) -> Generator[Ask, Reply, Sentence]:
+                   ) -> Generator[Transfer, TransferResult, Sentence]:
         """Write an entry; a refusal names the parameters that were meant."""
         names = [each.name for each in wanted.parameters]
         if 0 < place <= len(names):
@@ -187,7 +188,8 @@ class PdoSetUp:
             wanted.communication + pdo.MAPPING_OFFSET, place, content, 4 if place else 1,
             ', '.join(names)))
 
-    def _pace(self, at: int, *, fixed: bool, transmit: bool) -> Generator[Ask, Reply, Sentence]:
+    def _pace(self, at: int, *, fixed: bool,
+              transmit: bool) -> Generator[Transfer, TransferResult, Sentence]:
         """Write when a PDO is sent; return the refusal of what it cannot do without."""
         types, refusal = self._types(transmit=transmit), NOTHING
         for kind in types[:1] if fixed else types:

@@ -15,10 +15,10 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, NOT_SENT, Outcome, Outcomes, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
-from drive_can_bridge.protocols.access import Access, Found, Item, OneByOne
+from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import is_map, width
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 
@@ -46,14 +46,14 @@ def refused(code: int) -> Failure:
     return requests.refused(code, sentences.refused_by_drive(code, sdo.describe(code)))
 
 
-class SdoAccess(Access[Parameter, Ask, Reply]):
+class SdoAccess(ParameterAccess[Parameter, Transfer, TransferResult]):
     """Parameters by index and sub-index, one a transfer."""
 
     def __init__(self, channel: SdoChannel, retry: RetryPolicy) -> None:
         super().__init__(channel, retry, OneByOne())
 
-    def read(self, span: Parameter) -> Generator[Ask, Reply, Found]:
-        reply = yield Ask(span.index or 0, span.subindex or 0)
+    def read(self, span: Parameter) -> Generator[Transfer, TransferResult, Found]:
+        reply = yield Transfer(span.index or 0, span.subindex or 0)
         failure = self._failure(reply)
         if failure is not None:
             return failure
@@ -63,14 +63,14 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         if span.type is ParameterType.BOOL:
             return (data[0],)
         if len(data) > wanted and reply.padded is None and reply.sized:
-            status = yield Ask(STATUS_WORD)     # is that its way with everything?
+            status = yield Transfer(STATUS_WORD)     # is that its way with everything?
             reply = reply._replace(padded=status.padded)
         word = reply.word(wanted, signed=span.type.signed)
         if word is None:
             return Failure(FailureKind.REFUSED, sentences.other_length(len(data), span.type.value))
         return (word,)
 
-    def write(self, items: Sequence[Item]) -> Generator[Ask, Reply, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Generator[Transfer, TransferResult, Outcomes]:
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
@@ -82,11 +82,12 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _write(self, parameter: Parameter, raw: int) -> Generator[Ask, Reply, Outcome]:
+    def _write(self, parameter: Parameter, raw: int) -> Generator[Transfer, TransferResult,
+                                                                  Outcome]:
         """Write one parameter; of one whose width only the drive knows, it is asked first."""
         length = width(parameter)
         if not _own_width(parameter):
-            reply = yield Ask(parameter.index or 0, parameter.subindex or 0)
+            reply = yield Transfer(parameter.index or 0, parameter.subindex or 0)
             failure = self._failure(reply)
             if failure is None:
                 length = len(reply.data or b'')
@@ -102,14 +103,15 @@ class SdoAccess(Access[Parameter, Ask, Reply]):
         timeout = self.retry.timeout
         if parameter.stores:
             timeout = max(timeout, STORE_TIMEOUT)
-        reply = yield Ask(parameter.index or 0, parameter.subindex or 0, data, timeout=timeout)
+        reply = yield Transfer(parameter.index or 0, parameter.subindex or 0, data,
+                               timeout=timeout)
         if reply.data is not None:
             return Written()
         if reply.abort is not None:
             return refused(reply.abort)
         return self.retry.unanswered(1, timeout) if reply.sent else NOT_SENT
 
-    def _failure(self, reply: Reply) -> Failure | None:
+    def _failure(self, reply: TransferResult) -> Failure | None:
         """Return why what was read is no object of one to four bytes; None: it is."""
         if reply.abort is not None:
             return refused(reply.abort)

@@ -16,8 +16,8 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
-from drive_can_bridge.protocols.canopen.node import Node
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SILENT
+from drive_can_bridge.protocols.canopen.node import WatchedNode
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, SILENT, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import width
 from drive_can_bridge.protocols.cia402.procedures import refused
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS, StopWrite
@@ -27,7 +27,7 @@ NMT_SPACING, NMT_TIME = 0.05, 1.0
 _ATTEMPTS_UNTIL_NMT = 2
 _ROUNDING = 1e-6
 
-StopProcedure = Generator[Ask, Reply, list[Sentence]]
+StopProcedure = Generator[Transfer, TransferResult, list[Sentence]]
 
 
 class SdoStop:
@@ -37,7 +37,8 @@ class SdoStop:
     :param timeout: s for each attempt.
     """
 
-    def __init__(self, session: Session, node: Node, channel: SdoChannel, timeout: float) -> None:
+    def __init__(self, session: Session, node: WatchedNode, channel: SdoChannel,
+                 timeout: float) -> None:
         self._session, self._node, self._channel = session, node, channel
         self._timeout = timeout
         self._answer_time = max(ANSWER_TIME, session.configuration.parameter_timeout)
@@ -63,9 +64,9 @@ class SdoStop:
             attempts = STOP_ATTEMPTS
             if is_word:
                 reply, attempts = yield from self._word(
-                    Ask(*place, data, attempts=1, timeout=self._timeout), unheard=unheard)
+                    Transfer(*place, data, attempts=1, timeout=self._timeout), unheard=unheard)
             else:
-                reply = yield Ask(*place, data, attempts=attempts, timeout=self._timeout)
+                reply = yield Transfer(*place, data, attempts=attempts, timeout=self._timeout)
             if reply.abort is not None:
                 failed.append(sentences.write_refused(name, refused(reply.abort).reason))
             elif not reply.sent:
@@ -76,7 +77,8 @@ class SdoStop:
                     failed.append(sentences.node_may_be_stopped())
         return failed
 
-    def _word(self, word: Ask, *, unheard: bool) -> Generator[Ask, Reply, tuple[Reply, int]]:
+    def _word(self, word: Transfer, *, unheard: bool) -> Generator[Transfer, TransferResult,
+                                                                   tuple[TransferResult, int]]:
         """Write the control word; return what became of it, and the number of attempts."""
         began, attempts = self._channel.now, 0
         waited = began if unheard else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
@@ -92,7 +94,8 @@ class SdoStop:
             if reply is not SILENT:
                 return reply, attempts
 
-    def _wake(self, word: Ask, attempts: int) -> Generator[Ask, Reply, tuple[Reply, int]]:
+    def _wake(self, word: Transfer, attempts: int) -> Generator[Transfer, TransferResult,
+                                                                tuple[TransferResult, int]]:
         """Have the node answer SDO, and write the control word right behind, until it answers."""
         until = self._channel.now + NMT_TIME - 0.5 * NMT_SPACING
         command = network.encode_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node.number)

@@ -34,18 +34,19 @@ from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
-    Change, Node, START_PAUSE, START_PERIOD, START_SPACING)
+    NodeChange, START_PAUSE, START_PERIOD, START_SPACING, WatchedNode)
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import (
     Beat, BridgeHeartbeat, EventTimer, FreeSync, smallest, Turn)
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel, SdoTransactor
+from drive_can_bridge.protocols.cia402.channel import (
+    SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
@@ -76,7 +77,7 @@ _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.M
 class Heartbeats:
     """The part of a session that sends the bridge's heartbeat, and waits for that of the node."""
 
-    def __init__(self, session: 'Cia402Session', node: Node, beat: BridgeHeartbeat | None,
+    def __init__(self, session: 'Cia402Session', node: WatchedNode, beat: BridgeHeartbeat | None,
                  ) -> None:
         self._session, self._node, self._beat = session, node, beat
 
@@ -90,7 +91,7 @@ class Heartbeats:
         stage = self._session.stage
         if stage is not Stage.IDLE:
             self.send(now)
-        if stage is Stage.RUNNING and self._node.handle_timer(now) is Change.HEARTBEAT_LOST:
+        if stage is Stage.RUNNING and self._node.handle_timer(now) is NodeChange.HEARTBEAT_LOST:
             self._session.heartbeat_lost(now)
 
     @property
@@ -144,11 +145,11 @@ class Cia402Session(Session):
                 drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
             roles=Roles(drive, controlled=True, cells=cells, maps=frozenset((MAP,)),
                         built_in=(CONTROL_PARAMETER, _MODE_PARAMETER)))
-        self._node = Node(drive.station, heartbeat_timeout=options.heartbeat_timeout)
+        self._node = WatchedNode(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._transactor = SdoTransactor(drive.station, self.outbox, self.retry, self.sent)
         self._channel: SdoChannel = Channel(self._transactor)
         self.services = DriveServices(self, SdoAccess(self._channel, self.retry))
-        self._stop: SafeStop[Ask, Reply] = SafeStop(
+        self._stop: SafeStop[Transfer, TransferResult] = SafeStop(
             self, self._channel, self._stop_by_sdo_ended, None, self._read_status,
             word=CONTROL_PARAMETER)
         self._again = StopAgain(self, self._channel, self._stop, partial(
@@ -162,7 +163,7 @@ class Cia402Session(Session):
         self._synchronous: bool = options.transmission == 'sync'
         self._beat = beat or Beat()
         self._turn = Turn(drive.period, self._beat, self) if self._synchronous else None
-        self._answers = Answers(self, silence='no complete set of PDOs',
+        self._answers = CycleAnswers(self, silence='no complete set of PDOs',
                                in_turn=not self._synchronous,
                                timer=self._turn or EventTimer(drive.period),
                                period_max=INTERPOLATION_MAX if MODES[options.mode].interpolated
@@ -517,7 +518,7 @@ class Cia402Session(Session):
         if self.stage is not Stage.RUNNING:
             return
         self._answers.slack.heartbeat(self._node.silent_for)
-        if change is Change.RESTARTED:
+        if change is NodeChange.RESTARTED:
             self.report.note(Noted(sentences.booted()))
             self._answers.slack.forget()
             reason = sentences.device_restarted()
@@ -585,10 +586,10 @@ class Cia402Session(Session):
     def _looked(self, _: None) -> None:
         self._looking = False
 
-    def _look_at_mode(self) -> Generator[Ask, Reply, None]:
+    def _look_at_mode(self) -> Generator[Transfer, TransferResult, None]:
         """Read 6061h until it shows the mode."""
         while self._rules.state is State.OPERATION_ENABLED:
-            reply = yield Ask(states.MODE_SHOWN)
+            reply = yield Transfer(states.MODE_SHOWN)
             if reply.abort in sdo.ABSENT:
                 self._bring_up.tell(sentences.mode_not_shown())
                 self._mode_shown = self._mode       # nothing says otherwise
@@ -599,17 +600,17 @@ class Cia402Session(Session):
                     self._machine.status_received(self._rules.status, self._channel.now)
                     self.control_changed(self._channel.now)
                 return
-            yield Ask(pause=LOOK_PERIOD)
+            yield Transfer(pause=LOOK_PERIOD)
 
-    def _look_at_axis(self) -> Generator[Ask, Reply, None]:
+    def _look_at_axis(self) -> Generator[Transfer, TransferResult, None]:
         """Read what samples do not say as long as it is to be known whether the axis stands."""
         while self._standing.watching and not self._standing.holds:
             yield from self._standing.look(self._channel)
-            yield Ask(pause=LOOK_PERIOD)
+            yield Transfer(pause=LOOK_PERIOD)
 
-    def _look_at_error(self) -> Generator[Ask, Reply, None]:
+    def _look_at_error(self) -> Generator[Transfer, TransferResult, None]:
         """Read 603Fh: why the drive is not enabled."""
-        reply = yield Ask(states.ERROR_CODE)
+        reply = yield Transfer(states.ERROR_CODE)
         self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')
 
     @property
@@ -738,10 +739,10 @@ class Cia402Session(Session):
         self._runs_on = bool(failed)
         return failed
 
-    def _state_in_the_end(self) -> Generator[Ask, Reply, State]:
+    def _state_in_the_end(self) -> Generator[Transfer, TransferResult, State]:
         state = State.UNKNOWN
         while True:
-            reply = yield Ask(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
+            reply = yield Transfer(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
             if reply.data is not None:
                 raw = int.from_bytes(reply.data[:2], 'little')
                 state = state_of(raw)
@@ -752,11 +753,12 @@ class Cia402Session(Session):
             if self._standing.watching:
                 yield from self._standing.look(self._channel, sampled=False)
             if self._standing.holds:
-                yield Ask(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
-            yield Ask(pause=LOOK_PERIOD)
+                yield Transfer(states.CONTROL_WORD, 0, bytes(2), timeout=self._stop.answer_time)
+            yield Transfer(pause=LOOK_PERIOD)
 
-    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Ask, Reply]:
-        reply = yield Ask(states.STATUS_WORD, timeout=timeout, attempts=1)
+    def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Transfer,
+                                                                            TransferResult]:
+        reply = yield Transfer(states.STATUS_WORD, timeout=timeout, attempts=1)
         return None if reply.data is None else int.from_bytes(reply.data, 'little')
 
     def _stop_by_sdo_ended(self) -> None:

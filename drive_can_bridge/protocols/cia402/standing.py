@@ -27,7 +27,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply, SdoChannel
+from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
 from drive_can_bridge.protocols.cia402.states import State, state_of
 
@@ -173,18 +173,19 @@ class Standing:
             elif index == self._velocity_object:
                 self._take_velocity(raw, now)
 
-    def look(self, channel: SdoChannel, *, sampled: bool = True) -> Generator[Ask, Reply, None]:
+    def look(self, channel: SdoChannel, *,
+             sampled: bool = True) -> Generator[Transfer, TransferResult, None]:
         """
         Read once what says whether the axis moves.
 
         :param sampled: what is in samples is taken from there.
         """
         if self._threshold is None:
-            reply = yield Ask(states.VELOCITY_THRESHOLD, attempts=1)
+            reply = yield Transfer(states.VELOCITY_THRESHOLD, attempts=1)
             if reply.data is not None or reply.abort is not None:   # one that is refused is 0
                 self._threshold = int.from_bytes((reply.data or b'')[:2], 'little')
         if self._velocity_object and not (sampled and self._velocity_object in self._places):
-            reply = yield Ask(self._velocity_object, attempts=1)
+            reply = yield Transfer(self._velocity_object, attempts=1)
             if reply.abort in sdo.ABSENT:
                 self._velocity_object = _INSTEAD[self._velocity_object]
             elif reply.data is None:
@@ -194,7 +195,7 @@ class Standing:
                 self._take_velocity(
                     int.from_bytes(reply.data[:length], 'little', signed=True), channel.now)
         if self._position_object and not (sampled and self._position_object in self._places):
-            reply = yield Ask(self._position_object, attempts=1)
+            reply = yield Transfer(self._position_object, attempts=1)
             if reply.abort in sdo.ABSENT:
                 self._position_object = 0
             elif reply.data is None:

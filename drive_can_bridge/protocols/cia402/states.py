@@ -19,7 +19,7 @@ Beside them bit 8 halts, and bits 4 to 6 mean something else in each mode (:data
 from dataclasses import dataclass
 from enum import Enum
 
-from drive_can_bridge.core.parameters import Access, Parameter, ParameterType
+from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
 
 CONTROL_WORD, STATUS_WORD = 0x6040, 0x6041
 MODE, MODE_SHOWN, MODES_OFFERED = 0x6060, 0x6061, 0x6502
@@ -67,10 +67,10 @@ STATUS_BITS = {
     'bit_15': 15,
 }
 STATUS_PARAMETER = Parameter(
-    name=STATUS_NAME, index=STATUS_WORD, subindex=0, access=Access.READ_ONLY,
+    name=STATUS_NAME, index=STATUS_WORD, subindex=0, access=AccessMode.READ_ONLY,
     bits=tuple(STATUS_BITS.items()), description='Status word of the drive')
 CONTROL_PARAMETER = Parameter(
-    name='control_word', index=CONTROL_WORD, subindex=0, access=Access.WRITE_ONLY,
+    name='control_word', index=CONTROL_WORD, subindex=0, access=AccessMode.WRITE_ONLY,
     description='Control word of the drive')
 
 

@@ -15,7 +15,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo, states
-from drive_can_bridge.protocols.cia402.channel import Ask, Reply
+from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
 from drive_can_bridge.protocols.cia402.pdo import request_pdos
 
@@ -82,13 +82,13 @@ class Watch:
         return NOTHING if self._objects.absent else sentences.object_refused(
             at_object(index, subindex), sdo.describe(self._objects.abort or 0))
 
-    def _guarding(self) -> Generator[Ask, Reply, Sentence]:
+    def _guarding(self) -> Generator[Transfer, TransferResult, Sentence]:
         """Name life guarding, if that is set."""
         time = (yield from self._objects.read(GUARD_TIME, 0, 2)) or 0
         factor = (yield from self._objects.read(LIFE_FACTOR, 0, 1)) or 0
         return sentences.life_guarding(time * factor) if time * factor else NOTHING
 
-    def _time_out(self) -> Generator[Ask, Reply, Sentence]:
+    def _time_out(self) -> Generator[Transfer, TransferResult, Sentence]:
         """Name the receive PDO that may be missing for a time only."""
         for each in self._received:
             time = yield from self._objects.read(each.communication, pdo.EVENT_TIMER, 2)
@@ -97,7 +97,7 @@ class Watch:
                     at_object(each.communication, pdo.EVENT_TIMER), time)
         return NOTHING
 
-    def _watchers(self) -> Generator[Ask, Reply, list[int]]:
+    def _watchers(self) -> Generator[Transfer, TransferResult, list[int]]:
         count = yield from self._objects.read(CONSUMER, 0, 1)
         if count is None:
             self._unsure = self._refused(CONSUMER)
@@ -109,7 +109,7 @@ class Watch:
             found.append(entry or 0)
         return found
 
-    def _write_watch(self, interval: float) -> Generator[Ask, Reply, 'int | None']:
+    def _write_watch(self, interval: float) -> Generator[Transfer, TransferResult, 'int | None']:
         node = self._options.bridge_node
         entries = yield from self._watchers()
         slots = [place for place, entry in enumerate(entries, 1) if entry >> 16 & 0x7F == node] + [
@@ -132,7 +132,7 @@ class Watch:
             return None
         return self.slot
 
-    def _read_watch(self, interval: float) -> Generator[Ask, Reply, 'int | None']:
+    def _read_watch(self, interval: float) -> Generator[Transfer, TransferResult, 'int | None']:
         for place, entry in enumerate((yield from self._watchers()), 1):
             if entry >> 16 & 0x7F == self._options.bridge_node and entry & 0xFFFF:
                 if entry & 0xFFFF < 2000 * interval:
@@ -147,4 +147,4 @@ class Watch:
         """Have the drive watch the bridge no more, behind an ordered stop."""
         slot, self.slot = self.slot, None
         if slot is not None:
-            yield Ask(CONSUMER, slot, bytes(4), attempts=self._attempts, timeout=timeout)
+            yield Transfer(CONSUMER, slot, bytes(4), attempts=self._attempts, timeout=timeout)

@@ -65,7 +65,7 @@ class AcyclicSide:
             codec, send=session.outbox.put, sent=SentWrites(session.sent, self.numbers),
             retry=session.retry, eeprom_gap=options.eeprom_write_gap, quarantine=quarantine)
         self.channel: AcyclicChannel = Channel(self.transactor)
-        session.services = DriveServices(session, procedures.ParameterAccess(
+        session.services = DriveServices(session, procedures.DataModelAccess(
             self.channel, session.retry, self.numbers, verify=drive.verify_writes,
             together=codec.together))
         word = control_word(drive, controlled=session.control is not None)

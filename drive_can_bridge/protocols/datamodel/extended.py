@@ -246,7 +246,7 @@ def _check_station(station: int) -> None:
         raise LocalProtocolError(f'station {station} does not fit 7 bits: 0 to {STATION_MAX}')
 
 
-class AcyclicCodec:
+class ExtendedAcyclicCodec:
     """
     The acyclic frames of one station.
 

@@ -45,7 +45,7 @@ from drive_can_bridge.core.reporter import AdviceKind
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CYCLE, Do, Happened
-from drive_can_bridge.protocols.answers import Answers
+from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended, procedures
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
@@ -78,7 +78,7 @@ class ExtendedSession(Session):
         control = None if table is None else ControlMachine(table, timeout=drive.control_timeout)
         super().__init__(drive, control, roles=Roles(
             drive, controlled=table is not None, maps=map_cells(options)))
-        self._side = AcyclicSide(self, extended.AcyclicCodec(station, strict),
+        self._side = AcyclicSide(self, extended.ExtendedAcyclicCodec(station, strict),
                                  doubt=lambda: self._answers.book.doubt())
         self._channel = self._side.channel
         self._verify: bool = options.mapping != 'assume'
@@ -96,7 +96,7 @@ class ExtendedSession(Session):
         if not self._rewrites:
             self.remedy = sentences.maps_to_correct
         self.encode_cycle = self._codec.encode_request
-        self._answers = Answers(self, silence='no cyclic response')
+        self._answers = CycleAnswers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
         self._answers.heeded = not self._verify      # otherwise the maps tell who has heard it
         self._course = Life(self._channel)

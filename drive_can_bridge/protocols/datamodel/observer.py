@@ -14,7 +14,7 @@ from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict)
 from drive_can_bridge.protocols.pairing import (
-    Asked, CYCLES_WAITED, CyclicWatch, Requests, WriteGap)
+    CYCLES_WAITED, CyclicWatch, RequestContent, Requests, WriteGap)
 from drive_can_bridge.protocols.polled_exchange import Chunk
 from drive_can_bridge.protocols.telegrams import Direction
 
@@ -62,7 +62,8 @@ class _Traffic:
 
     def answered(self, chunk: Chunk, words: Sequence[int], now: float) -> None:
         """Take the answer to a read."""
-        self._requests.answer(chunk, self._requests.about.get(chunk) or Asked(chunk), now, words)
+        self._requests.answer(chunk, self._requests.about.get(chunk) or RequestContent(chunk),
+                              now, words)
 
     def _content(self, chunk: Chunk, words: Sequence[int] | None,
                  ) -> tuple[list[Parameter], list[int]]:

@@ -18,7 +18,8 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, NOT_SENT, Outcome, Outcomes, RetryPolicy, Written)
-from drive_can_bridge.protocols.access import Access, Found, Item, ParameterPlacement, read_back
+from drive_can_bridge.protocols.access import (
+    Found, Item, ParameterAccess, ParameterPlacement, read_back)
 from drive_can_bridge.protocols.datamodel.channel import (
     AcyclicChannel, Read, Reply, Step, Words, Write)
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
@@ -106,7 +107,7 @@ def put(write: Write, *, look: bool, verify: bool = True) -> Generator[Step, Rep
     return Put(found)
 
 
-class ParameterAccess(Access[Chunk, Step, Reply]):
+class DataModelAccess(ParameterAccess[Chunk, Step, Reply]):
     """
     Parameters by number; runs of consecutive ones share a frame.
 

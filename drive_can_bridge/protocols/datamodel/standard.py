@@ -137,7 +137,7 @@ def decode_read_response(frame: Frame, count: int, *, strict: bool = False) -> t
     return _WORDS[count].unpack_from(frame.data)
 
 
-class AcyclicCodec:
+class StandardAcyclicCodec:
     """
     The frames of one station.
 

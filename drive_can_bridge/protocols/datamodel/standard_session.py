@@ -40,7 +40,7 @@ class StandardSession(Session):
         request = standard.identifier(options.request_id_base, drive.station)
         strict: bool = options.length_policy == 'strict'
         self._side = AcyclicSide(
-            self, standard.AcyclicCodec(request, strict), quarantine=options.quarantine,
+            self, standard.StandardAcyclicCodec(request, strict), quarantine=options.quarantine,
             known=self._status_known)
         self._channel = self._side.channel
         self._status_slot = self._side.status_slot

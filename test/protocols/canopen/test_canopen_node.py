@@ -7,19 +7,19 @@ import pytest
 from saying import says
 
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
-from drive_can_bridge.protocols.canopen.node import Change, Node
+from drive_can_bridge.protocols.canopen.node import NodeChange, WatchedNode
 
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = NmtState
 OVERLOAD = Emergency(0x2310, 0x02, bytes(5))
 
 
-def node(*, heartbeat_timeout: float = 0.0) -> Node:
-    made = Node(5, heartbeat_timeout=heartbeat_timeout)
+def node(*, heartbeat_timeout: float = 0.0) -> WatchedNode:
+    made = WatchedNode(5, heartbeat_timeout=heartbeat_timeout)
     made.begin(10.0)
     return made
 
 
-def hears(watched: Node, state: NmtState, now: float) -> Change:
+def hears(watched: WatchedNode, state: NmtState, now: float) -> NodeChange:
     return watched.receive_heartbeat(state, now)
 
 
@@ -35,14 +35,14 @@ def test_a_node_that_is_started_is_free_a_moment_later() -> None:
     watched = node()
     watched.started(10.0)
     assert watched.free_at == pytest.approx(10.05)
-    assert hears(watched, PRE_OPERATIONAL, 10.02) is Change.NOT_OPERATIONAL
+    assert hears(watched, PRE_OPERATIONAL, 10.02) is NodeChange.NOT_OPERATIONAL
     watched.started(10.1)
     assert watched.free_at == pytest.approx(11.02), 'its heartbeats know better'
 
 
 def test_boot_up() -> None:
     watched = node()
-    assert hears(watched, BOOT_UP, 10.5) is Change.RESTARTED
+    assert hears(watched, BOOT_UP, 10.5) is NodeChange.RESTARTED
     assert watched.facts()['nmt_state'] == 'pre-operational'
     assert watched.free_at == pytest.approx(10.55), 'no heartbeats: nobody will ever say so'
     assert watched.refusal(10.5) == ''
@@ -52,24 +52,24 @@ def test_boot_up() -> None:
     (PRE_OPERATIONAL, 'node is pre-operational'), (STOPPED, 'node is stopped')])
 def test_heartbeats_say_when_pdos_may_be_sent(state: NmtState, text: str) -> None:
     watched = node()
-    assert hears(watched, state, 10.2) is Change.NOT_OPERATIONAL
+    assert hears(watched, state, 10.2) is NodeChange.NOT_OPERATIONAL
     assert watched.refusal(10.2) == text
     assert watched.free_at == pytest.approx(11.2)
-    assert hears(watched, state, 10.35) is Change.STILL_NOT
+    assert hears(watched, state, 10.35) is NodeChange.STILL_NOT
     assert watched.free_at == pytest.approx(11.35)
-    assert hears(watched, OPERATIONAL, 10.4) is Change.OPERATIONAL
+    assert hears(watched, OPERATIONAL, 10.4) is NodeChange.OPERATIONAL
     assert watched.free_at == 10.4
     assert watched.refusal(10.4) == ''
-    assert hears(watched, OPERATIONAL, 10.5) is Change.NONE
+    assert hears(watched, OPERATIONAL, 10.5) is NodeChange.NONE
 
 
 def test_boot_up_of_a_node_with_heartbeats_waits_for_operational() -> None:
     watched = node()
     hears(watched, OPERATIONAL, 10.1)
-    assert hears(watched, BOOT_UP, 20.0) is Change.RESTARTED
+    assert hears(watched, BOOT_UP, 20.0) is NodeChange.RESTARTED
     assert watched.free_at == pytest.approx(21.0)
     assert watched.refusal(20.5) == says('node_state', state='pre-operational')
-    assert hears(watched, OPERATIONAL, 20.1) is Change.OPERATIONAL
+    assert hears(watched, OPERATIONAL, 20.1) is NodeChange.OPERATIONAL
     assert watched.free_at == 20.1
 
 
@@ -90,7 +90,7 @@ def test_pause_longer_than_any_interval_is_none() -> None:
 
 
 def test_what_was_heard_before_the_beginning_still_counts() -> None:
-    watched = Node(5, heartbeat_timeout=0.0)
+    watched = WatchedNode(5, heartbeat_timeout=0.0)
     hears(watched, PRE_OPERATIONAL, 11.0)
     watched.begin(11.5)
     assert watched.free_at == pytest.approx(12.0)
@@ -103,13 +103,13 @@ def test_heartbeat_time_out() -> None:
     assert watched.due == math.inf, 'watched from the first one'
     hears(watched, OPERATIONAL, 11.0)
     assert watched.due == 11.5
-    assert watched.handle_timer(11.499) is Change.NONE
+    assert watched.handle_timer(11.499) is NodeChange.NONE
     hears(watched, OPERATIONAL, 11.4)
-    assert watched.handle_timer(11.5) is Change.NONE
-    assert watched.handle_timer(11.9) is Change.HEARTBEAT_LOST
+    assert watched.handle_timer(11.5) is NodeChange.NONE
+    assert watched.handle_timer(11.9) is NodeChange.HEARTBEAT_LOST
     assert watched.heartbeat_lost
-    assert watched.handle_timer(12.5) is Change.NONE, 'told once'
-    assert hears(watched, OPERATIONAL, 13.0) is Change.OPERATIONAL
+    assert watched.handle_timer(12.5) is NodeChange.NONE, 'told once'
+    assert hears(watched, OPERATIONAL, 13.0) is NodeChange.OPERATIONAL
     assert not watched.heartbeat_lost
     assert watched.due == 13.5
 
@@ -117,22 +117,22 @@ def test_heartbeat_time_out() -> None:
 def test_heartbeats_are_watched_after_boot_up_too() -> None:
     watched = node(heartbeat_timeout=0.5)
     hears(watched, BOOT_UP, 11.0)
-    assert watched.handle_timer(11.5) is Change.HEARTBEAT_LOST
+    assert watched.handle_timer(11.5) is NodeChange.HEARTBEAT_LOST
 
 
 def test_heartbeats_are_not_watched_by_default() -> None:
     watched = node()
     hears(watched, OPERATIONAL, 11.0)
     assert watched.due == math.inf
-    assert watched.handle_timer(1000.0) is Change.NONE
+    assert watched.handle_timer(1000.0) is NodeChange.NONE
 
 
 def test_no_heartbeat_was_due_while_nobody_listened() -> None:
     watched = node(heartbeat_timeout=0.5)
     hears(watched, OPERATIONAL, 11.0)
     watched.begin(20.0)
-    assert watched.handle_timer(20.4) is Change.NONE
-    assert watched.handle_timer(20.5) is Change.HEARTBEAT_LOST
+    assert watched.handle_timer(20.4) is NodeChange.NONE
+    assert watched.handle_timer(20.5) is NodeChange.HEARTBEAT_LOST
 
 
 #: CiA 301: classes of emergency codes

@@ -14,7 +14,7 @@ from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
-from drive_can_bridge.core.parameters import Access
+from drive_can_bridge.core.parameters import AccessMode
 from drive_can_bridge.core.setpoints import CommandOutcome
 
 
@@ -104,7 +104,7 @@ def test_lost_enable_is_written_again_when_it_is_not_there() -> None:
 
 
 def test_word_that_cannot_be_read_back_is_never_repeated() -> None:
-    secret = replace(WORD, access=Access.WRITE_ONLY)
+    secret = replace(WORD, access=AccessMode.WRITE_ONLY)
     talk = ready(parameter_timeout=0.1, table=[
         secret if entry is WORD else entry for entry in TABLE])
     assert talk.asks(ControlAction.ENABLE, 10.075) == [ENABLE_0]
