@@ -3,13 +3,13 @@
 The pictures of README and docs, in one style: ``make pictures``.
 
 Each is a function in ``PICTURES`` that writes one file. Nothing is drawn by hand: the live view is
-that of a demo which really runs, exported by rich, and so is the diagram of the architecture; the
-arm is a record of simulated axes. The panel is seen in a real browser; where none is installed its
-pictures are left out.
+that of a demo which really runs, the arm and the steps are records of simulated axes. The panel is
+seen in a real browser; where none is installed its pictures are left out.
 """
 
 import argparse
 from collections.abc import Callable, Sequence
+import json
 import os
 from pathlib import Path
 import re
@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from xml.sax.saxutils import escape
 
 # before rclpy is imported: nothing leaves this machine, nor meets a demo that runs here
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -26,28 +27,35 @@ os.environ.setdefault('ROS_DOMAIN_ID', '96')
 
 import panel_pictures
 from panel_pictures import care
-from rich import box
-from rich.console import Console, Group, RenderableType
-from rich.panel import Panel
-from rich.table import Table
-from rich.text import Text
+from rich.cells import cell_len
+from rich.console import Console, RenderableType
+from rich.style import Style
+from rich.terminal_theme import SVG_EXPORT_THEME
 
+from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.ros.monitor.client import MonitorClient
+from drive_can_bridge.trace.files import read_records
+from drive_can_bridge.trace.sinks import Plotter
+from drive_can_bridge.trace.tracer import Channels, Tracer
 from drive_can_bridge.view.live import Choice, page, Setting
 from drive_can_bridge.view.parts import TREND_SPAN
 
 HERE = Path(__file__).resolve().parent
 #: columns and lines of the live view
-SIZE = (138, 33)
-#: lines of the architecture's boxes
-_HEIGHT = 20
+SIZE = (150, 29)
 #: s that the demo may take to come up
 _START_TIMEOUT = 120.0
 _FRAME_PERIOD = 0.25
-#: rich's SVG wants a font from a server; a picture is complete in itself
-_SUPERFLUOUS = re.compile(r'@font-face \{.*?\}\s*|<!--.*?-->\s*', re.DOTALL)
 _FONTS = 'Fira Code, DejaVu Sans Mono, Menlo, Consolas, monospace'
+#: of a character: width and height; and of letters
+_CELL, _SIZE = (12.2, 24.4), 20
+#: left, right and below; above
+_EDGE, _TOP = 10, 42
+_GROUND, _INK = '#292929', '#c5c8c6'
+_BLOCKS = '▁▂▃▄▅▆▇█'
+#: characters that fonts show in different widths, if at all
+_DRAWN = f'─│╭╮╰╯░●○▸{_BLOCKS}'
 
 
 def live_view(path: Path, *options: str) -> None:
@@ -105,50 +113,17 @@ def _watch(demo: 'subprocess.Popen[bytes]') -> tuple[RenderableType, bool]:
             not any(drive.missed for drive in snapshot.drives))
 
 
-def architecture(path: Path) -> None:
-    """Draw what runs in which process, and what goes from where to where."""
-    graph = _lines(['', '~/command/…', '~/joint_command', '', '~/<parameter>', '~/response',
-                    '~/request', '~/online', '', 'ros2 param …', '~/enable …', '',
-                    '/diagnostics', '/rosout'])
-    ros = _lines(['', 'command intake', '', '', 'sample publisher', '', '', '', '',
-                  'parameter services', 'control services', '', 'diagnostics', 'lifecycle'])
-    session = Panel(_lines(['protocols/ + core/', 'no clock, no thread', '', 'setpoints, arming',
-                            'control word', 'cyclic exchange', 'acyclic channel', 'map check', '',
-                            'codec: bytes ⇄ values'], 'center'),
-                    title='session of a drive', border_style='cyan', box=box.ROUNDED)
-    exchange = Group(_lines(['timer thread', 'one lock per bus'], 'center', 'bright_black'),
-                     session)
-    transport = _lines(['reader thread', '', 'python-can', '', '', 'acceptance filters',
-                        'reconnection', 'error frames', '', '', 'serial writer'], 'center')
-    can = _lines(['', 'drive, station 1', '', 'drive, station 2', '', '…', '', '', 'or',
-                  'drive_can simulate', 'over a', 'pseudo-terminal'], 'center')
-    inside = _row([
-        _titled('ros/', ros, 22), _arrows({1: '→', 4: '←', 9: '⇄', 12: '←'}),
-        _titled('exchange/', exchange, 30), _arrows({3: '→', 6: '←'}),
-        _titled('transport/', transport, 22)])
-    bridge = Panel(inside, title='one process: drive_can_bridge', title_align='left',
-                   border_style='bright_black', box=box.ROUNDED, width=82, height=_HEIGHT)
-    picture = _row([
-        _titled('ROS graph', graph, 19, 'green', _HEIGHT),
-        _arrows({2: '→', 5: '←', 10: '⇄', 13: '←'}), bridge, _arrows({4: '→', 7: '←'}),
-        _titled('CAN', can, 22, 'yellow', _HEIGHT)])
-    clients = Panel(_lines(['drive_can monitor, read, write, backup … and your own nodes: '
-                            'processes of their own, clients of the graph like any other']),
-                    border_style='green', box=box.ROUNDED, width=127)
-    _save(Group(picture, clients), path, 'drive_can_bridge: what goes where', 128, 23)
-
-
 def arm(path: Path) -> None:
     """Draw what an axis does, and is told, through all that may come between."""
     with tempfile.TemporaryDirectory() as folder:
-        trace = Path(folder, 'arm.log')
-        _record('ros2_control_run.py', trace)
-        subprocess.run(
-            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', trace, '--params-file',
-             HERE.parent / 'config' / 'ros2_control' / 'arm.yaml', '--plot', path,
-             *(f'shoulder.{name}' for name in ('position_setpoint', 'actual_position',
-                                               'status_word'))],
-            check=True)
+        trace, notes = Path(folder, 'arm.log'), Path(folder, 'notes.json')
+        _record('ros2_control_run.py', trace, notes)
+        _plot(trace, HERE.parent / 'config' / 'ros2_control' / 'arm.yaml', path,
+              'One axis of three under a trajectory controller: after each loss it begins where '
+              'it stands',
+              [f'shoulder.{name}' for name in ('position_setpoint', 'actual_position',
+                                               'status_word')],
+              [(at, text) for at, text in json.loads(notes.read_text(encoding='utf-8'))])
 
 
 def step_response(path: Path) -> None:
@@ -156,12 +131,24 @@ def step_response(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         trace, file = Path(folder, 'steps.log'), Path(folder, 'steps.yaml')
         _record('step_response_run.py', trace, file)
-        subprocess.run(
-            [sys.executable, '-m', 'drive_can_bridge.cli.main', 'decode', trace, '--params-file',
-             file, '--plot', path,
-             *(f'conveyor.{name}' for name in ('speed_setpoint', 'actual_speed',
-                                               'motor_current'))],
-            check=True)
+        _plot(trace, file, path,
+              'Steps of the setpoint, as a simulated conveyor follows them on its ramp; 100 '
+              'exchanges a second',
+              [f'conveyor.{name}' for name in ('speed_setpoint', 'actual_speed',
+                                               'motor_current')])
+
+
+def _plot(trace: Path, file: Path, path: Path, title: str, values: Sequence[str],
+          notes: Sequence[tuple[float, str]] = ()) -> None:
+    """Draw what ``drive_can decode --plot`` draws, under a title."""
+    configuration = configuration_from_file(file)
+    plotter = Plotter(configuration, values, [])
+    channels = Channels(list(configuration.buses.values()), {}, print)
+    tracer = Tracer(configuration, plotter, channels)
+    for record in read_records(trace, print):
+        tracer.take(record)
+    tracer.finish()
+    plotter.draw(str(path), title, notes)
 
 
 def _record(script: str, *files: Path) -> None:
@@ -174,48 +161,104 @@ def _record(script: str, *files: Path) -> None:
     raise SystemExit(f'pictures: {script} failed three times')
 
 
-def _lines(lines: Sequence[str], justify: str = 'left', style: str = '') -> Text:
-    return Text('\n'.join(lines), justify=justify, style=style)  # type: ignore[arg-type]
-
-
-def _titled(title: str, body: RenderableType, width: int, style: str = 'white',
-            height: int = _HEIGHT - 2) -> Panel:
-    return Panel(body, title=Text(title, style='bold'), width=width, height=height,
-                 border_style=style, box=box.ROUNDED)
-
-
-def _arrows(rows: dict[int, str]) -> Text:
-    heads = {'→': '─▶', '←': '◀─', '⇄': '◀▶'}
-    return Text('\n'.join(heads[rows[row]] if row in rows else '  ' for row in range(-1, 16)),
-                style='bold cyan')
-
-
-def _row(cells: Sequence[RenderableType]) -> Table:
-    grid = Table.grid(padding=0)
-    for _ in cells:
-        grid.add_column(no_wrap=True)
-    grid.add_row(*cells)
-    return grid
-
-
 def _save(body: RenderableType, path: Path, title: str, width: int, height: int) -> None:
-    """Export something as rich shows it in a terminal of that size."""
+    """
+    Export something as a terminal of that size shows it.
+
+    Each word has a place of its own, and lines, bars and lamps are drawn: with whatever font, and
+    in a renderer that does not stretch text, nothing shifts (a line that is one text does).
+    """
     with open(os.devnull, 'w', encoding='utf-8') as nowhere:
-        console = Console(record=True, width=width, height=height, force_terminal=True,
+        console = Console(width=width, height=height, force_terminal=True,
                           color_system='truecolor', file=nowhere)
-        console.print(body, height=height)
-        svg = console.export_svg(title=title, unique_id=path.stem)
-    svg = _SUPERFLUOUS.sub('', svg).replace('font-family: Fira Code, monospace',
-                                          f'font-family: {_FONTS}')
-    path.write_text('\n'.join(line.rstrip() for line in svg.splitlines()) + '\n',
-                    encoding='utf-8')
+        options = console.options.update(width=width, height=height)
+        lines = console.render_lines(body, options)[:height]
+    parts: list[str] = []
+    for row, line in enumerate(lines):
+        column = 0
+        for segment in line:
+            parts += _segment(segment.text, segment.style or Style(), column, row)
+            column += cell_len(segment.text)
+    across, down = 2 * _EDGE + width * _CELL[0], _TOP + _EDGE + height * _CELL[1]
+    lamps = ''.join(f'<circle cx="{22 + 22 * place}" cy="20" r="7" fill="{colour}"/>'
+                    for place, colour in enumerate(('#ff5f57', '#febc2e', '#28c840')))
+    path.write_text('\n'.join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {across:g} {down:g}" '
+        f'font-family="{_FONTS}" font-size="{_SIZE}" role="img">', f'<title>{title}</title>',
+        f'<rect width="{across:g}" height="{down:g}" rx="8" fill="{_GROUND}"/>', lamps,
+        f'<text x="{across / 2:g}" y="26" text-anchor="middle" fill="{_INK}" '
+        f'font-family="Arial, Helvetica, sans-serif" font-weight="bold">{title}</text>',
+        f'<g transform="translate({_EDGE} {_TOP})" xml:space="preserve">', *parts,
+        '</g>', '</svg>', '']), encoding='utf-8')
+
+
+def _segment(text: str, style: Style, column: int, row: int) -> list[str]:
+    """Draw what stands side by side in one style."""
+    ink = _INK
+    if style.color is not None:
+        ink = style.color.get_truecolor(SVG_EXPORT_THEME).hex
+    if style.dim:
+        ink = '#808280'
+    weight = ' font-weight="bold"' if style.bold else ''
+    wide, high = _CELL
+    parts = []
+    for found in re.finditer(f'[{_DRAWN}]+|[^ {_DRAWN}]+', text):
+        left, top = (column + cell_len(text[:found.start()])) * wide, row * high
+        if found[0][0] in _DRAWN:
+            for place, character in enumerate(found[0]):
+                parts.append(_drawn(character, left + place * wide, top, ink))
+            continue
+        length = cell_len(found[0]) * wide
+        parts.append(f'<text x="{left:g}" y="{top + 0.75 * high:g}" textLength="{length:g}" '
+                     f'lengthAdjust="spacingAndGlyphs" fill="{ink}"{weight}>'
+                     f'{escape(found[0])}</text>')
+    return _joined(parts)
+
+
+def _drawn(character: str, left: float, top: float, ink: str) -> str:
+    """Draw a character that is a shape."""
+    wide, high = _CELL
+    middle, centre, right, bottom = left + wide / 2, top + high / 2, left + wide, top + high
+    line = {
+        '─': f'M{left:g} {centre:g}H{right:g}', '│': f'M{middle:g} {top:g}V{bottom:g}',
+        '╭': f'M{middle:g} {bottom:g}V{centre + 5:g}Q{middle:g} {centre:g} {right:g} {centre:g}',
+        '╮': f'M{middle:g} {bottom:g}V{centre + 5:g}Q{middle:g} {centre:g} {left:g} {centre:g}',
+        '╰': f'M{middle:g} {top:g}V{centre - 5:g}Q{middle:g} {centre:g} {right:g} {centre:g}',
+        '╯': f'M{middle:g} {top:g}V{centre - 5:g}Q{middle:g} {centre:g} {left:g} {centre:g}',
+    }.get(character)
+    if line:
+        return f'<path d="{line}" fill="none" stroke="{ink}"/>'
+    if character in _BLOCKS:
+        tall = high * (_BLOCKS.index(character) + 1) / 8
+        return f'<path d="M{left:g} {bottom:g}v{-tall:g}h{wide:g}v{tall:g}z" fill="{ink}"/>'
+    if character == '░':
+        return (f'<path d="M{left:g} {bottom:g}v{-high:g}h{wide:g}v{high:g}z" fill="{ink}" '
+                'fill-opacity="0.25"/>')
+    if character == '▸':
+        return f'<path d="M{left + 3:g} {centre - 5:g}l7 5l-7 5z" fill="{ink}"/>'
+    filled = ink if character == '●' else 'none'
+    return f'<circle cx="{middle:g}" cy="{centre:g}" r="4.5" fill="{filled}" stroke="{ink}"/>'
+
+
+def _joined(parts: Sequence[str]) -> list[str]:
+    """Make one path of those that follow each other and look the same."""
+    found: list[str] = []
+    for part in parts:
+        path, end = re.fullmatch('<path d="(.*?)"(.*)', part), ''
+        if path is not None and found:
+            before = re.fullmatch('<path d="(.*?)"(.*)', found[-1])
+            end = before[2] if before else ''
+            if before is not None and end == path[2]:
+                found[-1] = f'<path d="{before[1]}{path[1]}"{end}'
+                continue
+        found.append(part)
+    return found
 
 
 #: file -> what writes it
 PICTURES: dict[str, Callable[[Path], None]] = {
     'monitor.svg': live_view,
     'monitor_fault.svg': live_view_of_a_fault,
-    'architecture.svg': architecture,
     'ros2_control.png': arm,
     'step_response.png': step_response,
     **panel_pictures.PICTURES,

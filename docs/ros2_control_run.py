@@ -2,13 +2,16 @@
 """
 What docs/ros2_control.md shows: the arm of the example, with everything that may come between.
 
-usage: ros2_control_run.py TRACE
+usage: ros2_control_run.py TRACE [NOTES]
+
+NOTES: what happened when, ``[[seconds since 1970, text], …]``.
 
 Bridge and simulated drives share a bus that is in this process, and ``drive_can record`` listens
 to it; the controllers are those of ``test/ros2_control_twin.py``.
 """
 
 from collections.abc import Callable
+import json
 import math
 import os
 from pathlib import Path
@@ -49,10 +52,15 @@ class Arm:
 
     def __init__(self, node: Any, executor: SingleThreadedExecutor) -> None:
         self._node, self._executor = node, executor
+        self.notes: list[tuple[float, str]] = []
         self.hardware = HardwareTwin(node, System(FOLDER / 'arm.urdf'))
         text = (FOLDER / 'arm_controllers.yaml').read_text(encoding='utf-8')
         self.controller = TrajectoryTwin(self.hardware, Constraints.of(
             yaml.safe_load(text)['arm_controller']['ros__parameters']))
+
+    def note(self, text: str) -> None:
+        """Say what happens now."""
+        self.notes.append((time.time(), text))
 
     def pass_time(self, seconds: float) -> None:
         """Run the controllers for some time."""
@@ -103,46 +111,61 @@ def play(arm: Arm, one: Bridge) -> None:
     """Let happen what may happen."""
     arm.wait(lambda: all(math.isfinite(arm.hardware.state[joint, 'position']) for joint in HOME))
     arm.pass_time(0.5)
+    arm.note('enable')
     arm.enable(*AXES)
     arm.controller.activate()
     arm.pass_time(0.5)
+    arm.note('trajectory')
     arm.go(OUT, 2.0)
     arm.pass_time(2.5)
+    arm.note('another')
     arm.go(HOME, 3.0)                   # stopped on the way
     arm.pass_time(1.0)
+    arm.note('disable')
     arm.enable(*AXES, wanted=False)
     arm.aborted()
     arm.pass_time(0.5)
+    arm.note('enable')
     arm.enable(*AXES)
     arm.pass_time(0.8)
+    arm.note('trajectory')
     arm.go(OUT, 2.0)                    # a fault on the way
     arm.pass_time(0.7)
+    arm.note('fault')
     one.played['shoulder'].fault('trip')
     arm.aborted()
     arm.pass_time(0.7)
+    arm.note('reset, enable')
     arm.call('/shoulder/reset_fault', Trigger)
     arm.enable('shoulder')
     arm.pass_time(0.6)
+    arm.note('trajectory')
     arm.go(HOME, 2.0)                   # a lost drive on the way
     arm.pass_time(0.7)
+    arm.note('power lost')
     one.played['shoulder'].fault('power_cut=1')
     arm.wait(lambda: not arm.online('shoulder_joint'))
+    arm.note('offline')
     arm.wait(lambda: arm.online('shoulder_joint'))
     arm.pass_time(0.3)
+    arm.note('enable')
     arm.enable('shoulder')
     arm.pass_time(0.6)
+    arm.note('trajectory')
     arm.go(HOME, 2.0)
     arm.pass_time(2.5)
 
 
-def control(one: Bridge, failures: list[BaseException]) -> None:
+def control(one: Bridge, failures: list[BaseException], notes: list[tuple[float, str]]) -> None:
     """Play it all, and end the recording."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node('controllers')
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        play(Arm(node, executor), one)
+        arm = Arm(node, executor)
+        play(arm, one)
+        notes += arm.notes
     except BaseException as error:  # noqa: BLE001  outermost loop of a thread
         failures.append(error)
     finally:
@@ -161,7 +184,7 @@ def parameters() -> dict[str, Any]:
     return content
 
 
-def record(trace: Path) -> None:
+def record(trace: Path, told: Path | None = None) -> None:
     """Play it all, and record the bus."""
     with tempfile.TemporaryDirectory() as folder:
         one = Bridge(Path(folder), parameters(),
@@ -170,9 +193,10 @@ def record(trace: Path) -> None:
                                 '--log-level', 'error'),
                      mechanics=dict.fromkeys(AXES, Mechanics(load=0.3, noise=1, brake=1)))
         failures: list[BaseException] = []
+        notes: list[tuple[float, str]] = []
         try:
             one.begin()
-            controllers = threading.Thread(target=control, args=(one, failures))
+            controllers = threading.Thread(target=control, args=(one, failures, notes))
             # the recording ends by it, also where whoever started us had it ignored (nohup)
             signal.signal(signal.SIGINT, signal.default_int_handler)
             controllers.start()
@@ -185,7 +209,9 @@ def record(trace: Path) -> None:
         raise SystemExit(failures[0] if failures else code)
     if lost != {**dict.fromkeys(AXES, 0), 'shoulder': 1}:
         raise SystemExit(f'ros2_control: this machine is too busy, drives were lost: {lost}')
+    if told is not None:
+        told.write_text(json.dumps(notes), encoding='utf-8')
 
 
 if __name__ == '__main__':
-    record(Path(sys.argv[1]))
+    record(*map(Path, sys.argv[1:]))

@@ -1118,6 +1118,10 @@ no_sample = Text(
     'offline: no sample for {seconds:.0f} s: is its bridge {bridge} still running?',
     do='see whether that bridge runs')
 bridge_silent = Text('its bridge {bridge} is silent', do='see whether that bridge runs')
+drive_of_silent_bridge = Text(
+    'its bridge is silent since {since}',
+    do='make sure that the drive stands still, by other means if need be; see whether its bridge '
+       'runs')
 stopped_answering = Text('offline: it stopped answering', do='wait for what diagnostics say of it')
 bridge_silent_since = Text(
     'bridge {name}silent since {since}: its drives may still be running; a stop may not reach '

@@ -115,7 +115,7 @@ def facts_in(constraints: str) -> dict[str, str]:
     except ValueError:
         return {}
     pairs = (word.partition('=') for word in words)
-    return {printable(key): printable(value, None if key == 'values' else TEXT_MAX)
+    return {printable(key): printable(value, None if key in ('values', 'bits') else TEXT_MAX)
             for key, separator, value in pairs if separator}
 
 

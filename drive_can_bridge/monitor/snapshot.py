@@ -180,6 +180,8 @@ class Rate:
 
 
 Points = tuple[tuple[float, float], ...]
+#: what families call a bit that has no meaning of its own
+_UNNAMED = re.compile(r'bit_([0-9]+)')
 #: state of a bus whose bridge is silent
 UNKNOWN = 'unknown'
 
@@ -236,6 +238,21 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
+class Bit:
+    """
+    One bit of a word.
+
+    :param number: None: nobody has told.
+    :param named: it has a meaning; others are called by their number.
+    """
+
+    name: str
+    state: bool
+    number: int | None = None
+    named: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class DriveSnapshot:
     """
     One drive.
@@ -281,6 +298,18 @@ class DriveSnapshot:
     parameters: tuple[ParameterInfo, ...] = ()
     readings: Mapping[str, Reading] = field(default_factory=dict)
     silent: bool = False
+
+    def bits_of(self, parameter: str) -> list['Bit']:
+        """Return the bits of a word by number; those whose number nobody knows behind them."""
+        info = next((info for info in self.parameters if info.name == parameter), None)
+        numbers = info.bits if info is not None else {}
+        found = []
+        for name, state in self.bits.get(parameter, {}).items():
+            unnamed = _UNNAMED.fullmatch(name)
+            number = numbers.get(name, int(unnamed[1]) if unnamed else None)
+            found.append(Bit(name, state, number, named=unnamed is None))
+        return sorted(found, key=lambda bit: (
+            math.inf if bit.number is None else bit.number, bit.name))
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,11 @@ class ParameterInfo:
         return dict(taken_apart(self.facts.get('values', '')))
 
     @property
+    def bits(self) -> dict[str, int]:
+        """Numbers of bits, of those that have a name."""
+        return {name: number for number, name in taken_apart(self.facts.get('bits', ''))}
+
+    @property
     def readable(self) -> bool:
         """Can be read by a service."""
         return self.facts.get('access') != 'wo'

@@ -15,13 +15,14 @@ from nicegui import background_tasks, ui
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import ValueKind
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Times
+from drive_can_bridge.core.text import counted
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, Times
 from drive_can_bridge.monitor.summary import tone_of
 from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.access import Role
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
+    advice, box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
     stop_buttons, Values, words,
 )
 
@@ -331,7 +332,7 @@ class _Content:
                         words('Setpoints as sent, and actual values', 'dim')
                         self._values = Values()
                         words('Bits', 'dim')
-                        self._bits = Changing(box('lamps'), _make_lamps)
+                        self._bits = Changing(box('words'), _make_lamps)
                     with box('section'):
                         self._chart = Chart(view, drive)
             with ui.tab_panel('Parameters'):
@@ -351,20 +352,14 @@ class _Content:
         self._look.set(class_of(tone_of(drive)))
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)
-        self._advice.set_text(
-            '' if drive.level is Level.OK or drive.silent else drive.advice)
+        self._advice.set_text(advice(drive, snapshot))
         self._place.set_text(' · '.join(filter(None, (
             place_in_words(drive), f'{drive.rate:.0f} exchanges/s' if drive.rate else '',
             f'by {drive.bridge}'))))
         tab = self._panels.value
         if tab == 'Live':
             self._values.show(drive)
-            bits = {f'{parameter}.{bit}' if len(drive.bits) > 1 else bit: state
-                    for parameter, found in sorted(drive.bits.items())
-                    for bit, state in sorted(found.items())}
-            for (bit, state), look in zip(bits.items(), self._bits.of(tuple(bits))):
-                bad = bit.rpartition('.')[2].startswith(_BAD_BITS)
-                look.set(f'{"on" if state else ""}{" bad" if bad else ""}')
+            self._show_bits(drive)
         elif tab == 'Parameters':
             self._parameters.show(drive)
         else:
@@ -374,9 +369,36 @@ class _Content:
         # also behind other pages, so that nothing is missing in it afterwards
         self._chart.show(snapshot)
 
+    def _show_bits(self, drive: DriveSnapshot) -> None:
+        words_of = {parameter: drive.bits_of(parameter) for parameter in sorted(drive.bits)}
+        lamps = self._bits.of(tuple(
+            (parameter if len(words_of) > 1 else '',
+             tuple((bit.number, bit.name, bit.named) for bit in bits))
+            for parameter, bits in words_of.items()))
+        for look, bit in zip(lamps, (bit for bits in words_of.values() for bit in bits)):
+            bad = bit.named and bit.name.startswith(_BAD_BITS)
+            look.set(f'{"on" if bit.state else ""}{" bad" if bad else ""}')
 
-def _make_lamps(names: tuple[str, ...]) -> list[Look]:
-    return [Look(words(name, 'lamp'), 'lamp') for name in names]
+
+def _make_lamps(words_of: tuple[tuple[str, tuple[tuple[int | None, str, bool], ...]], ...],
+                ) -> list[Look]:
+    """Make a lamp for each bit, in their order; those without a meaning are folded."""
+    looks: list[Look] = []
+    for parameter, bits in words_of:
+        if parameter:
+            words(parameter, 'small dim')
+        row = box('lamps')
+        unnamed = [number for number, _, named in bits if not named]
+        if unnamed:
+            with box('folded', 'details'):
+                with box('dim', 'summary'):
+                    ui.label(f'{counted(len(unnamed), "bit")} without a name')
+                folded = box('lamps')
+        for number, name, named in bits:
+            with row if named else folded:
+                text = name if number is None else f'{number} {name}' if named else str(number)
+                looks.append(Look(words(text, 'lamp'), 'lamp'))
+    return looks
 
 
 def _make_facts(names: tuple[str, ...]) -> list[ui.label]:

@@ -27,7 +27,7 @@ from starlette.types import ASGIApp
 
 from drive_can_bridge import __version__
 from drive_can_bridge.monitor.snapshot import (
-    BusSnapshot, DriveSnapshot, Level, LogLine, Shown, Snapshot,
+    BusSnapshot, DriveSnapshot, LogLine, Shown, Snapshot,
 )
 from drive_can_bridge.monitor.summary import (
     counts, FEW, in_order, principal, Tone, tone_of, Trouble, troubles,
@@ -37,8 +37,8 @@ from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
-    Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words, stop_buttons,
-    Values, words,
+    advice, Banner, box, button, Changing, class_of, in_script, Look, marked, place_in_words,
+    stop_buttons, Values, words,
 )
 
 _LINES = 100
@@ -95,7 +95,8 @@ class Overview:
         together = {name for trouble in told for name in trouble.drives}
         wanted = (self._filter.value or '').lower().split() if many else []
         for row, drive in zip(rows, drives):
-            row.show(drive, places[drive.name], advice=drive.name not in together,
+            told_of = '' if drive.name in together else advice(drive, snapshot)
+            row.show(drive, places[drive.name], told_of,
                      hidden=any(word not in _searchable(drive) for word in wanted))
 
     def _make_counts(self, found: tuple[tuple[Tone, str], ...]) -> list[ui.label]:
@@ -166,12 +167,11 @@ class _Card:
                 self._place = words('', 'dim')
                 stop_buttons(drive, role)
 
-    def show(self, drive: DriveSnapshot, _: int, *, advice: bool, hidden: bool) -> None:
+    def show(self, drive: DriveSnapshot, _: int, told_of: str, *, hidden: bool) -> None:
         self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
         self._state.set_text(drive.state or 'unknown')
         self._control.set_text('' if drive.control == drive.state else drive.control)
-        self._advice.set_text(
-            drive.advice if advice and drive.level is not Level.OK and not drive.silent else '')
+        self._advice.set_text(told_of)
         self._values.show(drive)
         self._place.set_text(place_in_words(drive))
 
@@ -188,9 +188,10 @@ class _Row:
             self._state = words('', 'chip state')
             self._values = [words('', 'number'), words('', 'number')]
             self._place = words('', 'dim')
+            self._grey = Look(self._place, 'dim')
             stop_buttons(drive, role)
 
-    def show(self, drive: DriveSnapshot, place: int, *, advice: bool, hidden: bool) -> None:
+    def show(self, drive: DriveSnapshot, place: int, told_of: str, *, hidden: bool) -> None:
         self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
         if place != self._order:    # no row is made anew: somebody may be about to click
             self._order = place
@@ -198,7 +199,9 @@ class _Row:
         self._state.set_text(drive.state or 'unknown')
         for label, arrow, shown in zip(self._values, ('→ ', ''), (drive.setpoints, drive.values)):
             label.set_text(arrow + _value(principal(shown)) if shown else '')
-        self._place.set_text(place_in_words(drive))
+        # what others of these have is said above all of them; why one is grey stands with it
+        self._grey.set('why' if drive.silent else '')
+        self._place.set_text(told_of if drive.silent else place_in_words(drive))
 
 
 def _value(shown: Shown | None) -> str:

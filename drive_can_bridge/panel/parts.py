@@ -14,6 +14,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.element import Element
 
+from drive_can_bridge.core import sentences
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Stop
 from drive_can_bridge.monitor.summary import silence, Tone
 from drive_can_bridge.panel.access import Role
@@ -123,6 +124,15 @@ class Banner:
     def show(self, snapshot: Snapshot) -> None:
         """Say which bridges are silent."""
         self._lines.of(tuple(silence(snapshot, clock)))
+
+
+def advice(drive: DriveSnapshot, snapshot: Snapshot) -> str:
+    """Say what to do about a drive, or why it is grey; '' where it is well."""
+    if drive.silent:
+        ago = next((bridge.silent for bridge in snapshot.bridges if bridge.name == drive.bridge),
+                   0.0)
+        return sentences.drive_of_silent_bridge(since=clock(snapshot.at - ago))
+    return '' if drive.level is Level.OK else drive.advice
 
 
 def clock(at: float) -> str:

@@ -59,6 +59,7 @@ def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str
         'protected': str(parameter.protected).lower(),
         'role': None if role is None else role.value,
         'values': None if parameter.scaled else joined(parameter.values) or None,
+        'bits': joined((bit, name) for name, bit in parameter.bits) or None,
         'error': printable(error) or None,
     }
     return ' '.join(f'{key}={_quoted(str(value))}' for key, value in fields.items()

@@ -511,10 +511,12 @@ class Plotter:
                 '.'.join(place), parameter.bits, tuple(Curve(name) for name, _ in parameter.bits))
         return lanes
 
-    def draw(self, path: str) -> None:
+    def draw(self, path: str, title: str = '',
+             notes: Sequence[tuple[float, str]] = ()) -> None:
         """
         Write the picture: a panel for each unit, and one with lanes for each word of named bits.
 
+        :param notes: what happened, and when, as the records of the trace have the time.
         :raises DriveCanError: nothing to draw.
         :raises ImportError: matplotlib is not installed.
         """
@@ -550,9 +552,27 @@ class Plotter:
             axis.grid(visible=True, axis='x', alpha=0.3)
         for axis in axes[:, 0]:
             self._mark(axis)
+            for at, _ in notes:
+                axis.axvline(at - self._start, color='0.4', linewidth=0.8, linestyle=':')
+        for place, (at, text) in enumerate(notes):      # in turns, so that none hides the next one
+            axes[0, 0].annotate(
+                text, (at - self._start, 1.0), xycoords=axes[0, 0].get_xaxis_transform(),
+                xytext=(2, 3 + 11 * (place % 2)), textcoords='offset points', fontsize='small')
+        self._explain(axes[0, 0])
+        if title:
+            figure.suptitle(title, fontsize='medium')
         axes[-1, 0].set_xlabel('s since the trace began')
         figure.savefig(path)
         pyplot.close(figure)
+
+    def _explain(self, axis: Any) -> None:
+        """Say in the legend what the marks are, where there are any."""
+        if any(marks.lost for marks in self._marks.values()):
+            axis.plot([], [], '|', color='tab:red', markersize=9, label='no answer')
+        if any(marks.faults for marks in self._marks.values()):
+            axis.fill_between([], [], color='tab:red', alpha=0.12, linewidth=0, label='fault')
+        if axis.get_legend_handles_labels()[1]:
+            axis.legend(loc='upper right', fontsize='small')
 
     def _mark(self, axis: Any) -> None:
         """Show what went wrong: a red tick for each missing answer, red ground for a fault."""

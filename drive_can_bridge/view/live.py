@@ -173,10 +173,10 @@ def bit_lines(drive: DriveSnapshot, width: int) -> Lines:
     """Write the bits of all words."""
     several = len(drive.bits) > 1
     lines: Lines = []
-    for parameter, bits in drive.bits.items():
+    for parameter in drive.bits:
         if several:
             lines.append(Text(parameter, style=DIM))
-        lines += lamps(dict(sorted(bits.items())), width)
+        lines += lamps({bit.name: bit.state for bit in drive.bits_of(parameter)}, width)
     return lines
 
 

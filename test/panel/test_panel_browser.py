@@ -182,6 +182,7 @@ def test_the_bridge_dies_and_comes_back(site: Site, browser: Browser) -> None:
     browser.run('window.mark = 1')
     assert site.bridge.end(signal.SIGKILL) == -signal.SIGKILL
     browser.shows('silent since .*a stop may not reach them')
+    browser.shows(r'conveyor\s+unknown\s+its bridge is silent since \d\d:\d\d:\d\d')
     buttons = 'return [...document.querySelectorAll("[data-drive] button")]'
     assert browser.run(f'{buttons}.every(each=>!each.disabled)')
     site.bridge = site.start_bridge()
@@ -203,6 +204,7 @@ def test_a_panel_that_was_started_again_has_its_page_say_so(run: Run, tmp_path: 
         assert panel.end(signal.SIGKILL) == -signal.SIGKILL
         # what is old looks so
         wait_for(lambda: browser.find_all('.lost'), 'that it is noticed')
+        browser.shows(r'connecting… what is shown is of \d\d:\d\d:\d\d')
         run('drive_can', 'panel', '--port', str(urlsplit(address).port), '--namespace', '/nowhere')
         browser.shows('open the address that drive_can panel has printed')
     finally:

@@ -9,6 +9,7 @@ from drive_can_bridge.monitor.snapshot import (
     BridgeSnapshot, DriveSnapshot, Level, LogLine, Snapshot,
 )
 from drive_can_bridge.monitor.summary import silence
+from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.panel.access import Role
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
@@ -99,6 +100,35 @@ def test_stops_of_a_silent_bridge_are_there(page: Any, count: int, kind: str) ->
         made.show(seen(*['online'] * count, silent=silent))
         assert ['disabled' in each.props for each in shown(page, 'danger')] == [False] * 2 * count
         assert {'unknown' in each.classes for each in shown(page, kind)} == {silent}
+
+
+@pytest.mark.parametrize(('count', 'kind'), [(2, 'advice'), (7, 'why')])
+def test_what_is_grey_says_why(page: Any, count: int, kind: str) -> None:
+    from drive_can_bridge.panel.parts import clock
+    made = overview(seen(*['online'] * count))
+    assert not any('silent' in text for text in texts(page, kind))
+    made.show(seen(*['online'] * count, silent=True))
+    assert texts(page, kind) == [f'its bridge is silent since {clock(993.0)}'] * count
+    made.show(seen(*['online'] * count))
+    assert not any('silent' in text for text in texts(page, kind))
+
+
+def test_bits_stand_by_number_and_those_without_a_name_are_folded(page: Any) -> None:
+    from drive_can_bridge.panel.drive_page import _make_lamps
+    info = ParameterInfo('status_word', facts={'bits': '0:ready 3:fault 8:bit_8 9:remote'})
+    drive = DriveSnapshot(
+        '/axis', 'axis', BRIDGE, 'online', Level.OK, True, '', parameters=(info,),
+        bits={'status_word': {'remote': True, 'bit_12': True, 'fault': False, 'unheard_of': True,
+                              'bit_8': False, 'ready': True}})
+    bits = drive.bits_of('status_word')
+    assert [(bit.number, bit.name) for bit in bits] == [
+        (0, 'ready'), (3, 'fault'), (8, 'bit_8'), (9, 'remote'), (12, 'bit_12'),
+        (None, 'unheard_of')]
+    looks = _make_lamps((('', tuple((bit.number, bit.name, bit.named) for bit in bits)),))
+    assert len(looks) == len(bits)
+    folded, = texts(page, 'folded')
+    assert folded == '2 bits without a name812'
+    assert texts(page, 'lamp') == ['0 ready', '3 fault', '8', '9 remote', '12', 'unheard_of']
 
 
 def test_the_banner_says_so_once(page: Any) -> None:

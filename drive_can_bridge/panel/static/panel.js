@@ -14,9 +14,12 @@ const panel = (() => {
 
   // what a page without its panel shows is old, and is not to look as if it were not
   let told = false;
+  let since = '';   // time of day when the panel was last heard
   setInterval(async () => {
     const there = Boolean(window.socket && window.socket.connected);
     document.body.classList.toggle('lost', !there);
+    if (there) since = new Date().toTimeString().slice(0, 8);
+    connecting(!there);
     if (there || told) return;
     // a panel that was started again has other tokens: the page would try to reach it for ever
     const answer = await ask('/panel/icon.svg', {cache: 'no-store'});
@@ -25,6 +28,21 @@ const panel = (() => {
       tell(false, answer.text);
     }
   }, 1000);
+
+  // why everything is grey: it stands above the page, which is what it was
+  function connecting(lost) {
+    let line = document.getElementById('connecting');
+    if (!lost) return line && line.remove();
+    if (!line) {
+      line = document.createElement('div');
+      line.id = 'connecting';
+      line.setAttribute('role', 'status');
+      const page = document.querySelector('.page');
+      if (!page) return;
+      page.before(line);
+    }
+    line.textContent = since ? `connecting… what is shown is of ${since}` : 'connecting…';
+  }
 
   // -- requests -----------------------------------------------------------------------------------
 
@@ -203,6 +221,14 @@ const panel = (() => {
     if (changed || !one.paused) draw(id, changed);
   }
 
+  // a value that does not change has an axis around it, not one that begins at 0
+  function narrow() {
+    const room = ({min, max}) => (max > min || !isFinite(min) ? null
+      : Math.max(0.05 * Math.abs(min), 0.5));
+    return {min: (found) => (room(found) === null ? null : found.min - room(found)),
+      max: (found) => (room(found) === null ? null : found.max + room(found))};
+  }
+
   function draw(id, changed) {
     const one = chart(id);
     const element = getElement(id);
@@ -220,7 +246,7 @@ const panel = (() => {
     };
     if (changed) {
       options.yAxis = units.map((unit, place) => ({
-        type: 'value', name: unit, scale: true, position: place % 2 ? 'right' : 'left',
+        type: 'value', name: unit, scale: true, ...narrow(), position: place % 2 ? 'right' : 'left',
         offset: 46 * Math.floor(place / 2), nameTextStyle: {color: ink},
         axisLabel: {color: ink}, splitLine: {show: place === 0,
           lineStyle: {color: dark ? '#2d3743' : '#e3e8ee'}}}));
