@@ -28,12 +28,16 @@ PATIENCE = 300.0
 
 
 class Child:
-    """The near end."""
+    """
+    The near end.
 
-    def __init__(self, script: str, *arguments: object) -> None:
+    :param python: that runs it; another one has another build of the bridge.
+    """
+
+    def __init__(self, script: str, *arguments: object, python: str = sys.executable) -> None:
         self.script = script
         self.process = subprocess.Popen(
-            [sys.executable, str(HERE / script), *map(str, arguments)],
+            [python, str(HERE / script), *map(str, arguments)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.ready = self._read()
 
@@ -83,9 +87,9 @@ def cpu_of(process: int) -> float:
 
 
 @contextmanager
-def child(script: str, *arguments: object) -> Iterator[Child]:
+def child(script: str, *arguments: object, python: str = sys.executable) -> Iterator[Child]:
     """Run a process for as long as needed."""
-    process = Child(script, *arguments)
+    process = Child(script, *arguments, python=python)
     try:
         yield process
     finally:

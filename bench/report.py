@@ -340,6 +340,22 @@ def _beside_figure(name: str, pairs: list[tuple[float, float]], goal: float) -> 
                   median([one / other for one, other in pairs if other]), goal)
 
 
+def builds_figures(found: dict[str, list[tuple[float, float]]]) -> list[Figure]:
+    """Compare this build and another that ran at the same time."""
+    goals = {'nobody subscribed': 0.82, 'subscribed': 0.91, 'subscribed, commands': 0.94,
+             'one drive': math.inf}
+    figures = []
+    for name, pairs in found.items():
+        ratios = sorted(one / other for one, other in pairs if other)
+        ours, theirs = (median([pair[place] for pair in pairs]) for place in (0, 1))
+        low, high = (ratios[round(share * (len(ratios) - 1))] for share in (0.25, 0.75))
+        figures.append(Figure(
+            f'CPU of two builds at the same time, {name}', f'{100 * ours:.1f} % (half of '
+            f'{len(ratios)} ratios: {low:.2f} to {high:.2f})',
+            f'the other build {100 * theirs:.1f} %', median(ratios), goals[name]))
+    return figures
+
+
 def start_figures(found: dict[str, Any]) -> list[Figure]:
     """Start and memory."""
     memory = found['resident_mb']
@@ -370,7 +386,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'hand': hand_figures, 'hand hung': hung_hand_figures, 'hand busy': busy_hand_figures,
     'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
-    'drives': drives_figures, 'decode': decode_figures,
+    'drives': drives_figures, 'builds': builds_figures, 'decode': decode_figures,
     'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,
 }
 

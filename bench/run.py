@@ -29,7 +29,7 @@ SWEEP = (1, 2, 4, 8, 15, 22, 30)
 #: share of the time that the hypervisor may take from a scenario, and how often it is measured
 STOLEN_MAX, ATTEMPTS = 0.05, 3
 #: takes long, and is run when it is named only
-NAMED_ONLY = ('sweep',)
+NAMED_ONLY = ('builds', 'sweep')
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Pace:
     stops: int = 200
     commands: int = 10
     rounds: int = 40
+    windows: int = 16
     turns: int = 4
     backups: int = 5
     loops: int = 8
@@ -47,8 +48,8 @@ class Pace:
 
 
 #: each scenario for a second or two, to see that it runs
-SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, turns=1, backups=1, loops=1,
-             sweep=(1, 2))
+SMOKE = Pace(calls=5, stops=4, commands=1, rounds=2, windows=2, turns=1, backups=1,
+             loops=1, sweep=(1, 2))
 
 
 def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
@@ -95,6 +96,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False, trace=2 * duration), duration, pace.rounds),
         'joints': lambda: scenarios.joints(
             Load(drives, period, subscribed=False), duration, 100.0, pace.rounds),
+        'builds': lambda: scenarios.builds(
+            drives, pace.windows, 0.2 * duration, options.beside),
         'decode': lambda: scenarios.decode(options.frames),
         'start': lambda: scenarios.start(drives, options.memory_duration),
         'sweep': lambda: scenarios.sweep(pace.sweep, 0.01, duration),
@@ -168,7 +171,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--frames', type=int, default=1_000_000, help='of a trace to decode')
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
     parser.add_argument('--beside', metavar='PYTHON', default='', help=(
-        'of another build (its .venv/bin/python), whose commands `hand` measures as well'))
+        'of another build (its .venv/bin/python): `hand` measures its commands as well, `builds` '
+        'its bridge'))
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
     parser.add_argument('--sweep-plot', type=Path,

@@ -167,10 +167,12 @@ class Bridges:
     What the drives notice, what diagnostics say, and CPU time.
     """
 
-    def __init__(self, stack: ExitStack, load: Load, bus: Bus, *each: tuple[object, ...]) -> None:
+    def __init__(self, stack: ExitStack, load: Load, bus: Bus, *each: tuple[object, ...],
+                 python: str = sys.executable) -> None:
         self._bus, self._load = bus, load
         self._diagnostics = stack.enter_context(child('subscriber.py', 'diagnostics'))
-        self.processes = [stack.enter_context(child('bridge.py', *load.how, *arguments))
+        self.processes = [stack.enter_context(child(
+            'bridge.py', *load.how, *arguments, python=python))
                           for arguments in each or [(bus.file,)]]
         begun = min(process.ready for process in self.processes)
         until = begun + PATIENCE
@@ -219,10 +221,11 @@ class Bridges:
 
 
 @contextmanager
-def bridge_under(load: Load, bus: Bus, *each: tuple[object, ...]) -> Iterator[Bridges]:
+def bridge_under(load: Load, bus: Bus, *each: tuple[object, ...],
+                 python: str = sys.executable) -> Iterator[Bridges]:
     """Run the bridge, and whoever commands it."""
     with ExitStack() as stack:
-        bridges = Bridges(stack, load, bus, *each)
+        bridges = Bridges(stack, load, bus, *each, python=python)
         if load.commands:
             stack.enter_context(child('publisher.py', 'commands', load.drives, load.commands))
         time.sleep(SETTLE)
@@ -662,6 +665,48 @@ def joints(load: Load, duration: float, rate: float, rounds: int = 40) -> dict[s
             listener.ask('clear'), commander.ask(f'rate {rate if commanded else 0.0}')))
         return {'states': states, 'states and commands': commands,
                 'received': listener.ask('count')}
+
+
+def builds(drives: int, windows: int, duration: float, other: str) -> dict[str, Any]:
+    """
+    Measure this build and another at the same time, so that the machine is as fast for both.
+
+    They change places half-way: discovery and scheduling favour one that was there first.
+
+    :param windows: of a measurement in either place.
+    :param other: its Python; '' is this build once more, which shows how far to believe a ratio.
+    :return: by load, pairs of CPU shares of this build and of the other.
+    """
+    pythons = [sys.executable, other or sys.executable]
+    quiet = Load(drives, 0.01, subscribed=False)
+    found: dict[str, Any] = {}
+    for name, load in (('nobody subscribed', quiet),
+                       ('subscribed', replace(quiet, subscribed=True)),
+                       ('subscribed, commands', replace(quiet, subscribed=True, commands=100.0)),
+                       ('one drive', replace(quiet, drives=1))):
+        found[name] = pairs = []
+        for turned in (1, -1):
+            with ExitStack() as stack:
+                if load.subscribed:
+                    stack.enter_context(child(
+                        'subscriber.py', 'all', 'drive,beside/drive', load.drives))
+                bridges = [stack.enter_context(bridge_under(
+                    replace(load, commands=0.0), bus, (bus.file, *words), python=python))
+                           for python, words in zip(
+                               pythons[::turned], ((), ('-r', '__ns:=/beside')))
+                           for bus in [Bus(stack, load)]]
+                for prefix in ('drive', 'beside/drive') if load.commands else ():
+                    stack.enter_context(child(
+                        'publisher.py', 'commands', load.drives, load.commands, prefix))
+                time.sleep(SETTLE)
+                for _ in range(windows):
+                    begun, spent = time.monotonic(), [bridge.cpu() for bridge in bridges]
+                    time.sleep(duration)
+                    elapsed = time.monotonic() - begun
+                    shares = [(bridge.cpu() - cpu) / elapsed
+                              for bridge, cpu in zip(bridges, spent)]
+                    pairs.append(shares[::turned])
+    return found
 
 
 def _beside(load: Load, without: Load, duration: float, rounds: int,
