@@ -13,7 +13,7 @@ from pathlib import Path
 
 from drive_can_bridge.cli.command import complain, print_json, say
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.transport.found_adapters import ask_libraries, Found, of_host
+from drive_can_bridge.transport.found_adapters import ask_libraries, FoundAdapter, of_host
 from drive_can_bridge.transport.known_adapters import NOT_ON_LINUX, Row, ROWS
 
 PAGE = Path('docs', 'adapters.md')
@@ -98,7 +98,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _lines(found: Found) -> Iterator[str]:
+def _lines(found: FoundAdapter) -> Iterator[str]:
     yield f'{found.interface} {printable(str(found.channel))}: {found.what}'
     for key, value in {'interface': found.interface, 'channel': found.channel,
                        **found.options}.items():
@@ -107,7 +107,7 @@ def _lines(found: Found) -> Iterator[str]:
         yield f'    # {remark}'
 
 
-def _document(found: Found) -> dict[str, object]:
+def _document(found: FoundAdapter) -> dict[str, object]:
     return {'interface': found.interface, 'channel': found.channel, 'options': found.options,
             'adapter': found.adapter or None, 'what': found.what, 'state': found.state or None,
             'bitrate': found.bitrate or None,

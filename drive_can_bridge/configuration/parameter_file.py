@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.schema import definition
 from drive_can_bridge.configuration.yaml_nodes import (
-    BrokenYaml, Kind, Node, read_documents, Rules, TreeReader)
+    BrokenYaml, NodeKind, read_documents, Rules, TreeReader, YamlNode)
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.messages import Sentence
@@ -75,7 +75,7 @@ class _FileReader:
             if _PROFILE_KEYS <= {key.text for key, _ in root.pairs}:
                 # a line for everything in it would not help
                 self._note(root.line, (), complaints.is_profile(entry=PARAMETERS_KEY))
-            elif root.kind is Kind.MAPPING:
+            elif root.kind is NodeKind.MAPPING:
                 self._names(root, ())
             else:
                 self._note(root.line, (), complaints.no_mapping(entry=PARAMETERS_KEY))
@@ -89,11 +89,11 @@ class _FileReader:
         self.problems.append(Problem(self._file, line, '/'.join(map(str, path)) or 'yaml',
                                      message))
 
-    def _names(self, node: Node, path: Path) -> None:
+    def _names(self, node: YamlNode, path: Path) -> None:
         """Read a mapping above ``ros__parameters``: its keys are node names or namespaces."""
         has_parameters = False
         for key, value in node.pairs:
-            if key.kind is not Kind.SCALAR or not key.text:
+            if key.kind is not NodeKind.SCALAR or not key.text:
                 self._note(key.line, path, complaints.key_no_node_name())
                 continue
             here = (*path, key.text)
@@ -113,14 +113,14 @@ class _FileReader:
                 self._note(key.line, here, complaints.misspelt(allowed=PARAMETERS_KEY))
             elif not path and key.text in _OURS:
                 self._note(key.line, here, complaints.without_head(entry=PARAMETERS_KEY))
-            elif value.kind is Kind.MAPPING:
+            elif value.kind is NodeKind.MAPPING:
                 self._names(value, here)
             else:
                 hint = suggestion(key.text, [PARAMETERS_KEY]) if path else \
                     complaints.allowed_below(entry=PARAMETERS_KEY)
                 self._note(key.line, here, complaints.no_mapping_refused(hint=hint))
 
-    def _parameters(self, node: Node, path: Path, line: int) -> None:
+    def _parameters(self, node: YamlNode, path: Path, line: int) -> None:
         name = ''
         for part in map(str, path):
             name += part if not name or name.endswith('/') else f'/{part}'
@@ -129,7 +129,7 @@ class _FileReader:
                 entry=PARAMETERS_KEY))
         elif not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
             self._note(line, path, complaints.no_node_name(name=name))
-        if node.kind is not Kind.MAPPING:
+        if node.kind is not NodeKind.MAPPING:
             self._note(line, (*path, PARAMETERS_KEY), complaints.no_parameters())
             return
         reader = TreeReader(self._file, Rules.PARAMETERS, {

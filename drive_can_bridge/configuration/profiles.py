@@ -17,8 +17,7 @@ from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY
 from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
 from drive_can_bridge.configuration.yaml_nodes import (
-    BrokenYaml, Kind, read_documents, Rules, TreeReader,
-)
+    BrokenYaml, NodeKind, read_documents, Rules, TreeReader)
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.messages import Sentence
@@ -141,7 +140,7 @@ def read_profile(path: FilePath) -> LoadedProfile:
         documents = read_documents(path)
     except BrokenYaml as error:
         return _unusable(file, error.line, error.why)
-    if not documents or documents[0].root.kind is not Kind.MAPPING:
+    if not documents or documents[0].root.kind is not NodeKind.MAPPING:
         return _unusable(file, 1, complaints.no_profile())
     root = documents[0].root
     if any(below.text == PARAMETERS_KEY for _, value in root.pairs for below, _ in value.pairs):

@@ -60,7 +60,7 @@ class BrokenYaml(Exception):
         self.line, self.why = line, why
 
 
-class Kind(Enum):
+class NodeKind(Enum):
     """What a node is."""
 
     SCALAR = 'scalar'
@@ -69,7 +69,7 @@ class Kind(Enum):
     ALIAS = 'alias'
 
 
-class Node(NamedTuple):
+class YamlNode(NamedTuple):
     """
     A part of a YAML text.
 
@@ -78,9 +78,9 @@ class Node(NamedTuple):
     :param text: of a scalar, without quotes.
     """
 
-    kind: Kind
+    kind: NodeKind
     line: int
-    items: list['Node']
+    items: list['YamlNode']
     text: str = ''
     quoted: bool = False
     tag: str | None = None
@@ -91,7 +91,7 @@ class Node(NamedTuple):
         return read_scalar(self.text, quoted=self.quoted, tag=self.tag)
 
     @property
-    def pairs(self) -> Iterator[tuple['Node', 'Node']]:
+    def pairs(self) -> Iterator[tuple['YamlNode', 'YamlNode']]:
         """Keys and values of a mapping."""
         return zip(self.items[::2], self.items[1::2])
 
@@ -100,7 +100,7 @@ class Document(NamedTuple):
     """One of the documents of a file: where it begins, and what it holds."""
 
     line: int
-    root: Node
+    root: YamlNode
 
 
 def read_documents(path: FilePath) -> list[Document]:
@@ -115,7 +115,7 @@ def read_documents(path: FilePath) -> list[Document]:
 
 def _documents(data: bytes) -> list[Document]:
     starts: list[int] = []
-    roots: list[Node] = []
+    roots: list[YamlNode] = []
     # the lists that nodes are added to: that of the documents, and those of all open nodes
     growing = [roots]
     line = 1
@@ -123,13 +123,14 @@ def _documents(data: bytes) -> list[Document]:
         for event in yaml.parse(data, Loader=_LOADER):
             line = event.start_mark.line + 1 if event.start_mark else line
             if isinstance(event, yaml.ScalarEvent):
-                growing[-1].append(Node(Kind.SCALAR, line, [], event.value,
-                                        event.style in ("'", '"'), event.tag))
+                growing[-1].append(YamlNode(NodeKind.SCALAR, line, [], event.value,
+                                            event.style in ("'", '"'), event.tag))
             elif isinstance(event, yaml.AliasEvent):
-                growing[-1].append(Node(Kind.ALIAS, line, []))
+                growing[-1].append(YamlNode(NodeKind.ALIAS, line, []))
             elif isinstance(event, yaml.CollectionStartEvent):
-                kind = Kind.LIST if isinstance(event, yaml.SequenceStartEvent) else Kind.MAPPING
-                node = Node(kind, line, [])
+                kind = NodeKind.LIST if isinstance(event,
+                                                   yaml.SequenceStartEvent) else NodeKind.MAPPING
+                node = YamlNode(kind, line, [])
                 growing[-1].append(node)
                 growing.append(node.items)
                 if len(growing) > DEPTH_MAX + 1:
@@ -193,7 +194,7 @@ class TreeReader:
         self._parameters = rules is Rules.PARAMETERS
         self._why = ' (rcl refuses the file)' if self._parameters else ''
 
-    def read(self, node: Node) -> None:
+    def read(self, node: YamlNode) -> None:
         """Read a mapping."""
         self.tree.lines[()] = node.line
         self._mapping(node, (), self.tree.data)
@@ -203,7 +204,7 @@ class TreeReader:
         self.refused.append(self.tree.problem(path, message, at=at))
         self.tree.damaged.add(path)
 
-    def _mapping(self, node: Node, path: Path, target: dict[str, Any]) -> None:
+    def _mapping(self, node: YamlNode, path: Path, target: dict[str, Any]) -> None:
         lines = self.tree.lines
         for key, value in self._in_place(node, path):
             problem = _key_problem(key)
@@ -228,14 +229,14 @@ class TreeReader:
             if read is not _UNREADABLE:
                 target[key.text] = read
 
-    def _in_place(self, node: Node, path: Path) -> Iterator[tuple['Node', 'Node']]:
+    def _in_place(self, node: YamlNode, path: Path) -> Iterator[tuple['YamlNode', 'YamlNode']]:
         """Yield keys and values, without those that were meant to stand below an entry."""
         keys = self._entries.get(path)
-        empty: Node | None = None       # an entry without anything below it
+        empty: YamlNode | None = None       # an entry without anything below it
         displaced: list[int] = []
         for key, value in (*node.pairs, (_END, _END)):
             if keys is not None and empty is not None and key.text in keys \
-                    and value.kind is not Kind.MAPPING:
+                    and value.kind is not NodeKind.MAPPING:
                 displaced.append(key.line)
                 continue
             if empty is not None:
@@ -259,12 +260,12 @@ class TreeReader:
                 return message(why=self._why, key=name, value=value.strip())
         return complaints.no_value(why=self._why)
 
-    def _value(self, node: Node, path: Path) -> Any:
-        if node.kind is Kind.SCALAR:
+    def _value(self, node: YamlNode, path: Path) -> Any:
+        if node.kind is NodeKind.SCALAR:
             return self._scalar(node, path)
-        if node.kind is Kind.LIST:
+        if node.kind is NodeKind.LIST:
             return self._list(node, path)
-        if node.kind is Kind.ALIAS:
+        if node.kind is NodeKind.ALIAS:
             self._note(path, complaints.alias(why=self._why))
         elif self._parameters and not node.items:
             self._note(path, complaints.garbling_mapping())
@@ -274,7 +275,7 @@ class TreeReader:
             return value
         return _UNREADABLE
 
-    def _scalar(self, node: Node, path: Path) -> Any:
+    def _scalar(self, node: YamlNode, path: Path) -> Any:
         if _is_empty(node):
             self._note(path, self._no_value(str(path[-1]), path[:-1]))
         elif '\0' in node.text:
@@ -283,14 +284,14 @@ class TreeReader:
             return node.scalar
         return _UNREADABLE
 
-    def _list(self, node: Node, path: Path) -> Any:
+    def _list(self, node: YamlNode, path: Path) -> Any:
         items: list[Any] = []
         for item in node.items:
             here = (*path, len(items))
             self.tree.lines[here] = item.line
-            plain = item.kind is Kind.SCALAR
+            plain = item.kind is NodeKind.SCALAR
             value = self._scalar(item, here) if plain else _UNREADABLE
-            if item.kind is Kind.ALIAS:
+            if item.kind is NodeKind.ALIAS:
                 self._note(path, complaints.alias(why=self._why), at=here)
             elif not plain:
                 self._note(path, complaints.nested_list(), at=here)
@@ -306,17 +307,17 @@ class TreeReader:
 
 
 #: stands behind the last key of a mapping
-_END = Node(Kind.LIST, 0, [])
+_END = YamlNode(NodeKind.LIST, 0, [])
 
 
-def _is_empty(node: Node) -> bool:
-    return node.kind is Kind.SCALAR and not node.text and not node.quoted
+def _is_empty(node: YamlNode) -> bool:
+    return node.kind is NodeKind.SCALAR and not node.text and not node.quoted
 
 
-def _key_problem(key: Node) -> Sentence:
+def _key_problem(key: YamlNode) -> Sentence:
     """Say why a key cannot be one; NOTHING if it can."""
-    if key.kind is not Kind.SCALAR:
-        kind = 'an alias' if key.kind is Kind.ALIAS else 'a list or mapping'
+    if key.kind is not NodeKind.SCALAR:
+        kind = 'an alias' if key.kind is NodeKind.ALIAS else 'a list or mapping'
         return complaints.no_key(kind=kind)
     if not key.text:
         return complaints.empty_key()

@@ -39,14 +39,14 @@ class Age(Enum):
     STEADILY_LATE = 'steadily late'
 
 
-class Judged(NamedTuple):
+class AgeVerdict(NamedTuple):
     """What a command's age says, and the figure to it in s."""
 
     age: Age
     seconds: float
 
 
-_FRESH = Judged(Age.FRESH, 0.0)
+_FRESH = AgeVerdict(Age.FRESH, 0.0)
 
 
 class CommandAges:
@@ -86,7 +86,7 @@ class CommandAges:
         self._moved = ahead != self._ahead and not first
         self._now, self._ahead = now, ahead
 
-    def judge(self, source: int, received: int, publisher: bytes | None) -> Judged:
+    def judge(self, source: int, received: int, publisher: bytes | None) -> AgeVerdict:
         """
         Tell what a command's stamps say.
 
@@ -122,7 +122,7 @@ class CommandAges:
                   and abs(lateness - self._last_late) <= STEADY_BAND
                   and (publisher is None or publisher != self._fresh_from))
         self._last_late, self._fresh_since = lateness, False
-        return Judged(Age.CLOCKS_DIFFER if differ else Age.LATE, 1e-9 * lateness)
+        return AgeVerdict(Age.CLOCKS_DIFFER if differ else Age.LATE, 1e-9 * lateness)
 
     def _stamp(self, publisher: bytes | None, source: int) -> int | None:
         """Record a publisher's stamp; return the one before it, if it is known to be its own."""
@@ -147,10 +147,10 @@ class CommandAges:
         return False
 
     def _begin(self, why: Age, figure: int, source: int, arrived: int,
-               publisher: bytes | None) -> Judged:
+               publisher: bytes | None) -> AgeVerdict:
         """Have a command be the first of its topic."""
         self.forget()
         self._stamp(publisher, source)
         if not self._moved and self._now is not None:
             self._smallest, self._smallest_at = arrived - source, self._now
-        return Judged(why, 1e-9 * figure)
+        return AgeVerdict(why, 1e-9 * figure)

@@ -51,7 +51,7 @@ RELEASES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Ignored:
+class IgnoredProfiles:
     """
     Profiles that somebody has named, and nobody reads.
 
@@ -86,7 +86,7 @@ class Middleware:
         """Those that are in effect."""
         return self.also if self.release is None else (self.release.variable, *self.also)
 
-    def ignored(self, environment: Mapping[str, str], folder: Path) -> Iterator[Ignored]:
+    def ignored(self, environment: Mapping[str, str], folder: Path) -> Iterator[IgnoredProfiles]:
         """Go through what is set, or lies in the working directory, and is not in effect."""
         read = {Path(folder, environment[name]) for name in self.variables
                 if environment.get(name)}
@@ -94,13 +94,13 @@ class Middleware:
             named = environment.get(release.variable, '')
             if named and release.variable not in self.variables and (
                     Path(folder, named) not in read):
-                yield Ignored(release.variable, named,
-                              self.release.variable if self.release else '',
-                              _protects(Path(folder, named)))
+                yield IgnoredProfiles(release.variable, named,
+                                      self.release.variable if self.release else '',
+                                      _protects(Path(folder, named)))
             if release is not self.release and Path(folder, release.file).is_file():
-                yield Ignored(release.file, release.file,
-                              self.release.file if self.release else '',
-                              _protects(Path(folder, release.file)))
+                yield IgnoredProfiles(release.file, release.file,
+                                      self.release.file if self.release else '',
+                                      _protects(Path(folder, release.file)))
 
     def has_profiles(self, environment: Mapping[str, str], folder: Path) -> bool:
         """Tell whether somebody has profiles of their own, which count."""

@@ -227,7 +227,7 @@ class LeftOut:
 
 
 @dataclass(slots=True)
-class Found:
+class FileContent:
     """
     Everything that a file offers.
 
@@ -272,7 +272,7 @@ class Built:
     notes: tuple[str, ...]
 
 
-def build_profile(found: Found, source: str, *, description: str = '',
+def build_profile(found: FileContent, source: str, *, description: str = '',
                   protocols: Sequence[str] = ()) -> Built:
     """
     Make a profile of what a file offers.
@@ -400,7 +400,7 @@ def _unmended(named: dict[str, Draft], problems: Iterable[Problem]) -> list[Prob
     return left
 
 
-def _sections(named: dict[str, Draft], found: Found, protocols: Sequence[str],
+def _sections(named: dict[str, Draft], found: FileContent, protocols: Sequence[str],
               ) -> tuple[dict[str, Any], list[str]]:
     """
     Return the sections that the profile can have, and say what else there is to say of it.
@@ -479,7 +479,7 @@ def _carriers(named: dict[str, Draft], profile: Profile, said: tuple[str, ...],
 # -- the text -------------------------------------------------------------------------------------
 
 
-def _text(named: dict[str, Draft], found: Found, sections: dict[str, Any], source: str,
+def _text(named: dict[str, Draft], found: FileContent, sections: dict[str, Any], source: str,
           description: str, protocols: Sequence[str], *, guessed: bool = False) -> str:
     lines = comment(f'Made from {source} by "drive_can profile import": {len(named)} of '
                     f'{len(found.drafts) + len(found.left_out)} entries, sorted by address. '

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.profiles.catalogue import Draft, Found, ImportFailed, LeftOut
+from drive_can_bridge.profiles.catalogue import Draft, FileContent, ImportFailed, LeftOut
 from drive_can_bridge.profiles.names import (
     decimal_sign, factor, integer, interval, is_hexadecimal_only, known_unit, Measure, measure,
     name_of, one_line, plain_words, rounded, split_unit, unit, Unusable)
@@ -306,7 +306,7 @@ def _head(rows: Sequence[Row], given: Sequence[str]) -> Row | None:
 
 
 def read_table(text: str, given: Mapping[str, str], sign: str = '',
-               protocols: Sequence[str] = ()) -> Found:
+               protocols: Sequence[str] = ()) -> FileContent:
     """
     Read what a table offers.
 
@@ -320,7 +320,7 @@ def read_table(text: str, given: Mapping[str, str], sign: str = '',
     reader = _RowReader(table, sign or decimal_sign(
         table.cell(row, column) for row in table.rows for column in _NUMERIC),
         bytes_stay=tuple(protocols) == ('cia402',))
-    found = Found(notes=table.notes())
+    found = FileContent(notes=table.notes())
     sections = []
     for row in table.rows:
         if sum(map(bool, row.cells)) <= 1 and len(table.columns) > 1:

@@ -22,7 +22,8 @@ from types import ModuleType
 from typing import Any
 
 from drive_can_bridge.core.parameters import ParameterType
-from drive_can_bridge.profiles.catalogue import check, Checked, Draft, Found, ImportFailed, LeftOut
+from drive_can_bridge.profiles.catalogue import (
+    check, Checked, Draft, FileContent, ImportFailed, LeftOut)
 from drive_can_bridge.profiles.csv_import import access_of
 from drive_can_bridge.profiles.names import one_line, rounded, split_step, unit, Unusable
 from drive_can_bridge.resources import command_that_brings, profiles_directory
@@ -120,7 +121,7 @@ class Section:
 _NONE = Section('', 0)
 
 
-def _take_apart(text: str, found: Found) -> dict[str, Section]:
+def _take_apart(text: str, found: FileContent) -> dict[str, Section]:
     """Return the sections of a file by name in lower case, and note what is odd."""
     sections: dict[str, Section] = {}
     section = _NONE
@@ -157,7 +158,7 @@ def _take_apart(text: str, found: Found) -> dict[str, Section]:
 
 
 def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = None,
-             force: bool = False) -> Found:
+             force: bool = False) -> FileContent:
     """
     Read what an EDS or DCF file offers.
 
@@ -168,7 +169,7 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     :raises ImportFailed: it is none, or none of a drive, or the library is missing.
     """
     library = canopen_library()
-    found = Found(mended=True)
+    found = FileContent(mended=True)
     sections = _take_apart(text, found)
     if not any(map(_OBJECT.fullmatch, sections)):
         raise ImportFailed('is no EDS or DCF file: it has no section of an object, like [1000]')
@@ -195,7 +196,8 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     return found
 
 
-def _choose_axis(sections: Mapping[str, Section], found: Found, wanted: int | None) -> int | None:
+def _choose_axis(sections: Mapping[str, Section], found: FileContent,
+                 wanted: int | None) -> int | None:
     """
     Leave out the objects of other axes, and return how far those of this one are from the first.
 
@@ -261,7 +263,7 @@ class _Place:
 class _ObjectReader:
     """Reads all objects."""
 
-    def __init__(self, library: ModuleType, sections: dict[str, Section], found: Found, *,
+    def __init__(self, library: ModuleType, sections: dict[str, Section], found: FileContent, *,
                  bytes_stay: bool) -> None:
         self._library = library
         self._sections = sections
@@ -655,7 +657,7 @@ def _si_unit(section: Section) -> tuple[str, float] | None:
     return (name, count * 10.0 ** exponent) if name and exponent in _EXPONENTS else None
 
 
-def _standardise(found: Found, sections: Mapping[str, Section], shift: int) -> None:
+def _standardise(found: FileContent, sections: Mapping[str, Section], shift: int) -> None:
     """
     Call standard objects by their names, and say what is known of them.
 

@@ -27,7 +27,7 @@ KeyT = TypeVar('KeyT')
 Handler = Callable[[bytes, float], None]
 
 
-class Kind(Enum):
+class TelegramKind(Enum):
     """What a telegram is for."""
 
     CYCLIC = 'cyclic'           # the exchange, emulated ones included
@@ -64,7 +64,7 @@ class Telegram(NamedTuple):
     time: float
     drive: str
     direction: Direction
-    kind: Kind
+    kind: TelegramKind
     title: str
     parameters: Sequence[Parameter] = ()
     raws: Sequence[int] = ()
@@ -108,7 +108,7 @@ class Observed:
     latency: Statistic = field(default_factory=Statistic)
 
 
-class Watch(Protocol):
+class AnswerExpiry(Protocol):
     """Something of a drive that waits for answers."""
 
     def expire(self, now: float) -> float:
@@ -132,7 +132,7 @@ class DriveObserver:
         self.handlers: dict[int, Handler] = {}
         self.remote_handlers: dict[int, Handler] = {}
         self.observed = Observed()
-        self.watches: list[Watch] = []
+        self.watches: list[AnswerExpiry] = []
         self.deadline = math.inf
         self.emit = emit
         self._extended = extended
@@ -150,7 +150,7 @@ class DriveObserver:
         if when < self.deadline:
             self.deadline = when
 
-    def tell(self, now: float, direction: Direction, kind: Kind, title: str,
+    def tell(self, now: float, direction: Direction, kind: TelegramKind, title: str,
              parameters: Sequence[Parameter] = (), raws: Sequence[int] = (), *,
              verdict: Verdict = _NORMAL, remark: str = '', latency: float = math.nan) -> None:
         """Emit a telegram, and count what is wrong with it."""
@@ -168,7 +168,7 @@ class DriveObserver:
                            remark, latency))
 
     def decoded(self, decode: Callable[[bytes], T], data: bytes, now: float,
-                direction: Direction, kind: Kind, title: str) -> T | None:
+                direction: Direction, kind: TelegramKind, title: str) -> T | None:
         """Return what data mean to ``decode``; None: nothing, which was told."""
         try:
             return decode(data)
@@ -176,7 +176,7 @@ class DriveObserver:
             self.tell(now, direction, kind, title, verdict=Verdict.MALFORMED, remark=str(error))
             return None
 
-    def hear(self, identifier: int, direction: Direction, kind: Kind, title: str,
+    def hear(self, identifier: int, direction: Direction, kind: TelegramKind, title: str,
              decode: Callable[[bytes], T], take: Callable[[T, float], None]) -> None:
         """
         Listen to frames with an identifier.

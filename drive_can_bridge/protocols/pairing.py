@@ -12,7 +12,7 @@ import math
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.observer import DriveObserver, Kind, Observed, Verdict
+from drive_can_bridge.protocols.observer import DriveObserver, Observed, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 
 #: s for which an answer that did not come in time is still known to be one
@@ -96,7 +96,7 @@ class CyclicWatch:
         return due if due > now else math.inf   # NaN: nothing is under way
 
     def _miss(self, now: float) -> None:
-        self._observer.tell(now, Direction.RESPONSE, Kind.CYCLIC, 'cyclic response',
+        self._observer.tell(now, Direction.RESPONSE, TelegramKind.CYCLIC, 'cyclic response',
                             verdict=Verdict.LOST,
                             remark=f'no answer in {1e3 * (now - self._asked):.0f} ms')
         self._asked = math.nan
@@ -150,7 +150,7 @@ class RequestContent(NamedTuple):
 
     span: Any
     writes: bool = False
-    kind: Kind = Kind.PARAMETER
+    kind: TelegramKind = TelegramKind.PARAMETER
     title: str = ''
 
 
@@ -199,7 +199,8 @@ class Requests(Generic[Key]):
         writes = words is not None
         cyclic = span in self._setpoints if writes else self.round.asked(span, now)
         self._observer.observed.requests += not cyclic
-        asked = RequestContent(span, writes, Kind.CYCLIC if cyclic else Kind.PARAMETER, title)
+        asked = RequestContent(span, writes,
+                               TelegramKind.CYCLIC if cyclic else TelegramKind.PARAMETER, title)
         if key is not None:
             self.about.pop(key, None)
             self.about[key] = asked
@@ -244,7 +245,7 @@ class Requests(Generic[Key]):
             asked = self.about[key]
             if not asked.writes:
                 self.round.failed(asked.span)
-            self._observer.observed.unanswered += asked.kind is Kind.PARAMETER
+            self._observer.observed.unanswered += asked.kind is TelegramKind.PARAMETER
             self._tell(due, Direction.RESPONSE, asked._replace(title=self._missing), None,
                        verdict=Verdict.LOST, remark='no answer')
             if len(self._given_up) > 64:

@@ -2,8 +2,8 @@
 """
 Who speaks, and what a row says in a table of telegrams of different layouts.
 
-Such a table is an enum whose values are rows (:class:`.canopen.sdo.Kind`). Where all telegrams
-have one layout, a row is a number and what it means (:class:`.canopen_pkw.pkw.Function`,
+Such a table is an enum whose values are rows (:class:`.canopen.sdo.SdoCommand`). Where all
+telegrams have one layout, a row is a number and what it means (:class:`.canopen_pkw.pkw.Function`,
 :class:`.cannord.parameter_frame.Task`). Sessions, simulated drives and ``decode`` read frames by
 the same rows, so ``test/protocols/test_telegrams.py`` wants a frame of a source for each, and
 that every change of one is seen.

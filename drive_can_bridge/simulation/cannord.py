@@ -29,7 +29,7 @@ from drive_can_bridge.protocols.cannord.states import (
 )
 from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, RUNNING, State
-from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
+from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw, Quantity
 from drive_can_bridge.simulation.registers import (
@@ -87,7 +87,7 @@ _RESERVED_BIT = 0x2000
 
 
 @dataclass
-class Group:
+class ParameterArray:
     """All entries with one number, by sub-index; one without a sub-index counts as 0."""
 
     members: dict[int, Parameter] = field(default_factory=dict)
@@ -104,12 +104,12 @@ class Group:
         return self.plain and len(self.members) > 1
 
 
-def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, Group]:
-    groups: dict[int, Group] = {}
+def groups_of(parameters: Mapping[str, Parameter]) -> dict[int, ParameterArray]:
+    groups: dict[int, ParameterArray] = {}
     for parameter in parameters.values():
         if parameter.number is None or parameter.number > NUMBER_MAX:
             continue
-        group = groups.setdefault(parameter.number, Group())
+        group = groups.setdefault(parameter.number, ParameterArray())
         group.members[parameter.subindex or 0] = parameter
         group.plain = group.plain or parameter.subindex is None
     return groups
@@ -327,9 +327,9 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _process_data(self, data: bytes, now: float, *, answered: bool) -> None:
         if len(data) == EXTRA_LENGTH and not self._options.extra_setpoints:
-            raise Ignored('five bytes of process data without extra_setpoints')
+            raise IgnoredFrame('five bytes of process data without extra_setpoints')
         if len(data) not in (SHORT_LENGTH, LONG_LENGTH, EXTRA_LENGTH):
-            raise Ignored('process data of a length that the manual does not define')
+            raise IgnoredFrame('process data of a length that the manual does not define')
         self.requests += 1
         self._look_at_clock(now)
         self._silent_since = now
@@ -373,11 +373,11 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     def _parameter_task(self, data: bytes, now: float) -> None:
         if len(data) != LENGTH:
-            raise Ignored('parameter task without eight data bytes')
+            raise IgnoredFrame('parameter task without eight data bytes')
         try:
             task = self._layout.decode(data)
         except RemoteProtocolError:
-            raise Ignored('parameter task that the manual does not define') from None
+            raise IgnoredFrame('parameter task that the manual does not define') from None
         self.requests += 1
         if data[2 if self._layout.index_byte == 'high' else 3]:
             self._violation('byte of the sub-index that holds no information is not 0')

@@ -29,7 +29,7 @@ from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import (
     FAULTS, Machine, Operation, Report, Rule, State, StatusWord)
-from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
+from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.quantities import clamp, plausible
 from drive_can_bridge.simulation.registers import (
@@ -418,14 +418,14 @@ class SimulatedPkwDrive(SimulatedDrive):
         if identifier != self._options.request_cob_id or extended:
             return False
         if self.node.state is not NmtState.OPERATIONAL:
-            raise Ignored('request while the node is not operational')
+            raise IgnoredFrame('request while the node is not operational')
         try:
             request = pkw.decode(data, self._layout)
         except RemoteProtocolError:
-            raise Ignored('request without eight data bytes') from None
+            raise IgnoredFrame('request without eight data bytes') from None
         if request.function_byte == self._request.function_byte:
             if request != self._request:
-                raise Ignored('request with the function byte of the one before')
+                raise IgnoredFrame('request with the function byte of the one before')
             return True
         self._request = request
         self.requests += 1
@@ -434,7 +434,7 @@ class SimulatedPkwDrive(SimulatedDrive):
                           pkw.encode(self._response, self._layout), False), now)
         return True
 
-    def _response_to(self, request: pkw.Message) -> pkw.Message:
+    def _response_to(self, request: pkw.PkwMessage) -> pkw.PkwMessage:
         meaning = request.meaning
         if request.code == pkw.Function.NONE:
             return pkw.response(request)

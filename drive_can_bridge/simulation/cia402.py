@@ -23,7 +23,7 @@ from drive_can_bridge.simulation.canopen.pdos import Pdo, Pdos
 from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
 from drive_can_bridge.simulation.cia402_plant import (
     Habits, LOST_MASTER, own_parameters, ServoPlant)
-from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
+from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.registers import PlantFactory, Refused
 
 CONSUMER_HEARTBEATS = 0x1016
@@ -198,9 +198,9 @@ class SimulatedServoDrive(SimulatedDrive):
 
     def _take(self, pdo: Pdo, data: bytes, now: float) -> None:
         if self.node.state is not NmtState.OPERATIONAL:
-            raise Ignored('PDO while the node is not operational')
+            raise IgnoredFrame('PDO while the node is not operational')
         if len(data) < pdo.length:
-            raise Ignored('PDO shorter than its mapping')
+            raise IgnoredFrame('PDO shorter than its mapping')
         self.requests += 1
         if pdo.type <= 240:
             pdo.pending = data

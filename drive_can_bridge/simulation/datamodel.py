@@ -17,7 +17,7 @@ from drive_can_bridge.core.parameters import Parameter, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.options import effective, padded
-from drive_can_bridge.simulation.drive import Ignored, SimulatedDrive
+from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.registers import Registers
 
 #: s that an EEPROM write takes: the manual's 20 ms, less the time by which the arrival of a frame
@@ -167,7 +167,7 @@ class ExtendedWire:
             return None
         request = extended.decode(frame, strict=True)
         if len(frame.data) != extended.PAYLOAD or not isinstance(request, Request):
-            raise Ignored('read request without eight data bytes')
+            raise IgnoredFrame('read request without eight data bytes')
         odd = isinstance(request, extended.ReadRequest) and any(frame.data)
         return request, 'read request with data other than 00h' if odd else ''
 
@@ -245,7 +245,7 @@ class SimulatedDataModelDrive(SimulatedDrive):
         try:
             found = self._wire.decode(frame)
         except RemoteProtocolError:
-            raise Ignored('frame that the manual does not define') from None
+            raise IgnoredFrame('frame that the manual does not define') from None
         if found is None:
             return False
         request, rule = found

@@ -36,14 +36,14 @@ _POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
                FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
 
 
-class Table(Protocol):
+class AddressTable(Protocol):
     """What can be addressed."""
 
     def name_of(self, raw: Parameter) -> str | None:
         """Return the name of the register at an address; None: there is none."""
 
 
-class Ignored(DriveCanError):
+class IgnoredFrame(DriveCanError):
     """A frame that a drive leaves alone; the argument says which rule it breaks."""
 
 
@@ -83,7 +83,7 @@ class SimulatedDrive(ABC):
     :ivar table: what can be addressed, by the protocol's addresses.
     """
 
-    table: Table
+    table: AddressTable
 
     def __init__(self, configuration: DriveConfiguration, *,
                  mechanics: Mechanics | None = None, plant: PlantFactory | None = None) -> None:
@@ -120,7 +120,7 @@ class SimulatedDrive(ABC):
             if not (self.companion.receive(frame, now) or self.receive(frame, now)) and any(
                     route.matches(frame) for route in self.routes):
                 self._violation('frame that only this drive may send')
-        except Ignored as broken:
+        except IgnoredFrame as broken:
             self._violation(f'{broken} (ignored)')
         self.companion.look(now)
         if self.registers.settings_written >= self._cut_at:
@@ -240,7 +240,7 @@ class SimulatedDrive(ABC):
         """
         Take a frame while there is power. False: it is none that this drive listens to.
 
-        :raises Ignored: it is one, but breaks a rule.
+        :raises IgnoredFrame: it is one, but breaks a rule.
         """
 
     @abstractmethod

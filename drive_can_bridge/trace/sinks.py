@@ -27,7 +27,7 @@ from drive_can_bridge.core.continuous import ContinuousPosition
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 
 #: digits behind the point that a scale may ask for
@@ -79,7 +79,7 @@ def _bits_text(parameter: Parameter, raw: int) -> str:
 
 _NORMAL = Verdict.NORMAL
 _NEITHER, _REQUEST = Direction.NEITHER, Direction.REQUEST
-_OTHER = Kind.OTHER
+_OTHER = TelegramKind.OTHER
 #: telegrams of different kinds whose last time is remembered
 _KINDS_MAX = 20_000
 
@@ -127,16 +127,16 @@ class Selection:
         if not only:
             return True
         return (Only.ERRORS in only and telegram.verdict is not _NORMAL
-                or Only.PARAMETERS in only and telegram.kind is Kind.PARAMETER
+                or Only.PARAMETERS in only and telegram.kind is TelegramKind.PARAMETER
                 or Only.CHANGES in only and self._changed(bus, telegram))
 
     def _changed(self, bus: str, telegram: Telegram) -> bool:
         """Tell whether it says anything else than the last of its kind."""
         key = bus, telegram.drive, telegram.direction, telegram.title
-        if telegram.kind is Kind.OTHER:
+        if telegram.kind is TelegramKind.OTHER:
             identifier, _, _ = telegram.remark.partition('#')
             key = bus, identifier, telegram.direction, telegram.title
-        elif telegram.kind is not Kind.CYCLIC and telegram.kind is not Kind.NETWORK:
+        elif telegram.kind not in (TelegramKind.CYCLIC, TelegramKind.NETWORK):
             return False
         elif telegram.title in ('read', 'write'):   # of a round: each parameter for itself
             if telegram.title == 'read' and telegram.direction is Direction.REQUEST:

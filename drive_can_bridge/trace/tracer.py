@@ -16,7 +16,7 @@ from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import column_lines, printable
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Handler, Kind, Observed, Telegram, Verdict)
+    DriveObserver, Handler, Observed, Telegram, TelegramKind, Verdict)
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.trace.files import Channels
 from drive_can_bridge.transport.error_frames import decode_error_frame
@@ -271,7 +271,7 @@ class Tracer:
     def _tell(self, bus: BusTrace, time: float, title: str, remark: str,
               verdict: Verdict = Verdict.SUSPICIOUS) -> None:
         """Tell what is of no drive."""
-        self._sink(bus.name, Telegram(time, '', Direction.NEITHER, Kind.OTHER, title,
+        self._sink(bus.name, Telegram(time, '', Direction.NEITHER, TelegramKind.OTHER, title,
                                       verdict=verdict, remark=remark))
 
 

@@ -35,7 +35,7 @@ _SHORT = 0.002
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundAdapter:
     """
     An adapter.
 
@@ -59,7 +59,7 @@ class Found:
     remarks: list[str] = field(default_factory=list)
 
 
-def of_host() -> Iterator[Found]:
+def of_host() -> Iterator[FoundAdapter]:
     """Yield what the kernel has: CAN interfaces, and serial ports."""
     for each in kernel_interfaces():
         yield _of_kernel(each)
@@ -67,18 +67,18 @@ def of_host() -> Iterator[Found]:
         yield _of_port(port)
 
 
-def _of_kernel(each: KernelInterface) -> Found:
+def _of_kernel(each: KernelInterface) -> FoundAdapter:
     state = ' '.join(filter(None, ('up' if each.up else 'down', each.state if each.up else '')))
     rate = f'{each.bitrate} bit/s' if each.bitrate else 'no bit rate'
     kinds = {'can': 'a CAN controller', 'vcan': 'virtual, no hardware', 'vxcan': 'a tunnel'}
     parts = [state, *([rate] if each.kind == 'can' else []), kinds.get(each.kind, each.kind)]
     remarks: list[str] = [] if each.up else [bus_sentences.switch_on(each.how_up)]
-    return Found('socketcan', each.name, ', '.join(filter(None, parts)),
-                 {'bitrate': each.bitrate} if each.bitrate else {}, 'socketcan', state,
-                 each.bitrate, remarks=remarks)
+    return FoundAdapter('socketcan', each.name, ', '.join(filter(None, parts)),
+                        {'bitrate': each.bitrate} if each.bitrate else {}, 'socketcan', state,
+                        each.bitrate, remarks=remarks)
 
 
-def _of_port(port: str) -> Found:
+def _of_port(port: str) -> FoundAdapter:
     usb, row, timer = usb_device(port), row_of_port(port), latency_timer(port)
     named = [] if usb is None else list(filter(None, (usb.maker, usb.product)))
     what = ' '.join(named) or 'a serial port'
@@ -92,15 +92,15 @@ def _of_port(port: str) -> Found:
         remarks.append(bus_sentences.port_keeps(1e3 * timer.seconds, timer.remedy))
     if os.path.exists(port) and not os.access(port, os.R_OK | os.W_OK):
         remarks.append(bus_sentences.port_not_allowed())
-    return Found('slcan' if row is None else row.interface, port, what,
-                 adapter='' if row is None else row.name,
-                 latency=None if timer is None else timer.seconds, remarks=remarks)
+    return FoundAdapter('slcan' if row is None else row.interface, port, what,
+                        adapter='' if row is None else row.name,
+                        latency=None if timer is None else timer.seconds, remarks=remarks)
 
 
 def ask_libraries(clock: Clock, interfaces: Callable[[], Any] = lambda: can.interfaces.BACKENDS,
-                  ) -> tuple[list[Found], list[str]]:
+                  ) -> tuple[list[FoundAdapter], list[str]]:
     """Return what libraries of makers find, and the interfaces whose library has not come back."""
-    answers: dict[str, list[Found] | None] = {}
+    answers: dict[str, list[FoundAdapter] | None] = {}
     asked, workers = [], []
     for name in sorted(set(interfaces()) - NOT_ASKED):
         answers[name] = None
@@ -124,11 +124,13 @@ def ask_libraries(clock: Clock, interfaces: Callable[[], Any] = lambda: can.inte
             [name for name, _ in asked if answers[name] is None])
 
 
-def _found_by(interface: str) -> Iterator[Found]:
+def _found_by(interface: str) -> Iterator[FoundAdapter]:
     for each in detected(interface):
         options = {key: each[key] for key in _WHICH if isinstance(each.get(key), (int, str))}
         channel = each.get('channel', 0)
         names = [str(each[key]) for key in ('device_name', 'vector_channel_config', 'device_type')
                  if isinstance(each.get(key), str)]
-        yield Found(interface, channel if isinstance(channel, int) else printable(str(channel)),
-                    printable(' '.join(names)) or 'found by its library', options, interface)
+        yield FoundAdapter(interface,
+                           channel if isinstance(channel, int) else printable(str(channel)),
+                           printable(' '.join(names)) or 'found by its library', options,
+                           interface)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drive_can_bridge.cli.main import main
-from drive_can_bridge.process.fast_dds import Ignored, Middleware, running
+from drive_can_bridge.process.fast_dds import IgnoredProfiles, Middleware, running
 from drive_can_bridge.resources import config_file
 
 OLD, NEW = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
@@ -77,16 +77,16 @@ def test_words_of_the_other_version_are_in_no_file() -> None:
 
 
 @pytest.mark.parametrize(('version', 'given', 'expected'), [
-    ('2.14', {NEW: 'own.xml'}, [Ignored(NEW, 'own.xml', OLD, False)]),
+    ('2.14', {NEW: 'own.xml'}, [IgnoredProfiles(NEW, 'own.xml', OLD, False)]),
     ('2.14', {OLD: 'own.xml'}, []),
     ('2.14', {OLD: '', NEW: ''}, []),
     # one file by both is read
     ('2.14', {OLD: 'own.xml', NEW: 'own.xml'}, []),
-    ('2.14', {OLD: 'own.xml', NEW: 'other.xml'}, [Ignored(NEW, 'other.xml', OLD, False)]),
+    ('2.14', {OLD: 'own.xml', NEW: 'other.xml'}, [IgnoredProfiles(NEW, 'other.xml', OLD, False)]),
     ('3.2', {OLD: 'own.xml', NEW: 'other.xml'}, []),
-    ('3.6', {OLD: 'own.xml'}, [Ignored(OLD, 'own.xml', NEW, False)])])
+    ('3.6', {OLD: 'own.xml'}, [IgnoredProfiles(OLD, 'own.xml', NEW, False)])])
 def test_what_is_not_in_effect(tmp_path: Path, version: str, given: dict[str, str],
-                               expected: list[Ignored]) -> None:
+                               expected: list[IgnoredProfiles]) -> None:
     assert list(loaded(tmp_path, version).ignored(given, tmp_path)) == expected
 
 
@@ -97,10 +97,10 @@ def test_protection_that_is_not_in_effect(tmp_path: Path, tls: Path, version: st
     middleware = loaded(tmp_path, version)
     for file in str(tls), 'security/tls_bridge.xml', 'security/tls_client.xml':
         assert list(middleware.ignored({variable: file}, tmp_path)) == [
-            Ignored(variable, file, instead, True)]
+            IgnoredProfiles(variable, file, instead, True)]
     # another file that is in effect protects nobody
     assert list(middleware.ignored({variable: str(tls), instead: 'own.xml'}, tmp_path)) == [
-        Ignored(variable, str(tls), instead, True)]
+        IgnoredProfiles(variable, str(tls), instead, True)]
     assert not list(middleware.ignored({instead: str(tls)}, tmp_path))
     # edited since
     tls.write_text(tls.read_text(encoding='utf-8').replace('5100', '5200'), encoding='utf-8')
@@ -115,7 +115,8 @@ def test_a_file_in_the_working_directory(tmp_path: Path, tls: Path, version: str
     assert not middleware.has_profiles({}, tmp_path)
     (tmp_path / lies_there).write_bytes(tls.read_bytes())
     assert not middleware.has_profiles({}, tmp_path)
-    assert list(middleware.ignored({}, tmp_path)) == [Ignored(lies_there, lies_there, read, True)]
+    assert list(middleware.ignored({}, tmp_path)) == [IgnoredProfiles(lies_there, lies_there,
+                                                                      read, True)]
     (tmp_path / lies_there).rename(tmp_path / read)
     assert middleware.has_profiles({}, tmp_path)
     assert not list(middleware.ignored({}, tmp_path))
@@ -126,7 +127,7 @@ def test_another_middleware_reads_none(tmp_path: Path, tls: Path, identifier: st
     middleware = running(identifier)
     assert middleware.name in ('Cyclone DDS', identifier)
     assert list(middleware.ignored({OLD: str(tls), NEW: 'own.xml'}, tmp_path)) == [
-        Ignored(OLD, str(tls), '', True), Ignored(NEW, 'own.xml', '', False)]
+        IgnoredProfiles(OLD, str(tls), '', True), IgnoredProfiles(NEW, 'own.xml', '', False)]
 
 
 def test_a_version_that_nobody_can_tell(tmp_path: Path, tls: Path) -> None:

@@ -15,7 +15,7 @@ from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import (
     DriveState, Event, MappingDiffered, Noted, StationFound, StationLost)
-from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.ros.bridge_runtime import Occasions
 from drive_can_bridge.ros.diagnostics import Report
@@ -112,7 +112,7 @@ def test_a_drive_that_falls_silent(bridge: StartBridge, tmp_path: Path) -> None:
     path, = wait_until(lambda: traces(tmp_path))
     assert path.name.startswith('main_') and path.name.endswith('_conveyor_offline.log')
     tracer, told = decoded(one, path)
-    answers = [telegram for telegram in told if telegram.kind is Kind.CYCLIC
+    answers = [telegram for telegram in told if telegram.kind is TelegramKind.CYCLIC
                and telegram.direction is Direction.RESPONSE]
     lost = [telegram for telegram in answers if telegram.verdict is Verdict.LOST]
     # the last answer is in it, and every request that got none

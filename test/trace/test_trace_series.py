@@ -6,7 +6,7 @@ from trace_builders import bridge
 
 from drive_can_bridge.core.configuration import JointConfiguration
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.protocols.observer import Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.trace.sinks import Curve, Lanes, Marks, Plotter
 
@@ -37,7 +37,8 @@ STATUS = Parameter('status_word', number=211, bits=(('enabled', 1), ('fault', 3)
 
 
 def telegram(time: float, raw: int, verdict: Verdict = Verdict.NORMAL) -> Telegram:
-    return Telegram(time, 'lift', Direction.RESPONSE, Kind.CYCLIC, 'cyclic response', (STATUS,),
+    return Telegram(time, 'lift', Direction.RESPONSE, TelegramKind.CYCLIC, 'cyclic response',
+                    (STATUS,),
                     () if verdict is Verdict.LOST else (raw,), verdict)
 
 
@@ -67,7 +68,7 @@ def test_the_position_of_a_joint_that_turns_on_and_on_goes_on_in_a_picture() -> 
     plotter = Plotter(bridge(drive), ['conveyor.place'], [])
     # a counter of 16 bits that begins again; after a loss the drive has the word
     for time, raw in ((5.0, 32766), (5.1, -32766), (5.2, -32764), (6.0, 8), (6.1, 10)):
-        plotter('main', Telegram(time, 'conveyor', Direction.RESPONSE, Kind.CYCLIC,
+        plotter('main', Telegram(time, 'conveyor', Direction.RESPONSE, TelegramKind.CYCLIC,
                                  'cyclic response', (place,), (raw,)))
     curve, = plotter._curves.values()
     assert [round(time, 6) for time in curve.points()[0]] == [0.0, 0.1, 0.2, 1.0, 1.1]

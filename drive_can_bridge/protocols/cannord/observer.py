@@ -21,12 +21,12 @@ from drive_can_bridge.protocols.cannord.process_data import (
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
+    DriveObserver, Emit, listed_by, raws_of, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import CYCLES_WAITED, CyclicWatch, RequestContent, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
-_CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
+_CYCLIC, _PARAMETER = TelegramKind.CYCLIC, TelegramKind.PARAMETER
 
 #: what tasks ask for that ask for no value
 _TITLES = {Task.NONE: 'no task', Task.READ_ELEMENTS: 'read number of elements'}

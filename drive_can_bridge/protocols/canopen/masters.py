@@ -50,9 +50,9 @@ def sdo_request(frame: Frame, node: int) -> Sentence:
         asked = sdo.decode(Direction.REQUEST, frame.data)
     except RemoteProtocolError:
         asked = None
-    if asked is not None and asked.kind in (sdo.Kind.UPLOAD, sdo.Kind.SEGMENT_WANTED):
+    if asked is not None and asked.kind in (sdo.SdoCommand.UPLOAD, sdo.SdoCommand.SEGMENT_WANTED):
         return sentences.other_master_reads(node, str(frame))
-    if asked is not None and asked.kind is sdo.Kind.DOWNLOAD and (
+    if asked is not None and asked.kind is sdo.SdoCommand.DOWNLOAD and (
             asked.object == HEARTBEAT_TIME and not any(asked.data)):
         return sentences.heartbeats_ended(node, str(frame))
     return sentences.other_master_asks_node(node, 'SDO requests', str(frame))

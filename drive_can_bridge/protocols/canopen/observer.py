@@ -5,11 +5,12 @@ from collections.abc import Callable
 
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
-from drive_can_bridge.protocols.observer import DriveObserver, Emit, Kind, Telegram, Verdict
+from drive_can_bridge.protocols.observer import (
+    DriveObserver, Emit, Telegram, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import AnswerWatch
 from drive_can_bridge.protocols.telegrams import Direction
 
-_REQUEST, _RESPONSE, _NETWORK = Direction.REQUEST, Direction.RESPONSE, Kind.NETWORK
+_REQUEST, _RESPONSE, _NETWORK = Direction.REQUEST, Direction.RESPONSE, TelegramKind.NETWORK
 _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
              for command in network.NmtCommand}
 

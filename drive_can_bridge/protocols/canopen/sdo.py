@@ -4,7 +4,8 @@ Objects of a CANopen node by SDO (CiA 301): reads of any length, writes of up to
 
 The codes with which a node refuses one stand here, too.
 
-The commands are the rows of :class:`Kind`; requests go to 600h + node, responses to 580h + node.
+The commands are the rows of :class:`SdoCommand`; requests go to 600h + node, responses to
+580h + node.
 Numbers are sent low byte first. Of the head, byte 0, the bits that a row leaves open say:
 
 ====================== =====================================================================
@@ -97,7 +98,7 @@ _SIZED, _LAST = 0x01, 0x01
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
 
 
-class Kind(Enum):
+class SdoCommand(Enum):
     """What a client asks for, and what a server says; an abort may answer everything."""
 
     UPLOAD = TelegramType(_REQUEST, 0x40, 0xE0, '<BHB4x', 'head index subindex',
@@ -115,12 +116,12 @@ class Kind(Enum):
     SEGMENT_TAKEN = TelegramType(_RESPONSE, 0x20, 0xE0, '<B7x', 'head')
     ABORT = TelegramType(Direction.NEITHER, 0x80, 0xFF, '<BHBI', 'head index subindex number')
 
-    def answers(self, request: 'Kind') -> bool:
+    def answers(self, request: 'SdoCommand') -> bool:
         """Tell whether this says that a request of the same object was carried out."""
         return self.name in request.value.answers.split()
 
 
-class Message(NamedTuple):
+class SdoMessage(NamedTuple):
     """
     A request or a response.
 
@@ -132,7 +133,7 @@ class Message(NamedTuple):
     :param last: no segment follows; with object and data: their length is told.
     """
 
-    kind: Kind
+    kind: SdoCommand
     object: tuple[int, int] | None
     data: bytes = b''
     number: int = 0
@@ -154,7 +155,7 @@ class Uploaded(NamedTuple):
     absent: bool = False
 
 
-def encode(message: Message) -> bytes:
+def encode(message: SdoMessage) -> bytes:
     """Encode a request or a response; the length of data is told."""
     kind, place, data, number, toggle, last = message
     row = kind.value
@@ -163,14 +164,14 @@ def encode(message: Message) -> bytes:
         head |= (SEGMENT_MAX - len(data) << 1 | _LAST * last) * ('data' in row.names)
     elif 'data' in row.names:
         head |= EXPEDITED_MAX - len(data) << 2 | _SIZED
-    elif number and kind is not Kind.ABORT:
+    elif number and kind is not SdoCommand.ABORT:
         head |= _SIZED
     index, subindex = place or (0, 0)
     return row.pack({'head': head, 'index': index, 'subindex': subindex, 'data': data,
                      'number': number})
 
 
-def request(node: int, message: Message) -> Frame:
+def request(node: int, message: SdoMessage) -> Frame:
     """Encode a request to a node."""
     check_node(node)
     return Frame(REQUEST_BASE + node, encode(message), False)
@@ -178,7 +179,7 @@ def request(node: int, message: Message) -> Frame:
 
 def encode_upload(node: int, index: int, subindex: int) -> Frame:
     """Encode the request to read an object."""
-    return request(node, Message(Kind.UPLOAD, (index, subindex)))
+    return request(node, SdoMessage(SdoCommand.UPLOAD, (index, subindex)))
 
 
 def encode_download(node: int, index: int, subindex: int, data: bytes) -> Frame:
@@ -189,10 +190,10 @@ def encode_download(node: int, index: int, subindex: int, data: bytes) -> Frame:
     """
     if not 1 <= len(data) <= EXPEDITED_MAX:
         raise LocalProtocolError(f'{len(data)} bytes cannot be written: 1 to {EXPEDITED_MAX}')
-    return request(node, Message(Kind.DOWNLOAD, (index, subindex), data))
+    return request(node, SdoMessage(SdoCommand.DOWNLOAD, (index, subindex), data))
 
 
-def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Message:
+def decode(direction: Direction, data: bytes, *, segments: bool = True) -> SdoMessage:
     """
     Decode a request or a response.
 
@@ -201,7 +202,7 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Messa
         bytes where it holds what its head promises: some devices leave the rest away.
     """
     head = data[0] if data else 0
-    kind = next((kind for kind in Kind if head & kind.value.mask == kind.value.code
+    kind = next((kind for kind in SdoCommand if head & kind.value.mask == kind.value.code
                  and kind.value.is_sent_by(direction)
                  and (segments or 'index' in kind.value.names)), None)
     least = LENGTH if kind is None or direction is _REQUEST else _promised(kind, head)
@@ -216,25 +217,26 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> Messa
     if 'index' not in fields:
         if content:
             content = content[:SEGMENT_MAX - (head >> 1 & 0x07)]
-        return Message(kind, None, content, toggle=head & TOGGLE,
-                       last=not content or bool(head & _LAST))
+        return SdoMessage(kind, None, content, toggle=head & TOGGLE,
+                          last=not content or bool(head & _LAST))
     sized = bool(head & _SIZED)
     if content and sized:
         content = content[:EXPEDITED_MAX - (head >> 2 & 0x03)]
-    return Message(kind, (fields['index'], fields['subindex']), content,
-                   number if sized or kind is Kind.ABORT else 0,
-                   last=sized if content else 'number' not in fields or kind is Kind.ABORT)
+    return SdoMessage(kind, (fields['index'], fields['subindex']), content,
+                      number if sized or kind is SdoCommand.ABORT else 0,
+                      last=sized if content else
+                      'number' not in fields or kind is SdoCommand.ABORT)
 
 
-def _promised(kind: Kind, head: int) -> int:
+def _promised(kind: SdoCommand, head: int) -> int:
     """Return how many bytes a response has at least, by its head."""
-    if kind is Kind.UPLOADED:
+    if kind is SdoCommand.UPLOADED:
         return LENGTH - (head >> 2 & 0x03 if head & _SIZED else 0)
-    if kind is Kind.SEGMENT:
+    if kind is SdoCommand.SEGMENT:
         return LENGTH - (head >> 1 & 0x07)
-    if kind is Kind.SEGMENT_TAKEN:
+    if kind is SdoCommand.SEGMENT_TAKEN:
         return 1
-    if kind is Kind.DOWNLOADED or kind is Kind.UPLOAD_BEGUN and not head & _SIZED:
+    if kind is SdoCommand.DOWNLOADED or kind is SdoCommand.UPLOAD_BEGUN and not head & _SIZED:
         return SHORTEST
     return LENGTH
 
@@ -246,8 +248,8 @@ def decode_upload(data: bytes) -> Uploaded:
     :raises RemoteProtocolError: it is no answer to an upload.
     """
     answer = decode(_RESPONSE, data, segments=False)
-    if answer.object is None or answer.kind is Kind.DOWNLOADED:
+    if answer.object is None or answer.kind is SdoCommand.DOWNLOADED:
         raise RemoteProtocolError(f'SDO command {data[0]:02X}h is no answer to an upload')
     return Uploaded(answer.object, int.from_bytes(answer.data, 'little')
-                    if answer.kind is Kind.UPLOADED else None,
-                    answer.kind is Kind.ABORT and answer.number in ABSENT)
+                    if answer.kind is SdoCommand.UPLOADED else None,
+                    answer.kind is SdoCommand.ABORT and answer.number in ABSENT)

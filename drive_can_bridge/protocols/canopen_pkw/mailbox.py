@@ -56,7 +56,7 @@ from drive_can_bridge.core.requests import Failure, refused, RetryPolicy
 from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Message
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, PkwMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.transactor import Transactor
 
@@ -164,7 +164,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
     :param sent: keeps the books of what left.
     """
 
-    def __init__(self, send: Callable[[Message, Left], None], *, order: str, retry: RetryPolicy,
+    def __init__(self, send: Callable[[PkwMessage, Left], None], *, order: str, retry: RetryPolicy,
                  sent: SentWrites[Span] | None = None) -> None:
         super().__init__(retry)
         self._send = send
@@ -172,13 +172,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._order = order
         self._synchronised = False
         self._toggle = False            # of the last request
-        self._request: Message | None = None
+        self._request: PkwMessage | None = None
         #: writes in order, the one under way included, whose answers may still come
-        self._open: deque[Message] = deque(maxlen=OPEN_MAX)
+        self._open: deque[PkwMessage] = deque(maxlen=OPEN_MAX)
         #: requests in order, of which a device that answers in order has answered no newer one
-        self._asked: deque[Message] = deque(maxlen=ASKED_MAX)
+        self._asked: deque[PkwMessage] = deque(maxlen=ASKED_MAX)
         #: writes that were given up and are not to be done twice, until a late answer may come
-        self._given_up: deque[tuple[float, Message]] = deque(maxlen=ASKED_MAX)
+        self._given_up: deque[tuple[float, PkwMessage]] = deque(maxlen=ASKED_MAX)
         self._late_until = -math.inf    # the answer to the request under way may come, at last
         self._until = math.inf          # an answer counts; the deadline may be a moment before
         self._abandoned = False
@@ -198,7 +198,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
     def repeatable(self, step: Step, *, users: bool) -> bool:
         return isinstance(step, Read)
 
-    def answers(self, answer: Message, step: Step) -> bool:
+    def answers(self, answer: PkwMessage, step: Step) -> bool:
         """Tell whether an answer may be that to a step that was given up, or to its 00h."""
         return answer.code == Function.NONE or pkw.answers(
             answer, self._make_request(step, answer.toggle))
@@ -232,7 +232,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._until = min(self._until, until)
             self.deadline = min(self.deadline, until)
 
-    def receive(self, answer: Message, now: float) -> Reply | bool:
+    def receive(self, answer: PkwMessage, now: float) -> Reply | bool:
         request, step, since = self._request, self.step, self._writes_since(answer)
         late_until = self._take_late(answer, now)
         if request is None or step is None:
@@ -292,7 +292,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._abandoned = self._late = self._preparing = False
         self._refused_at = None
 
-    def _prepare(self, request: Message, now: float) -> None:
+    def _prepare(self, request: PkwMessage, now: float) -> None:
         """Ask something else before the step."""
         self._preparing, self._request = True, request
         patience = STOP_PATIENCE if _is_blind(self.step) else SYNCHRONISATION_TIMEOUT
@@ -300,7 +300,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._asked.append(request)
         self._send(request, self._left)
 
-    def _prepared(self, request: Message, step: Step, now: float) -> Reply | bool:
+    def _prepared(self, request: PkwMessage, step: Step, now: float) -> Reply | bool:
         """Take the answer to what was asked before the step."""
         self._synchronised = True
         if self._abandoned:
@@ -337,14 +337,14 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._toggle = not self._toggle
         self._prepare(pkw.read_request(Address(word), 1, self._toggle), now)
 
-    def _writes_since(self, answer: Message) -> list[Message]:
+    def _writes_since(self, answer: PkwMessage) -> list[PkwMessage]:
         """Take an answer: it is to the oldest write that it fits. Return that and those since."""
         found = list(dropwhile(lambda each: not pkw.answers(answer, each), self._open))
         if found:
             self._open = deque(found[1:], maxlen=OPEN_MAX)
         return found
 
-    def _take_late(self, answer: Message, now: float) -> float | None:
+    def _take_late(self, answer: PkwMessage, now: float) -> float | None:
         """Take an answer; return until when it might be that to a write that was given up."""
         found = next(
             (each for each in self._still_late(now) if pkw.answers(answer, each[1])), None)
@@ -355,7 +355,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._asked = deque(older[1:], maxlen=ASKED_MAX)
         return None if found is None else found[0]
 
-    def _still_late(self, now: float) -> list[tuple[float, Message]]:
+    def _still_late(self, now: float) -> list[tuple[float, PkwMessage]]:
         """Return the writes that were given up, and until when answers to them may come anyhow."""
         if self._given_up:
             asked = set(map(id, self._asked))
@@ -426,19 +426,19 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._asked.append(self._request)
         self._send(self._request, left)
 
-    def _make_request(self, step: Step, toggle: bool) -> Message:
+    def _make_request(self, step: Step, toggle: bool) -> PkwMessage:
         if isinstance(step, Read):
             return pkw.read_request(step.address, step.count, toggle)
         return pkw.write_request(step.address, step.words, toggle)
 
 
-def _fits(answer: Message, request: Message) -> bool:
+def _fits(answer: PkwMessage, request: PkwMessage) -> bool:
     """Tell whether an answer may be that to a request, function 00h included."""
     return (answer.code == Function.NONE if request.code == Function.NONE else
             pkw.answers(answer, request))
 
 
-def _conflicts(written: Iterable[Message], request: Message) -> bool:
+def _conflicts(written: Iterable[PkwMessage], request: PkwMessage) -> bool:
     """Tell whether something else was written to the registers of a request."""
     return any(each.words != request.words and each.address == request.address
                for each in written)

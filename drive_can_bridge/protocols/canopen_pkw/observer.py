@@ -15,14 +15,14 @@ from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import hear_node
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, PkwMessage
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Kind, listed_by, raws_of, Verdict)
+    DriveObserver, Emit, listed_by, raws_of, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import RequestContent, Requests
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
-_PARAMETER = Kind.PARAMETER
+_PARAMETER = TelegramKind.PARAMETER
 
 
 class PkwObserver(DriveObserver):
@@ -43,14 +43,14 @@ class PkwObserver(DriveObserver):
             drive.profile.parameters.values(), lambda parameter: (
                 None if placement.address(parameter) is None else placement.span(parameter)))
         self._wanted = addresses.round_spans(drive)
-        self._requests: Requests[Message] = Requests(
+        self._requests: Requests[PkwMessage] = Requests(
             self, drive.parameter_timeout, self._content, plan=addresses.round_plan(drive),
             setpoints={placement.span(parameter) for parameter in drive.cyclic_request})
         self._last_byte: int | None = None
 
     # -- the mailbox ------------------------------------------------------------------------------
 
-    def _take_request(self, message: Message, now: float) -> None:
+    def _take_request(self, message: PkwMessage, now: float) -> None:
         repeated = message.function_byte == self._last_byte
         self._last_byte = message.function_byte
         if message.code == Function.NONE:
@@ -65,7 +65,7 @@ class PkwObserver(DriveObserver):
             futile=repeated, wrong='the function byte is that of the request before: nothing is '
             'started' if repeated else '')
 
-    def _take_response(self, message: Message, now: float) -> None:
+    def _take_response(self, message: PkwMessage, now: float) -> None:
         if message.code == Function.NONE:
             self.tell(now, _RESPONSE, _PARAMETER, 'idle response')
             return
@@ -85,7 +85,7 @@ class PkwObserver(DriveObserver):
             refusal=self._refusal(message) if refused else '',
             parts=addresses.instead_of(asked.span, self._wanted))
 
-    def _meant(self, message: Message, now: float, direction: Direction,
+    def _meant(self, message: PkwMessage, now: float, direction: Direction,
                title: str) -> RequestContent | None:
         """Return what a message is about; None: its function does not exist, which was told."""
         meaning = message.meaning
@@ -95,7 +95,7 @@ class PkwObserver(DriveObserver):
             return None
         return RequestContent(Span(message.address, meaning.count), meaning.writes)
 
-    def _refusal(self, message: Message) -> str:
+    def _refusal(self, message: PkwMessage) -> str:
         return pkw.describe(pkw.code_from_words(message.words, self._abort_order))
 
     def _content(self, span: Span, words: Sequence[int] | None,
@@ -115,7 +115,7 @@ class PkwObserver(DriveObserver):
         self._last_byte = None
 
 
-def _key(message: Message) -> Message:
+def _key(message: PkwMessage) -> PkwMessage:
     """Return what a request and its answer have in common."""
     low = message.low if message.address.by_object else 0
     return message._replace(words=pkw.NO_WORDS, low=low)

@@ -158,7 +158,7 @@ class Address(NamedTuple):
         return f'{self.word:04X}h.{self.subindex:02X}h'
 
 
-class Message(NamedTuple):
+class PkwMessage(NamedTuple):
     """
     The four words of the mailbox, of either direction.
 
@@ -199,7 +199,7 @@ class Message(NamedTuple):
 # -- messages -------------------------------------------------------------------------------------
 
 
-def read_request(address: Address, count: int, toggle: bool) -> Message:
+def read_request(address: Address, count: int, toggle: bool) -> PkwMessage:
     """
     Make the request that reads one register or two adjacent ones.
 
@@ -208,7 +208,7 @@ def read_request(address: Address, count: int, toggle: bool) -> Message:
     return _request(address, False, count, toggle, NO_WORDS)
 
 
-def write_request(address: Address, words: tuple[int, ...], toggle: bool) -> Message:
+def write_request(address: Address, words: tuple[int, ...], toggle: bool) -> PkwMessage:
     """
     Make the request that writes one register or two adjacent ones.
 
@@ -221,17 +221,17 @@ def write_request(address: Address, words: tuple[int, ...], toggle: bool) -> Mes
     return _request(address, True, len(words), toggle, (first, second))
 
 
-def idle_request(toggle: bool = False) -> Message:
+def idle_request(toggle: bool = False) -> PkwMessage:
     """Make the request that starts nothing, so that any function byte may follow."""
-    return Message(0, Function.NONE, toggle)
+    return PkwMessage(0, Function.NONE, toggle)
 
 
-def response(request: Message, words: Words = NO_WORDS) -> Message:
+def response(request: PkwMessage, words: Words = NO_WORDS) -> PkwMessage:
     """Make the device's response to a request; ``words`` are what was read."""
     return request._replace(words=words)
 
 
-def error_response(request: Message, words: Words) -> Message:
+def error_response(request: PkwMessage, words: Words) -> PkwMessage:
     """
     Make the response with which the device refuses a request.
 
@@ -240,7 +240,7 @@ def error_response(request: Message, words: Words) -> Message:
     return request._replace(code=int(Function.ERROR), words=words)
 
 
-def answers(message: Message, request: Message) -> bool:
+def answers(message: PkwMessage, request: PkwMessage) -> bool:
     """Tell whether a response, refusals included, belongs to a request."""
     return (message.toggle == request.toggle
             and message.code in (request.code, Function.ERROR)
@@ -248,7 +248,7 @@ def answers(message: Message, request: Message) -> bool:
             and (not request.address.by_object or message.low == request.low))
 
 
-def _request(address: Address, writes: bool, count: int, toggle: bool, words: Words) -> Message:
+def _request(address: Address, writes: bool, count: int, toggle: bool, words: Words) -> PkwMessage:
     function = _FUNCTIONS.get(Meaning(address.by_object, writes, count))
     if function is None:
         raise LocalProtocolError(f'{count} registers in one request: 1 or 2 are possible')
@@ -257,13 +257,13 @@ def _request(address: Address, writes: bool, count: int, toggle: bool, words: Wo
         if not 0 <= entry.word <= WORD_MAX or not 0 <= (entry.subindex or 0) <= SUBINDEX_MAX:
             raise LocalProtocolError(f'{entry} does not exist: register numbers and indices are '
                                      f'0 to {WORD_MAX}, sub-indices 0 to {SUBINDEX_MAX}')
-    return Message(address.word, function, toggle, address.subindex or 0, words)
+    return PkwMessage(address.word, function, toggle, address.subindex or 0, words)
 
 
 # -- bytes ----------------------------------------------------------------------------------------
 
 
-def encode(message: Message, layout: Layout) -> bytes:
+def encode(message: PkwMessage, layout: Layout) -> bytes:
     """
     Return the eight bytes of a message.
 
@@ -277,7 +277,7 @@ def encode(message: Message, layout: Layout) -> bytes:
         raise LocalProtocolError(f'{message!r} does not fit its words') from None
 
 
-def decode(data: bytes, layout: Layout) -> Message:
+def decode(data: bytes, layout: Layout) -> PkwMessage:
     """
     Read a message of either direction.
 
@@ -289,7 +289,7 @@ def decode(data: bytes, layout: Layout) -> Message:
         raise RemoteProtocolError(f'{len(data)} data bytes instead of {PAYLOAD}')
     packing, places = _PLACES[layout]
     _, (word, low, function, third, fourth) = zip(*sorted(zip(places, packing.unpack(data))))
-    return Message(word, function & CODE_MASK, bool(function & TOGGLE), low, (third, fourth))
+    return PkwMessage(word, function & CODE_MASK, bool(function & TOGGLE), low, (third, fourth))
 
 
 # -- 32-bit values --------------------------------------------------------------------------------

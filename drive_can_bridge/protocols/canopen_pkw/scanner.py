@@ -24,7 +24,7 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import TEXTS
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, Layout, PkwMessage
 from drive_can_bridge.protocols.scanner import (
     Certainty, conclude, Conversation, Finding, Prober, Question, Scanner, spaced)
 
@@ -45,7 +45,7 @@ _WIDE_MAX = 12
 _AGREEING = 2
 _SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); '
            'check station, bit rate, request_cob_id and response_cob_id')
-_Asking = Generator[Question, Frame | None, tuple[bytes, Message] | None]
+_Asking = Generator[Question, Frame | None, tuple[bytes, PkwMessage] | None]
 
 
 class CanopenScanner(Scanner):

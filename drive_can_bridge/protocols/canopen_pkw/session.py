@@ -56,7 +56,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
     MailboxChannel, MailboxTransactor, Procedure, Read, Refused, Reply, Silence, Step)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, Message
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, PkwMessage
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
@@ -381,7 +381,7 @@ class PkwSession(Session):
 
     # -- frames -----------------------------------------------------------------------------------
 
-    def _send(self, message: Message, left: Left) -> None:
+    def _send(self, message: PkwMessage, left: Left) -> None:
         request = pkw.encode(message, self._layout)
         self.outbox.put(Frame(self.configuration.options.request_cob_id, request, False), left)
 

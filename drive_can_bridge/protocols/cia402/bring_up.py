@@ -32,11 +32,11 @@ from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
 from drive_can_bridge.protocols.cia402.objects import (
-    at_object, differs, End, Found, Objects, Outcome, Procedure, silent)
+    at_object, differs, ObjectAccess, Procedure, SetUpEnd, SetUpOutcome, SetUpState, silent)
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
 from drive_can_bridge.protocols.cia402.states import MODES, State
-from drive_can_bridge.protocols.cia402.watch import Watch
+from drive_can_bridge.protocols.cia402.watch import BridgeWatch
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019
 PRODUCER = 0x1017
@@ -74,7 +74,7 @@ class BringUp:
         self._channel, self._limits, self._beat = channel, limits, beat
         self._drive, self._options = drive, drive.options
         self._mode = MODES[drive.options.mode]
-        objects = self._objects = Objects(drive.parameter_retries + 1)
+        objects = self._objects = ObjectAccess(drive.parameter_retries + 1)
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
         self._told: set[str] = set()
@@ -83,7 +83,7 @@ class BringUp:
         self.options: dict[int, int] = {}
         self.nmt_at = self.started_at = -math.inf
         self.forget(-math.inf)
-        self.watch = Watch(objects, drive, self.tell)
+        self.watch = BridgeWatch(objects, drive, self.tell)
         self._pdos = PdoSetUp(objects, drive, self._may_write, self.tell)
 
     def forget(self, now: float) -> None:
@@ -103,13 +103,13 @@ class BringUp:
         return min(max(self._asked_at, self._stopped_at + STOP_TIME), silent_at)
 
     def run(self) -> Procedure:
-        """Do it; returns an :class:`Outcome`."""
+        """Do it; returns a :class:`SetUpOutcome`."""
         self._asked_at = min(self._asked_at, self._channel.now)
         reply = yield Transfer(states.STATUS_WORD)
         if silent(reply):
             if self._node.heard_at > self._asked_at:
                 yield from self._tell_blindly(attempts=1)
-            return Outcome(Found.ABSENT)
+            return SetUpOutcome(SetUpState.ABSENT)
         try:
             yield from self._stand_still(reply)
             yield from self._learn()
@@ -124,9 +124,9 @@ class BringUp:
             yield from self._start()
             yield from self._find_axes()
             status = yield from self._once_more()
-        except End as end:
+        except SetUpEnd as end:
             return end.outcome
-        return Outcome(Found.READY, status=status)
+        return SetUpOutcome(SetUpState.READY, status=status)
 
     def _once_more(self) -> Generator[Transfer, TransferResult, int]:
         """Look again at what nobody looked at meanwhile; return the status word."""
@@ -174,7 +174,7 @@ class BringUp:
             found = (sentences.found_braking if braking else sentences.found_enabled)(state.value)
             if self._channel.now >= until:
                 runs = found if braking else sentences.found_running(state.value)
-                raise End(Outcome(Found.RUNS, together((runs, refusal))))
+                raise SetUpEnd(SetUpOutcome(SetUpState.RUNS, together((runs, refusal))))
             if not looks and found != self._found:
                 self._found = found
                 self._session.report.note(Noted(found, warning=True))
@@ -222,7 +222,7 @@ class BringUp:
         """Read it once more: users have written it."""
         try:
             yield from self._learn()
-        except End:    # nobody answers: what was read stands
+        except SetUpEnd:    # nobody answers: what was read stands
             return
 
     def _heartbeat(self) -> Procedure:
@@ -292,7 +292,7 @@ class BringUp:
             if said is NmtState.OPERATIONAL or said is None and now >= heard_by:
                 return
             if now >= until:
-                raise End(Outcome(Found.SILENT, sentences.node_state(
+                raise SetUpEnd(SetUpOutcome(SetUpState.SILENT, sentences.node_state(
                     (said or NmtState.PRE_OPERATIONAL).text)))
             yield Transfer(pause=LOOK_PERIOD)
 

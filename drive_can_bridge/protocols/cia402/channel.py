@@ -16,7 +16,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind, Message
+from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 from drive_can_bridge.protocols.telegrams import Direction
@@ -140,28 +140,28 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
 
     def receive(self, answer: bytes, now: float) -> TransferResult | bool:
         found, step = self.decode(answer), self.step
-        if found.kind is Kind.SEGMENT:
+        if found.kind is SdoCommand.SEGMENT:
             return self._take_segment(found, now)
         upload, until = self._open_upload
         if upload is not None and _belongs(found, upload):
             self._open_upload = None, -math.inf
             if upload is not step and now < until:
-                if found.kind is Kind.UPLOAD_BEGUN:
+                if found.kind is SdoCommand.UPLOAD_BEGUN:
                     self._give_up(_BROKEN_OFF, upload)
                 raise Unasked(f'SDO response {answer.hex(" ").upper()} to what was given up')
         if step is None or not _belongs(found, step):
             raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
-        if found.kind is Kind.UPLOAD_BEGUN:
+        if found.kind is SdoCommand.UPLOAD_BEGUN:
             self._collected, self._toggle = bytearray(), 0
             return self._ask_segment(now)
         self.finish()
-        if found.kind is Kind.ABORT:
+        if found.kind is SdoCommand.ABORT:
             return TransferResult(abort=found.number)
-        if found.object == (STATUS_WORD, 0) and found.kind is Kind.UPLOADED and found.last:
+        if found.object == (STATUS_WORD, 0) and found.kind is SdoCommand.UPLOADED and found.last:
             self._padded = len(found.data) > 2
         return self._answered(found.data, sized=found.last)
 
-    def decode(self, answer: bytes) -> Message:
+    def decode(self, answer: bytes) -> SdoMessage:
         """
         Decode a response.
 
@@ -177,7 +177,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
         """
         return _belongs(sdo.decode(Direction.RESPONSE, answer), step)
 
-    def _take_segment(self, found: Message, now: float) -> TransferResult | bool:
+    def _take_segment(self, found: SdoMessage, now: float) -> TransferResult | bool:
         if self._collected is None or found.toggle != self._toggle:
             raise RemoteProtocolError('SDO segment out of turn')
         self._collected += found.data
@@ -198,14 +198,14 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             self.forget()
             return SILENT
         self.deadline = now + self.retry.timeout
-        self._outbox.put(sdo.request(self._node, Message(
-            Kind.SEGMENT_WANTED, None, toggle=self._toggle)))
+        self._outbox.put(sdo.request(self._node, SdoMessage(
+            SdoCommand.SEGMENT_WANTED, None, toggle=self._toggle)))
         return True
 
     def _give_up(self, code: int, step: Transfer | None) -> None:
         if step is not None:
-            self._outbox.put(sdo.request(self._node, Message(
-                Kind.ABORT, (step.index, step.subindex), number=code)))
+            self._outbox.put(sdo.request(self._node, SdoMessage(
+                SdoCommand.ABORT, (step.index, step.subindex), number=code)))
 
     def handle_timer(self, now: float) -> TransferResult | bool:
         if self._collected is not None and self.busy and now >= self.deadline:
@@ -250,13 +250,13 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
 SdoChannel = Channel[Transfer, TransferResult]
 
 
-def _belongs(found: Message, step: Transfer) -> bool:
+def _belongs(found: SdoMessage, step: Transfer) -> bool:
     if step.pause:
         return False
     place = step.index, step.subindex
-    if found.kind is Kind.ABORT:    # of a command that it does not know, some say no object
+    if found.kind is SdoCommand.ABORT:    # of a command that it does not know, some say no object
         return found.object in (place, (0, 0))
-    asked = Kind.UPLOAD if step.data is None else Kind.DOWNLOAD
+    asked = SdoCommand.UPLOAD if step.data is None else SdoCommand.DOWNLOAD
     return found.object == place and found.kind.answers(asked)
 
 

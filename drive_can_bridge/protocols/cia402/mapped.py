@@ -16,7 +16,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
-from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import Pdo
 
 
@@ -25,7 +25,7 @@ def named(parameter: Parameter) -> str:
     return f'{parameter.name} ({at_object(parameter.index or 0, parameter.subindex or 0)})'
 
 
-def read_mapped(objects: Objects, pdos: Iterable[Pdo], status: TransferResult,
+def read_mapped(objects: ObjectAccess, pdos: Iterable[Pdo], status: TransferResult,
                 ) -> Generator[Transfer, TransferResult, dict[Parameter, int]]:
     """
     Read all that PDOs are to carry.

@@ -19,7 +19,7 @@ from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 Procedure = Generator[Transfer, TransferResult, Any]
 
 
-class Found(Enum):
+class SetUpState(Enum):
     """What the set-up has come to."""
 
     READY = 'ready'
@@ -30,7 +30,7 @@ class Found(Enum):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SetUpOutcome:
     """
     The end of the set-up.
 
@@ -39,21 +39,21 @@ class Outcome:
     :param remedy: says what to do about what differs.
     """
 
-    found: Found
+    found: SetUpState
     text: Sentence = NOTHING
     status: int = 0
     remedy: Callable[[str], Sentence] = sentences.drive_to_correct
 
 
-class End(Exception):
+class SetUpEnd(Exception):
     """The set-up ends here."""
 
-    def __init__(self, outcome: Outcome) -> None:
+    def __init__(self, outcome: SetUpOutcome) -> None:
         super().__init__(outcome.text)
         self.outcome = outcome
 
 
-class Objects:
+class ObjectAccess:
     """
     Reads and writes numbers.
 
@@ -71,10 +71,10 @@ class Objects:
         return self.abort in sdo.ABSENT
 
     def transfer(self, ask: Transfer) -> Generator[Transfer, TransferResult, TransferResult]:
-        """Do one transfer. :raises End: nobody answers."""
+        """Do one transfer. :raises SetUpEnd: nobody answers."""
         reply = yield ask
         if silent(reply):
-            raise End(Outcome(Found.SILENT))
+            raise SetUpEnd(SetUpOutcome(SetUpState.SILENT))
         self.abort = reply.abort
         return reply
 
@@ -84,7 +84,7 @@ class Objects:
         Read a number; None: the drive refuses.
 
         :param length: its bytes, where the drive does not tell, or answers with four always.
-        :raises End: nobody answers.
+        :raises SetUpEnd: nobody answers.
         """
         reply = yield from self.transfer(Transfer(index, subindex))
         if reply.data is None:
@@ -99,7 +99,7 @@ class Objects:
         Write a number; return the refusal.
 
         :param meant: what it stands for there.
-        :raises End: nobody answers.
+        :raises SetUpEnd: nobody answers.
         """
         data = (value & (1 << 8 * length) - 1).to_bytes(length, 'little')
         reply = yield from self.transfer(Transfer(index, subindex, data, attempts=self._attempts))
@@ -107,7 +107,7 @@ class Objects:
             what=at_object(index, subindex), why=sdo.describe(reply.abort), meant=meant)
 
     def must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
-        """Write a number. :raises End: nobody answers, or the drive refuses."""
+        """Write a number. :raises SetUpEnd: nobody answers, or the drive refuses."""
         refusal = yield from self.put(index, subindex, value, length)
         if refusal:
             raise differs(refusal)
@@ -119,9 +119,9 @@ def silent(reply: TransferResult) -> bool:
 
 
 def differs(text: Sentence, remedy: Callable[[str], Sentence] = sentences.drive_to_correct,
-            ) -> End:
+            ) -> SetUpEnd:
     """Return what ends the set-up of a drive that does not fit."""
-    return End(Outcome(Found.DIFFERS, text, remedy=remedy))
+    return SetUpEnd(SetUpOutcome(SetUpState.DIFFERS, text, remedy=remedy))
 
 
 def at_object(index: int, subindex: int = 0) -> str:

@@ -17,17 +17,17 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
-from drive_can_bridge.protocols.canopen.sdo import Kind as Said, Message
+from drive_can_bridge.protocols.canopen.sdo import SdoMessage, SdoCommand as Said
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Handler, Kind, listed_by, Observed, Verdict)
+    DriveObserver, Emit, Handler, listed_by, Observed, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import (
     AnswerWatch, CYCLES_WAITED, CyclicWatch, RequestContent, Requests)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
-_CYCLIC, _PARAMETER, _NETWORK = Kind.CYCLIC, Kind.PARAMETER, Kind.NETWORK
+_CYCLIC, _PARAMETER, _NETWORK = TelegramKind.CYCLIC, TelegramKind.PARAMETER, TelegramKind.NETWORK
 #: periods without a complete set of PDOs that nobody asks for, after which one is missed
 _SETS_WAITED = 1.5
 _BYTES = {1: ParameterType.UINT8, 2: ParameterType.UINT16, 3: ParameterType.UINT32,
@@ -136,7 +136,7 @@ class Cia402Observer(DriveObserver):
 
     # -- parameters -------------------------------------------------------------------------------
 
-    def _take_sdo_request(self, request: Message, now: float) -> None:
+    def _take_sdo_request(self, request: SdoMessage, now: float) -> None:
         if request.object is None:
             self._take_segment_request(request, now)
             return
@@ -150,7 +150,7 @@ class Cia402Observer(DriveObserver):
         self._requests.ask(place, place, now, None if request.kind is Said.UPLOAD else [
             int.from_bytes(written, 'little'), len(written)] if written else [])
 
-    def _take_sdo_response(self, answer: Message, now: float) -> None:
+    def _take_sdo_response(self, answer: SdoMessage, now: float) -> None:
         place = answer.object
         if place is None:
             self._take_segment(answer, now)
@@ -166,7 +166,7 @@ class Cia402Observer(DriveObserver):
                 int.from_bytes(answer.data, 'little'), len(answer.data)],
             refusal=sdo.describe(answer.number) if answer.kind is Said.ABORT else '')
 
-    def _take_segment_request(self, request: Message, now: float) -> None:
+    def _take_segment_request(self, request: SdoMessage, now: float) -> None:
         """Take the next segment, or the wish for it: the transfer was told."""
         if self._transfer is None:
             return
@@ -174,7 +174,7 @@ class Cia402Observer(DriveObserver):
         if request.kind is Said.SEGMENT_SENT and self._add(request):
             self._tell_text(_REQUEST, now)
 
-    def _take_segment(self, answer: Message, now: float) -> None:
+    def _take_segment(self, answer: SdoMessage, now: float) -> None:
         latency = self._segments.answer(now)
         last = self._last if answer.kind is Said.SEGMENT_TAKEN else self._add(answer)
         if last and self._transfer is not None:
@@ -183,7 +183,7 @@ class Cia402Observer(DriveObserver):
             self._tell_text(_RESPONSE, now, latency if self._writes else math.nan)
             self._end_transfer(now)
 
-    def _add(self, segment: Message) -> bool:
+    def _add(self, segment: SdoMessage) -> bool:
         """Keep what a segment holds; tell whether it is the last one."""
         # a domain may have megabytes, and no more of it is shown
         self._text = (self._text + segment.data)[:TEXT_MAX]

@@ -9,7 +9,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
-from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos, same_mapping
 
 
@@ -21,7 +21,7 @@ class PdoSetUp:
     :param tell: tells people once what the drive lacks.
     """
 
-    def __init__(self, objects: Objects, drive: DriveConfiguration,
+    def __init__(self, objects: ObjectAccess, drive: DriveConfiguration,
                  may_write: Callable[[Sentence], None], tell: Callable[[Sentence], None]) -> None:
         self._objects, self._drive, self._options = objects, drive, drive.options
         self._received, self._sent = request_pdos(drive), response_pdos(drive)

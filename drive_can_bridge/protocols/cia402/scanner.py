@@ -18,7 +18,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind, Message
+from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.pdo import (
     ENTRIES_MAX, entry_text, MAPPING_OFFSET, Pdo, request_pdos, response_pdos, same_mapping)
@@ -290,20 +290,21 @@ class Cia402Prober(Prober):
         text = f'{index:04X}h' + (f'.{subindex:02X}h' if subindex else '')
         if answer is None:
             return _Read(why=f'{text} was not answered')
-        if answer.kind is not Kind.ABORT:
+        if answer.kind is not SdoCommand.ABORT:
             return _Read(int.from_bytes(answer.data, 'little'))
         if answer.number in sdo.ABSENT:
             return _Read(absent=True, why=f'the drive has no {text}')
         return _Read(why=f'{text} was refused: {sdo.describe(answer.number)}')
 
 
-def _answer(data: bytes, place: tuple[int, int]) -> Message | None:
+def _answer(data: bytes, place: tuple[int, int]) -> SdoMessage | None:
     """Return the answer to the read of an object; None: it is none."""
     try:
         found = sdo.decode(Direction.RESPONSE, data, segments=False)
     except RemoteProtocolError:
         return None
-    return found if found.object == place and found.kind in (Kind.UPLOADED, Kind.ABORT) else None
+    return found if found.object == place and found.kind in (SdoCommand.UPLOADED,
+                                                             SdoCommand.ABORT) else None
 
 
 def _entries_text(entries: Sequence[int]) -> str:

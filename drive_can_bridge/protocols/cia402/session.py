@@ -51,7 +51,7 @@ from drive_can_bridge.protocols.cia402.control import control_table, DriveRules,
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
-from drive_can_bridge.protocols.cia402.objects import Found, Outcome
+from drive_can_bridge.protocols.cia402.objects import SetUpOutcome, SetUpState
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
@@ -284,9 +284,9 @@ class Cia402Session(Session):
             self._heartbeats.send(now)      # to be heard before the drive is to watch it
             if self._stopped_by_nmt(now) and now >= bring_up.nmt_at + START_PERIOD:
                 bring_up.wake(now)
-            outcome: Outcome = yield bring_up.run()
+            outcome: SetUpOutcome = yield bring_up.run()
             now, found, text = self._channel.now, outcome.found, outcome.text
-            if found is Found.READY:
+            if found is SetUpState.READY:
                 self._start_cycling(outcome.status, now)
                 return
             self.remedy = outcome.remedy
@@ -294,15 +294,15 @@ class Cia402Session(Session):
             self.report.guess(sentences.set_up_unanswered(),
                               unless=text or (refusal.reason if refusal else NOTHING))
             again = now + LOOK_AGAIN
-            if found is Found.DIFFERS:
+            if found is SetUpState.DIFFERS:
                 self.report.advise(sentences.mapping_differs(text), AdviceKind.MAPPING)
                 if text != told:
                     self.report.note(MappingDiffered(text))
-            elif found is Found.RUNS and text != told:
+            elif found is SetUpState.RUNS and text != told:
                 self.report.warn(text, may_run=True)
-            elif found is Found.SILENT:
+            elif found is SetUpState.SILENT:
                 again = max(now, bring_up.nmt_at + START_PERIOD)
-            elif found is Found.ABSENT:
+            elif found is SetUpState.ABSENT:
                 again = now
                 if now >= bring_up.nmt_at + START_PERIOD:
                     bring_up.wake(now)      # a node that was stopped answers nothing

@@ -16,7 +16,7 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
-from drive_can_bridge.protocols.cia402.objects import at_object, differs, Objects, Procedure
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
 from drive_can_bridge.protocols.cia402.pdo import request_pdos
 
 CONSUMER, GUARD_TIME, LIFE_FACTOR = 0x1016, 0x100C, 0x100D
@@ -25,7 +25,7 @@ WATCH_INTERVALS = 3
 _ACTIONS = {0: 'nothing', 1: 'fault', 2: 'power off, it coasts', 3: 'quick stop'}
 
 
-class Watch:
+class BridgeWatch:
     """
     What watches the bridge on behalf of one drive.
 
@@ -34,7 +34,7 @@ class Watch:
     :ivar text: what stops the drive when the bridge dies, for diagnostics; '': not looked yet.
     """
 
-    def __init__(self, objects: Objects, drive: DriveConfiguration,
+    def __init__(self, objects: ObjectAccess, drive: DriveConfiguration,
                  tell: Callable[..., None]) -> None:
         self.slot: int | None = None
         self.text = ''

@@ -12,14 +12,14 @@ from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
-    DriveObserver, Emit, Handler, Kind, listed_by, raws_of, Telegram, Verdict)
+    DriveObserver, Emit, Handler, listed_by, raws_of, Telegram, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import (
     CYCLES_WAITED, CyclicWatch, RequestContent, Requests, WriteGap)
 from drive_can_bridge.protocols.polled_exchange import Chunk
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
-_CYCLIC, _PARAMETER = Kind.CYCLIC, Kind.PARAMETER
+_CYCLIC, _PARAMETER = TelegramKind.CYCLIC, TelegramKind.PARAMETER
 _NORMAL = Verdict.NORMAL
 
 

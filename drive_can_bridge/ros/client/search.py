@@ -157,7 +157,7 @@ _MARK = '.profile_sha256'
 
 
 @dataclass(slots=True)
-class Found:
+class FoundBridge:
     """
     What is known of a bridge.
 
@@ -224,7 +224,7 @@ class Search:
         self._expected = list(expected)
         self._only = only
         self._calls = NodeCalls(client_node, patience or _ANSWER_TIMEOUT)
-        self.found: dict[str, Found] = {}
+        self.found: dict[str, FoundBridge] = {}
         self.services: Entries = ()
         self._looked_at = self._changed_at = self._began = -1.0
 
@@ -267,7 +267,7 @@ class Search:
 
     def know(self, name: str, drives: Sequence[str], others: Sequence[str]) -> None:
         """Have it known of a bridge what it has said another way: it is not asked."""
-        found = self.found.setdefault(name, Found(name))
+        found = self.found.setdefault(name, FoundBridge(name))
         found.drives = tuple(drive.rpartition('/')[2] for drive in drives)
         found.others = tuple(others)
 
@@ -285,7 +285,7 @@ class Search:
                 if not (each.answered or each.silent)):
             self._signs = self._make_signs()
 
-    def _give_up(self, bridge: Found, ask_again: Callable[[float], None]) -> None:
+    def _give_up(self, bridge: FoundBridge, ask_again: Callable[[float], None]) -> None:
         """Have a bridge silent that has not answered in time, unless it is seen to live."""
         if (self._signs is not None and self._now < bridge.asked_at + _BUSY_TIMEOUT
                 and self._signs.lives(bridge.name)):
@@ -298,11 +298,11 @@ class Search:
             if (name not in self.found and self._namespace in (None, namespace_of(name))
                     and (self._only is None or name in self._only)):
                 other = bool(foreign(self._client_node, f'{name}/save_trace'))
-                self.found[name] = Found(name, silent=other, foreign=other)
+                self.found[name] = FoundBridge(name, silent=other, foreign=other)
                 if not other:
                     self._ask(self.found[name], now)
 
-    def _ask(self, bridge: Found, now: float) -> None:
+    def _ask(self, bridge: FoundBridge, now: float) -> None:
         bridge.asked_at = now
 
         def take_others(response: GetParameters.Response | None) -> None:
@@ -373,7 +373,7 @@ def find_drives(graph: Graph, namespace: str | None) -> dict[str, str]:
     return bridge_of
 
 
-def find_bridges(graph: Graph, pattern: str) -> list[Found]:
+def find_bridges(graph: Graph, pattern: str) -> list[FoundBridge]:
     """
     Return the bridges in all namespaces that fit to a shell pattern.
 
@@ -389,7 +389,7 @@ def find_bridges(graph: Graph, pattern: str) -> list[Found]:
     return found
 
 
-def _must_talk(graph: Graph, found: Iterable[Found]) -> None:
+def _must_talk(graph: Graph, found: Iterable[FoundBridge]) -> None:
     """
     See that bridges have the middleware of this process.
 

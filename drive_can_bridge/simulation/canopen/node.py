@@ -14,7 +14,7 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
 from drive_can_bridge.simulation.canopen.sdo import Absent, checked_length, Objects, SdoServer
-from drive_can_bridge.simulation.drive import Companion, Ignored, SimulatedDrive
+from drive_can_bridge.simulation.drive import Companion, IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.registers import Refused
 
 #: objects by index and sub-index
@@ -112,7 +112,7 @@ class CanopenNode(Companion):
         try:
             command, number = network.decode_nmt(data)
         except RemoteProtocolError:
-            raise Ignored('NMT command without two data bytes') from None
+            raise IgnoredFrame('NMT command without two data bytes') from None
         if number not in (0, self.number):
             return
         if command == NmtCommand.RESET_NODE:

@@ -10,7 +10,7 @@ from typing import Protocol
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.canopen.sdo import Kind, Message
+from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
 
@@ -158,39 +158,40 @@ class SdoServer:
             answer = self._serve(request)
         except Refused as error:
             self.reset()
-            answer = Message(Kind.ABORT, self._place, number=error.code)
+            answer = SdoMessage(SdoCommand.ABORT, self._place, number=error.code)
         return None if answer is None else sdo.encode(answer)
 
-    def _serve(self, request: bytes) -> Message | None:
+    def _serve(self, request: bytes) -> SdoMessage | None:
         try:
             kind, place, data, number, toggle, last = sdo.decode(Direction.REQUEST, request)
         except RemoteProtocolError:
             self._place = int.from_bytes(request[1:3], 'little'), request[3]
             raise Refused(sdo.UNKNOWN_COMMAND) from None
         if place is None:
-            under_way = self._rest if kind is Kind.SEGMENT_WANTED else self._written is not None
+            under_way = (self._rest if kind is SdoCommand.SEGMENT_WANTED else
+                         self._written is not None)
             if not under_way:
                 raise Refused(sdo.UNKNOWN_COMMAND)
             if toggle != self._toggle:
                 raise Refused(sdo.TOGGLE_NOT_ALTERNATED)
             self._toggle ^= sdo.TOGGLE
-            return self._next_segment(toggle) if kind is Kind.SEGMENT_WANTED else (
+            return self._next_segment(toggle) if kind is SdoCommand.SEGMENT_WANTED else (
                 self._take_segment(data, toggle, last))
         self.reset()
-        if kind is Kind.ABORT:
+        if kind is SdoCommand.ABORT:
             return None
         self._place = place
-        if kind is Kind.UPLOAD:
+        if kind is SdoCommand.UPLOAD:
             return self._upload(self._objects.read_object(*place))
-        if kind is Kind.DOWNLOAD:
+        if kind is SdoCommand.DOWNLOAD:
             self._objects.write_object(*place, data)
         elif self._segmented_writes:
             self._written, self._toggle, self._announced = b'', 0, number
         else:
             raise Refused(sdo.UNKNOWN_COMMAND)
-        return Message(Kind.DOWNLOADED, place)
+        return SdoMessage(SdoCommand.DOWNLOADED, place)
 
-    def _take_segment(self, data: bytes, toggle: int, last: bool) -> Message:
+    def _take_segment(self, data: bytes, toggle: int, last: bool) -> SdoMessage:
         data = self._written = (self._written or b'') + data
         if len(data) > (self._announced or WRITE_MAX):
             raise Refused(TYPE_TOO_LONG)
@@ -199,17 +200,17 @@ class SdoServer:
                 raise Refused(TYPE_TOO_SHORT)
             self.reset()
             self._objects.write_object(*self._place, data)
-        return Message(Kind.SEGMENT_TAKEN, None, toggle=toggle)
+        return SdoMessage(SdoCommand.SEGMENT_TAKEN, None, toggle=toggle)
 
-    def _upload(self, data: bytes) -> Message:
+    def _upload(self, data: bytes) -> SdoMessage:
         if len(data) <= sdo.EXPEDITED_MAX:
-            return Message(Kind.UPLOADED, self._place, data)
+            return SdoMessage(SdoCommand.UPLOADED, self._place, data)
         self._rest, self._toggle = data, 0
-        return Message(Kind.UPLOAD_BEGUN, self._place, number=len(data))
+        return SdoMessage(SdoCommand.UPLOAD_BEGUN, self._place, number=len(data))
 
-    def _next_segment(self, toggle: int) -> Message:
+    def _next_segment(self, toggle: int) -> SdoMessage:
         segment, self._rest = self._rest[:sdo.SEGMENT_MAX], self._rest[sdo.SEGMENT_MAX:]
-        return Message(Kind.SEGMENT, None, segment, toggle=toggle, last=not self._rest)
+        return SdoMessage(SdoCommand.SEGMENT, None, segment, toggle=toggle, last=not self._rest)
 
 
 def checked_length(data: bytes, length: int) -> bytes:

@@ -25,7 +25,7 @@ class Box:
             self.send, order=order, retry=RetryPolicy(timeout, attempts=1))
         self.left: Left = lambda sent, now: None
 
-    def send(self, message: pkw.Message, left: Left) -> None:
+    def send(self, message: pkw.PkwMessage, left: Left) -> None:
         self.sent.append(pkw.encode(message, Layout.WORD_LE).hex().upper())
         self.left = left
 
