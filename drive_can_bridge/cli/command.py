@@ -8,24 +8,24 @@ Whatever it raises, :mod:`.main` says in one line.
 
 import argparse
 from argparse import ArgumentParser, ArgumentTypeError
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-import json
 import math
 import os
 from pathlib import Path
 import re
 import sys
 import termios
-from typing import Any, NoReturn, TYPE_CHECKING, TypeVar
+from typing import NoReturn, TYPE_CHECKING, TypeVar
 
+from drive_can_bridge.cli.saying import (
+    FAILED as FAILED, print_json as print_json, say as say)
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import is_ros_name, printable
 
 if TYPE_CHECKING:
     from drive_can_bridge.core.configuration import BridgeConfiguration
 
-FAILED = 1
 WRONG_USAGE = 2
 #: characters of a line of complaint: some name all that there is
 LINE_MAX = 4000
@@ -54,19 +54,6 @@ class Parser(argparse.ArgumentParser):
         """
         complain(printable(f'{self.prog}: {message}; see {self.prog} --help', None))
         raise SystemExit(WRONG_USAGE)
-
-
-def say(text: str) -> None:
-    """Write a line to standard output."""
-    print(printable(text, None))
-
-
-def print_json(*documents: Mapping[str, Any]) -> None:
-    """Print JSON documents, each as a line of standard output; JSON has no inf, and no nan."""
-    for document in documents:
-        print(json.dumps({
-            key: str(value) if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in document.items()}, ensure_ascii=False))
 
 
 def complain(text: str) -> None:

@@ -6,20 +6,17 @@
 """
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from drive_can_bridge.cli.command import (
-    complain, FAILED, namespace, print_json, say, WrongUsage,
-)
+from drive_can_bridge.cli.command import complain, namespace, WrongUsage
+from drive_can_bridge.cli.stopping import answers, show
 from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern
-from drive_can_bridge.process.environment import nobody
-from drive_can_bridge.process.local_stop import Answer, begun, LocalStop, RUNNING
+from drive_can_bridge.process.local_stop import Answer, begun, LocalStop
 from drive_can_bridge.process.local_way import matches
-from drive_can_bridge.process.presence import short
 from drive_can_bridge.resources import what_is_missing
 
 STOP = 'stop'
@@ -34,6 +31,8 @@ _WORDS = {
 }
 #: s between two looks at what has arrived
 LOOK_PERIOD = 0.002
+#: s that a node may take to become part of the graph where it is no longer wanted there
+JOIN_TIMEOUT = 2.0
 
 
 def define(parser: ArgumentParser) -> None:
@@ -77,12 +76,12 @@ def run(args: Namespace) -> int:
     from drive_can_bridge.cli.output import waiting     # a stop has no time for that
     try:
         with waiting('waiting for the bridge'):
-            answers = _given_locally(args)
-            if answers is None:
-                answers = _given(args)
+            found = _given_locally(args)
+            if found is None:
+                found = _given(args)
     except (UnknownDrive, WhichBridge) as error:
         raise WrongUsage(str(error)) from None
-    return _show(args, answers)
+    return show(found, args.subcommand, json=args.json)
 
 
 def _given_locally(args: Namespace) -> list[Answer] | None:
@@ -108,15 +107,18 @@ def _given(args: Namespace) -> list[Answer]:
         graph.close()
 
 
-def _ros(args: Namespace) -> tuple[Any, Any]:
+def _ros(args: Namespace, join: Callable[[Callable[[], Any]], Any] = lambda make: make(),
+         ) -> tuple[Any, Any]:
     """
     Become part of the ROS graph; return that, and what tells drives there.
 
+    :param join: has the node made that is part of it.
     :raises DriveCanError: no ROS.
     """
     try:
         from drive_can_bridge.ros.client.calls import ClientNode
-        client_node = ClientNode('client')     # is being discovered while the rest is imported
+        # is being discovered while the rest is imported
+        client_node = join(partial(ClientNode, 'client'))
         from drive_can_bridge.ros.client import control
         from drive_can_bridge.ros.client.search import Graph
     except ImportError as error:
@@ -146,18 +148,58 @@ def _stop(args: Namespace) -> int:
     try:
         while not local.look(now()) and not ros.look(now()):
             args.clock.wait(now() + LOOK_PERIOD)
-        return _show(args, ros.answers())
+        return show(ros.answers(), STOP, json=args.json)
     except KeyboardInterrupt:
         complain('interrupted; this is known:')
-        _show(args, ros.answers())
+        show(ros.answers(), STOP, json=args.json)
         raise
-    except DriveCanError:   # no ROS: what was reached without is told all the same
-        if local.answers():
-            _show(args, ros.answers())
+    except DriveCanError:   # no ROS: what is known without is told all the same
+        if local.answers() or local.unheard:
+            show(ros.answers(), STOP, json=args.json)
         raise
     finally:
         local.close()
         ros.close()
+
+
+class _Joining:
+    """
+    Becomes part of the ROS graph in a thread of its own, because all of that takes a while.
+
+    :ivar done: the graph, and what tells drives there; None: not yet.
+    :ivar failure: why there is none.
+    """
+
+    def __init__(self, args: Namespace) -> None:
+        self.done: tuple[Any, Any] | None = None
+        self.failure: Exception | None = None
+        self._args = args
+        self._node: Any = None
+        self._given_up = False
+        self._making = args.clock.lock()
+        args.clock.worker(self._run, 'ROS').start()
+
+    def _run(self) -> None:
+        try:
+            self.done = _ros(self._args, self._join)
+        except Exception as error:  # noqa: BLE001  raised again by who waits for it
+            self.failure = error
+
+    def _join(self, make: Callable[[], Any]) -> Any:
+        with self._making:
+            if self._given_up:
+                raise DriveCanError('nobody wants this any more')
+            self._node = make()
+        return self._node
+
+    def close(self) -> None:
+        """Leave the graph, of which nothing is left half made; what is imported does not count."""
+        made = self._making.acquire(JOIN_TIMEOUT)
+        self._given_up = True
+        if self._node is not None:
+            self._node.leave()
+        if made:
+            self._making.release()
 
 
 class _RosStop:
@@ -166,65 +208,43 @@ class _RosStop:
     def __init__(self, args: Namespace, local: LocalStop) -> None:
         self._args = args
         self._local = local
-        self._graph: Any = None
+        self._joining: _Joining | None = None
         self._stop: Any = None
 
     def look(self, now: float) -> bool:
-        """Go on; return whether all is done, of the local part, too."""
-        args, local = self._args, self._local
+        """
+        Go on; return whether all is done, of the local part, too.
+
+        :raises DriveCanError: no ROS, and nothing is to be expected without it.
+        """
+        local = self._local
+        if self._stop is None and local.wants_ros(now):
+            self._begin(now)
         if self._stop is None:
-            if not local.wants_ros(now):
-                return False
-            self._graph, control = _ros(args)
-            self._stop = control.Stop(self._graph.client_node, args.namespace, args.words, [
-                each.name for each in local.present
-                if each.domain == local.domain and each.has_place])
+            return False
         for name, told in local.known.items():
             self._stop.know(name, told.drives, told.seen)
         self._stop.leave(local.handled)
         return self._stop.look(now) and local.over(now)
 
+    def _begin(self, now: float) -> None:
+        """Become part of the graph, and have drives told there."""
+        args, local = self._args, self._local
+        if self._joining is None:
+            self._joining = _Joining(args)
+        if self._joining.failure is not None and local.over(now):
+            raise self._joining.failure
+        if self._joining.done is not None:
+            graph, control = self._joining.done
+            self._stop = control.Stop(graph.client_node, args.namespace, args.words, [
+                each.name for each in local.present
+                if each.domain == local.domain and each.has_place])
+
     def answers(self) -> list[Answer]:
         """Return what became of all."""
-        args, local, stop = self._args, self._local, self._stop
-        told, known, drives = list(local.answers()), set(local.known), local.drives
-        heard = set() if stop is None else {short(name) for name in stop.heard}
-        told = [Answer(each.name, False, f'{each.silence(local.domain)}: its drives {RUNNING}',
-                       bridge=True)
-                for each in local.unheard
-                if each.domain != local.domain or each.name not in heard] + told
-        if stop is not None:
-            named = {answer.name for answer in told if answer.bridge}
-            told += [answer for answer in stop.answers(local.present)
-                     if not answer.bridge or short(answer.name) not in named]
-            known, drives = known | stop.seen, [*drives, *stop.drives]
-        nodes = {answer.name for answer in told if not answer.bridge}
-        there = ', '.join(node.lstrip('/') for node in dict.fromkeys(drives)) or 'none'
-        told += [Answer(word, False, f'no such drive; there are: {there}') for word in args.words
-                 if known and not any(matches(word, node) for node in nodes)]
-        own = any(each.domain in (None, local.domain) for each in local.present)
-        if not known and (not told or not own and stop is not None):
-            # those of other domains may be all that there are, or discovery was too slow
-            told.append(Answer('', bool(told), nobody(args.namespace), bridge=True))
-        return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
-                        for name in known]
+        return answers(self._local, self._stop, self._args.namespace, self._args.words)
 
     def close(self) -> None:
         """Leave the graph."""
-        if self._graph is not None:
-            self._graph.close()
-
-
-def _show(args: Namespace, answers: Sequence[Any]) -> int:
-    """Print what became of it, failures first; return the exit code."""
-    for answer in sorted(answers, key=lambda each: each.ok):
-        name, elsewhere = answer.name.lstrip('/'), answer.domain is not None
-        if args.json:
-            print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
-                        'message': answer.text,
-                        **({'domain': answer.domain} if elsewhere else {})})
-        else:
-            verdict = '' if answer.ok or args.subcommand != STOP else 'NOT STOPPED'
-            say((f'[domain {answer.domain}] ' if elsewhere else '')
-                + ': '.join(filter(None, (name, verdict, answer.text))))
-    return 0 if answers and all(answer.ok for answer in answers) else FAILED
+        if self._joining is not None:
+            self._joining.close()

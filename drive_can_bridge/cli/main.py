@@ -12,7 +12,6 @@ import argparse
 from argparse import HelpFormatter
 from collections.abc import Sequence
 import importlib
-import io
 import os
 import re
 import signal
@@ -25,7 +24,8 @@ from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import nearest
-from drive_can_bridge.process.beginning import keep_output, let_signals_in
+from drive_can_bridge.process.beginning import (
+    keep_output, let_signals_in, look_after_outputs)
 
 #: what for, subcommand, one line of help
 GROUPS: dict[str, dict[str, str]] = {
@@ -141,8 +141,10 @@ ENDLESS_OPTIONS = ('--live', '--watch')
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
 #: subcommands that open no bus, whatever they are given
 WITHOUT_BUS = (*GROUPS['By hand'], 'monitor', 'panel')
+#: want something of drives, and end
+OF_DRIVES = (*GROUPS['By hand'], *GROUPS['Parameters of drives'])
 #: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
-WITH_ROS = (*GROUPS['By hand'], *GROUPS['Parameters of drives'], 'monitor', 'panel')
+WITH_ROS = (*OF_DRIVES, 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
 SHOWING = ('adapters', 'validate', 'decode', 'explain', 'profile')
 #: exit codes of what could not be done, where 1 says something else
@@ -162,7 +164,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     :return: exit code.
     """
     arguments = _in_order(sys.argv[1:] if argv is None else argv)
-    wanted = _wanted(arguments)
+    wanted = subcommand_in(arguments)
     failed = TROUBLE.get(wanted, FAILED)
     prefix = f'{PROGRAM} {wanted}'.rstrip()
     endless = wanted in ENDLESS or any(
@@ -170,7 +172,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     if argv is None:
         if wanted in WITH_ROS:
             keep_output()
-        _look_after_outputs()
+        look_after_outputs()
     code = None
     if argv is None and endless:  # until the subcommand looks after signals itself
         for number in _ENDING:
@@ -215,13 +217,6 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
                 signal.signal(number, signal.SIG_IGN)
 
 
-def _look_after_outputs() -> None:
-    """Let nothing that is said raise an error: an output may be one that has no … or °."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors='backslashreplace')
-
-
 def _in_order(arguments: Sequence[str]) -> list[str]:
     """Have the subcommand first: its options may stand anywhere, before it too."""
     words = list(arguments)
@@ -231,7 +226,8 @@ def _in_order(arguments: Sequence[str]) -> list[str]:
     return words
 
 
-def _wanted(arguments: list[str]) -> str:
+def subcommand_in(arguments: Sequence[str]) -> str:
+    """Return what is wanted; '' where nothing is."""
     return next((word for word in arguments if not word.startswith('-')), '')
 
 
@@ -242,7 +238,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     :raises SystemExit: they mean nothing, or help is all that is wanted.
     """
     completing = typed()
-    wanted = _wanted(arguments if completing is None else completing)
+    wanted = subcommand_in(arguments if completing is None else completing)
     parser = Parser(
         prog=PROGRAM, usage=f'{PROGRAM} SUBCOMMAND …', formatter_class=Formatter,
         description='Tools of drive_can_bridge, the bridge from motor drives on CAN buses to '

@@ -19,7 +19,8 @@ from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Source
 from drive_can_bridge.monitor.summary import balance, documents, Lines
 from drive_can_bridge.process import environment
-from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.process.beginning import leave
+from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.resources import what_is_missing
 
 #: s between two lines of a drive, and between two looks at what arrives
@@ -85,7 +86,9 @@ def run(args: argparse.Namespace) -> int:
             code = _show(source, model, watcher, args, refusal)
         finally:
             source.close()
-        leave(watcher.exit_code(code))
+        code = watcher.exit_code(code)
+        leave(code)
+        return code
 
 
 def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace,

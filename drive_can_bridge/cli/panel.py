@@ -14,7 +14,8 @@ from drive_can_bridge.cli.command import namespace, whole
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
-from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.process.beginning import leave
+from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.resources import command_that_brings, what_is_missing
 
 COMMAND = 'drive_can panel'
@@ -49,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     with SignalWatcher(args.clock, keep=True) as watcher:
         if not _serve(args, lambda: watcher.signalled):
             print(f'{COMMAND}: ended before it served a page', file=sys.stderr)
-        leave(watcher.exit_code(0))
+        code = watcher.exit_code(0)
+        leave(code)
+        return code
 
 
 def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:

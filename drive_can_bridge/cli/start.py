@@ -9,7 +9,7 @@ A stop does not: what it needs to be sent by the local way is all that is import
 import sys
 
 from drive_can_bridge import __version__
-from drive_can_bridge.process.beginning import begin
+from drive_can_bridge.process.beginning import begin, leave
 
 
 def main() -> int:
@@ -20,9 +20,18 @@ def main() -> int:
         return 0
     if sys.argv[1:2] == ['stop']:
         from drive_can_bridge.process.local_stop import begin as begin_stop
-        begin_stop(sys.argv[2:])    # and go on: there may be bridges elsewhere
-    from drive_can_bridge.cli.main import main as run
-    return run()
+        early = begin_stop(sys.argv[2:])
+        if early is not None:
+            from drive_can_bridge.cli.stopping import finished
+            code = finished(early)
+            if code is not None:
+                leave(code)     # signals still wait, and all is done
+    from drive_can_bridge.cli import main as command
+    code = command.main()
+    # buses that were opened here have more to do
+    if command.subcommand_in(sys.argv[1:]) in command.OF_DRIVES and 'can' not in sys.modules:
+        leave(code)
+    return code
 
 
 if __name__ == '__main__':

@@ -8,6 +8,7 @@ takes time.
 
 from collections import namedtuple
 from collections.abc import Iterable, Sequence
+import select
 
 from drive_can_bridge.process.local_way import (
     ANYWHERE, END, Line, meant, NO, PATIENCE, Rubbish)
@@ -58,6 +59,7 @@ class _Told:
     :ivar answers: of its drives.
     :ivar ended: these were all.
     :ivar passed: what became of others that it has passed a stop on to; None: was not asked to.
+    :ivar said: something, since the last look.
     """
 
     def __init__(self, present: Present, question: Sequence[str]) -> None:
@@ -71,7 +73,8 @@ class _Told:
         self.around: list[str] = []
         self.answers: dict[str, Answer] = {}
         self.passed: list[Answer] | None = None
-        self.ended = False
+        self.ended = self.said = False
+        self._heard_at = 0.0
 
     def ask(self) -> None:
         """Ask it, if it listens."""
@@ -96,6 +99,11 @@ class _Told:
         return self.passed is not None and self.line is None and not self.ended
 
     @property
+    def unreached(self) -> bool:
+        """It is not known to have been asked: an older one, of another user, or it has ended."""
+        return not self.here and (self.line is None or not self.line.believed)
+
+    @property
     def quiet(self) -> bool:
         """It may still answer, and has not said who it is."""
         return not self.here and (self.busy or self.line is not None and self.line.believed)
@@ -111,6 +119,7 @@ class _Told:
                 message = line.take()
                 if message is None:
                     return
+                self.said = True
                 self._take(message)
                 if self.line is None:
                     return
@@ -138,6 +147,13 @@ class _Told:
         elif kind == NO:
             self.hang_up()
 
+    def give_up(self, now: float) -> None:
+        """Hang up on one that was to pass a stop on, and has said nothing for too long."""
+        if self.said or not self._heard_at:
+            self.said, self._heard_at = False, now
+        elif now - self._heard_at > PATIENCE:
+            self.hang_up()
+
     def hang_up(self) -> None:
         """Ask it nothing more."""
         line, self.line = self.line, None
@@ -160,6 +176,7 @@ class LocalStop:
         self._namespace = namespace
         self._words = list(words)
         self._began: float | None = None
+        self._waited_before = 0.0
         question = ['stop', ANYWHERE if namespace is None else namespace, *self._words]
         everywhere = not words and namespace is None
         self._told = [_Told(each, question) for each in bridges()
@@ -175,7 +192,7 @@ class LocalStop:
     def look(self, now: float) -> bool:
         """Take what was said; return whether all that anybody knows of have answered."""
         if self._began is None:
-            self._began = now
+            self._began = now - self._waited_before
         waited = now - self._began
         for each in (*self._told, *self._passing):
             if each.busy and waited < PATIENCE:
@@ -183,10 +200,23 @@ class LocalStop:
             each.look()
         if waited >= SOON or not any(each.quiet for each in self._told):
             self._pass_on()
-        if waited > STOP_TIMEOUT + PATIENCE:
-            for each in self._passing:
+        for each in self._passing:
+            each.give_up(now)
+            if waited > STOP_TIMEOUT + PATIENCE:
                 each.hang_up()
         return self._knows_own_domain and self.over(now) and not self._left_to_ros
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until something is said, for so many s at most; return whether it was."""
+        poll = select.poll()
+        for each in (*self._told, *self._passing):
+            if each.line is not None and each.line.believed:
+                poll.register(each.line.socket, select.POLLIN)
+        return bool(poll.poll(1e3 * timeout))
+
+    def go_on(self, waited: float) -> None:
+        """Go on by another clock: with the next look so many s will have passed."""
+        self._began, self._waited_before = None, waited
 
     def over(self, now: float) -> bool:
         """Tell whether nothing more is to be expected of this host."""
@@ -211,8 +241,11 @@ class LocalStop:
 
     @property
     def _left_to_ros(self) -> bool:
-        """A stop was not passed on that ROS can bring, too."""
-        return any(each.failed for each in self._passing if each.present.domain == self.domain)
+        """There is a bridge that is not reached by the local way, or a stop was not passed on."""
+        return (any(each.unreached for each in self._told
+                    if each.present.domain in (None, self.domain))
+                or any(each.failed for each in self._passing
+                       if each.present.domain == self.domain))
 
     @property
     def _knows_own_domain(self) -> bool:
@@ -297,18 +330,33 @@ class LocalStop:
             each.hang_up()
 
 
-#: what has been sent before anything else was done: words, and the stop
-_early: list[tuple[tuple[str | None, list[str]], LocalStop]] = []
+class Early(namedtuple('Early', 'stop namespace words json')):
+    """
+    A stop that has been sent before anything else was done.
+
+    :ivar stop: what was sent.
+    :ivar namespace: of the bridges that are meant; None: all.
+    :ivar words: names, patterns or full names; none: all.
+    :ivar json: what becomes of it is to be told to a program.
+    """
+
+    __slots__ = ()
 
 
-def begin(arguments: Sequence[str]) -> None:
+#: those that nobody has taken over
+_early: list[Early] = []
+
+
+def begin(arguments: Sequence[str]) -> Early | None:
     """
     Send a stop as soon as it is clear that one is meant: before anything else is imported.
 
     :param arguments: those of ``drive_can stop``; with any that need a closer look it is not sent.
+    :return: None: it was not.
     """
     namespace: str | None = None
     words: list[str] = []
+    json = False
     left = list(arguments)
     while left:
         word = left.pop(0)
@@ -316,13 +364,17 @@ def begin(arguments: Sequence[str]) -> None:
         if option == '--namespace' and (given or left):
             namespace = plain_namespace(value if given else left.pop(0))
             if namespace is None:
-                return
+                return None
+        elif word == '--json':
+            json = True
         elif word.startswith('-'):
-            if word not in ('--yes', '--json'):
-                return
+            if word != '--yes':
+                return None
         else:
             words.append(word)
-    _early.append(((namespace, words), LocalStop(namespace, words)))
+    early = Early(LocalStop(namespace, words), namespace, words, json)
+    _early.append(early)
+    return early
 
 
 def plain_namespace(text: str) -> str | None:
@@ -336,8 +388,9 @@ def plain_namespace(text: str) -> str | None:
 def begun(namespace: str | None, words: Sequence[str]) -> LocalStop:
     """Return the stop that was sent for this, or send it."""
     while _early:
-        asked, stop = _early.pop()
-        if asked == (namespace, list(words)):
+        early = _early.pop()
+        stop: LocalStop = early.stop
+        if early[1:3] == (namespace, list(words)):
             return stop
         stop.close()
     return LocalStop(namespace, words)

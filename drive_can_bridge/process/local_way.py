@@ -16,7 +16,8 @@ asked                                  answered
                                        ``drive`` NAME OK ONLINE TEXT for each that is meant;
                                        ``around`` NAME…: drives that it sees; ``end``.
                                        PLACE: a namespace, or a pattern of some, ``*`` for all
-``pass`` BRIDGE… '' NAME… '' WORD…     ``drives`` NAME…; ``passed`` NAME OK TEXT IS_BRIDGE for
+``pass`` BRIDGE… '' NAME… '' WORD…     ``passing``, at once and again as long as it lasts;
+                                       ``drives`` NAME…; ``passed`` NAME OK TEXT IS_BRIDGE for
                                        each; ``end``: a stop for bridges of other hosts, but for
                                        drives that have theirs already
 ``who``                                ``bridge`` …, ``drives`` …, ``end``
@@ -47,6 +48,8 @@ VERSION = '1'
 PACKET, ASKED_MAX = 4096, 65536
 #: s that a bridge may take to begin to answer
 PATIENCE = 1.0
+#: s after which one that passes a stop on says so again: it may take long, and does not hang
+PASSING_PERIOD = 0.25
 END, NO = 'end', 'no'
 #: what stands for a namespace: any
 ANYWHERE = '*'

@@ -21,10 +21,9 @@ import math
 import os
 import signal
 import socket
-import sys
 import threading
 from types import TracebackType
-from typing import Any, NoReturn
+from typing import Any
 
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
@@ -141,21 +140,6 @@ class SignalWatcher:
     def _watch(self) -> None:
         while received := self._read.recv(1):
             self.take(received[0])
-
-
-def leave(code: int) -> NoReturn:
-    """
-    End the process now, without what Python does on its way out.
-
-    That would take 0.2 s with rclpy, and its first step puts the default handlers back: a signal
-    in that time would end the process with another exit code. Close everything before.
-    """
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, ValueError):  # its reader has gone
-            pass
-    os._exit(code)
 
 
 def _attempt(step: Callable[..., object], *arguments: float) -> None:

@@ -24,10 +24,11 @@ from drive_can_bridge.core.sentences import (
     ends_before_stop, may_still_be_running, profiles_not_read, profiles_not_there,
     protection_not_read)
 from drive_can_bridge.memory import keep_reserves
+from drive_can_bridge.process.beginning import leave
 from drive_can_bridge.process.environment import domain_problem
 from drive_can_bridge.process.fast_dds import MAPS, running
 from drive_can_bridge.process.scheduling import be_punctual
-from drive_can_bridge.process.signals import leave, NOT_SUSPENDED, SignalWatcher
+from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
 from drive_can_bridge.process.standard_outputs import StandardOutputs
 from drive_can_bridge.resources import config_file, what_is_missing
 

@@ -18,6 +18,7 @@ from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core import sentences
 from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_stop import Answer, RUNNING
+from drive_can_bridge.process.local_way import PASSING_PERIOD
 from drive_can_bridge.ros.client.control import Stop
 from drive_can_bridge.ros.client.search import LOOK_PERIOD
 from drive_can_bridge.ros.rcl.end import End
@@ -154,10 +155,12 @@ class Passing:
         self._waiting: list[tuple[OthersStop, LocalRequest]] = []
         self._under_way: list[_Way] = []
         self._ending = False
+        self._said_at = -math.inf
         self._thread: Worker | None = None
 
     def begin(self, wanted: OthersStop, asked: LocalRequest) -> None:
         """Pass a stop on. From one thread."""
+        asked.answer('passing')
         if self._thread is None:
             self._thread = self._clock.worker(self._run, 'passing on')
             self._thread.start()
@@ -190,6 +193,11 @@ class Passing:
     def _turn(self) -> None:
         self._take_mail()
         now = self._clock.now()
+        if now >= self._said_at + PASSING_PERIOD:
+            self._said_at = now
+            for asked in (*(each for _, each in self._waiting),
+                          *(each for way in self._under_way for each in way.asked)):
+                asked.answer('passing')
         self._begin_what_may(now)
         for way in list(self._under_way):
             if way.look(now):

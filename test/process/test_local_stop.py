@@ -113,16 +113,64 @@ def hangs(_: list[str]) -> Any:
 
 
 @pytest.mark.parametrize(('passes', 'at'), [
-    (dies, 0.0), (lambda _: [['no', 'another user']], 0.0), (hangs, 11.1)],
+    (dies, 0.0), (lambda _: [['no', 'another user']], 0.0), (hangs, 1.1)],
     ids=['dies', 'refuses', 'hangs'])
 def test_one_that_does_not_pass_a_stop_on_leaves_the_others_to_ros(
         monkeypatch: pytest.MonkeyPatch, passes: Played, at: float) -> None:
     """It has answered for its own drives, which does not stop those of others."""
     Host(monkeypatch, lambda question: SAID if question[0] == 'stop' else passes(question))
     stop = LocalStop(None, [])
-    assert looked(stop, 0.0, at) == [False, False]
-    assert stop.over(at) and stop.wants_ros(at)
+    assert looked(stop, 0.1, 0.1 + at) == [False, False]
+    assert stop.over(0.1 + at) and stop.wants_ros(0.1 + at)
     assert [answer.name for answer in stop.answers()] == ['/lift']
+
+
+def test_one_that_passes_a_stop_on_to_a_slow_drive_does_not_hang(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow(_: list[str]) -> Any:
+        for _ in range(7):
+            yield from (['passing'], None)
+        yield from played(['pass'])
+    Host(monkeypatch, lambda question: SAID if question[0] == 'stop' else slow(question))
+    stop = LocalStop(None, [])
+    times = [0.9 * number for number in range(1, 9)]
+    assert looked(stop, *times) == [False] * 8 and not any(map(stop.wants_ros, times))
+    assert stop.look(8.1)
+    assert [(answer.name, answer.ok) for answer in stop.answers()] == [
+        ('/lift', True), ('/arm', True)]
+
+
+def test_one_that_passes_on_for_ever_leaves_the_others_to_ros(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def for_ever(_: list[str]) -> Any:
+        while True:
+            yield from (['passing'], None)
+    Host(monkeypatch, lambda question: SAID if question[0] == 'stop' else for_ever(question))
+    stop = LocalStop(None, [])
+    times = [0.9 * number for number in range(1, 15)]
+    assert not any(looked(stop, *times))
+    assert stop.over(times[-1]) and stop.wants_ros(times[-1])
+
+
+@pytest.mark.parametrize('refusal', [ConnectionRefusedError, None], ids=['older', 'strange'])
+def test_one_that_is_not_reached_is_left_to_ros_whoever_else_answers(
+        monkeypatch: pytest.MonkeyPatch, refusal: type[OSError] | None) -> None:
+    other = BRIDGE._replace(process=2, name='/other')
+    host = Host(monkeypatch, lambda _: [[*each, '/bridge', '/other'][:5] if each[0] == 'bridge'
+                                        else each for each in SAID])
+    monkeypatch.setattr(local_stop, 'bridges', lambda: [BRIDGE, other])
+
+    def line(present: Present) -> Any:
+        if present == other and refusal is not None:
+            raise refusal
+        found = Line(host)
+        found.believed = present == BRIDGE
+        return found
+    monkeypatch.setattr(local_stop, 'Line', line)
+    stop = LocalStop(None, [])
+    assert looked(stop, 0.1, 0.2, 1.3) == [False] * 3
+    assert stop.over(1.3) and stop.wants_ros(0.2)
+    assert stop.unheard == [other]
 
 
 def test_one_that_talks_without_end_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:

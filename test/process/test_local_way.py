@@ -428,3 +428,51 @@ def test_a_stop_imports_nothing_that_it_does_not_need_to_be_sent() -> None:
     imported = set(done.stdout.split())
     assert {name for name in imported if name.startswith('drive_can_bridge')} == NEEDED
     assert not imported & HEAVY
+
+
+#: what is imported besides where all bridges are of this host, until the command has ended
+TO_ITS_END = {'drive_can_bridge.cli.saying', 'drive_can_bridge.cli.stopping'}
+ENDING = """
+import os, sys
+before, leave = set(sys.modules), os._exit
+
+def told(code):
+    print(*sorted(set(sys.modules) - before), file=sys.stderr, flush=True)
+    leave(code)
+os._exit = told
+from drive_can_bridge.cli.start import main
+main()
+"""
+
+
+@pytest.mark.usefixtures('programs', 'threads')
+@pytest.mark.parametrize(('success', 'said'), [
+    ('1', 'of_a_test/lift: ready\n'), ('0', 'of_a_test/lift: NOT STOPPED: no answer\n')])
+def test_a_stop_that_is_answered_imports_nothing_more(success: str, said: str) -> None:
+    name = f'/of_a_test/bridge{os.getpid()}'
+    presence = Presence(231, name)
+
+    def serve(asked: Asked) -> None:
+        assert (asked.action, asked.words) == ('stop', ['/of_a_test', 'lift'])
+        asked.answer('drives', '/of_a_test/lift')
+        asked.answer('bridge', name, '231', name)
+        time.sleep(0.01)
+        asked.answer('drive', '/of_a_test/lift', success, '1',
+                     'ready' if success == '1' else 'no answer')
+        asked.end()
+    server = LocalServer(
+        presence.socket, serve, open_to_all=True, report=print, prepare_thread=lambda: None,
+        keep_share=lambda: lambda: None, clock=REAL)
+    try:
+        done = subprocess.run(
+            [sys.executable, '-c', ENDING, 'stop', 'lift', '--namespace=of_a_test'],
+            capture_output=True, text=True, check=False,
+            env={**os.environ, 'DRIVE_CAN_LOCAL': 'on', 'ROS_DOMAIN_ID': '231'})
+    finally:
+        server.stop()
+        presence.withdraw()
+    assert (done.returncode, done.stdout) == (1 - int(success), said)
+    imported = set(done.stderr.split())
+    assert {name for name in imported if name.startswith('drive_can_bridge')} == (
+        NEEDED | TO_ITS_END)
+    assert not imported & HEAVY

@@ -163,7 +163,8 @@ hold_signals()
 for number in (signal.SIGINT, signal.SIGTERM):
     os.kill(os.getpid(), number)
 from drive_can_bridge.clock import SteadyClock
-from drive_can_bridge.process.signals import leave, SignalWatcher
+from drive_can_bridge.process.beginning import leave
+from drive_can_bridge.process.signals import SignalWatcher
 atexit.register(print, "this is never said")
 with SignalWatcher(SteadyClock(), keep=True) as watcher:
     watcher.wait()

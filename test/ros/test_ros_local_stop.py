@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """``drive_can stop`` by the local way: who is asked, by which way, and what is said of them."""
 
+from collections.abc import Callable, Iterator
 import json
 import os
 from typing import Any
@@ -10,7 +11,9 @@ from by_hand import Lines, no_ros, Run
 from clients import wait_until
 import pytest
 
+from drive_can_bridge.cli import control
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.presence import Presence
 
 HOIST = {**LIFT, 'station': 3}
@@ -104,3 +107,43 @@ def test_one_that_hangs_is_named_after_a_second(
     finally:
         hung.withdraw()
         elsewhere.withdraw()
+
+
+@pytest.fixture
+def hung(bridge: StartBridge, locally: Lines) -> Iterator[str]:
+    """Have two bridges on this host, of which one hangs; what is said of that."""
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    presence = Presence(one.context.get_domain_id(), '/b/bridge')
+    locally(one, hung=('/b/bridge',))
+    yield (f'b/bridge: NOT STOPPED: this bridge of this host (process {os.getpid()}) does not '
+           'answer here: its drives may still be running')
+    presence.withdraw()
+
+
+def test_one_that_hangs_is_named_though_ros_takes_long_to_begin(
+        run: Run, hung: str, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    began, joined = bench.clock.now(), []
+
+    def slow(_: Any, join: Callable[[Callable[[], Any]], Any]) -> Any:
+        bench.clock.wait(began + 5.0)
+        try:
+            join(lambda: joined.append(True))
+        except DriveCanError:
+            joined.append(False)
+            raise
+    monkeypatch.setattr(control, '_ros', slow)
+    assert run('stop') == (1, [hung, 'lift: ready'], '')
+    assert 1.0 <= bench.clock.now() - began < 1.1
+    wait_until(lambda: joined)
+    assert joined == [False]    # nobody becomes part of the graph after the end
+
+
+def test_without_ros_a_bridge_that_hangs_has_its_second_and_is_named(
+        run: Run, hung: str, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_way(*_: Any) -> Any:
+        raise DriveCanError('no ROS')
+    monkeypatch.setattr(control, '_ros', no_way)
+    began = bench.clock.now()
+    assert run('stop') == (1, [hung, 'lift: ready'], '')
+    assert 1.0 <= bench.clock.now() - began < 1.1

@@ -1,0 +1,118 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What became of drives that were told something by hand, and a stop that is over at once.
+
+Where all bridges are of this host, ``drive_can stop`` ends here, with nothing imported but what
+sends a stop and says what became of it.
+"""
+
+from collections.abc import Collection, Iterable, Sequence
+import sys
+
+from drive_can_bridge.cli.saying import FAILED, print_json, say
+from drive_can_bridge.process.beginning import look_after_outputs
+from drive_can_bridge.process.local_stop import Answer, Early, LocalStop, RUNNING
+from drive_can_bridge.process.local_way import matches
+from drive_can_bridge.process.presence import Present, short
+
+#: s without a word after which the rest is imported, and how many words are taken in before it
+_QUIET, _WORDS = 0.03, 1000
+
+
+class WithoutRos:
+    """
+    What has become of a stop through ROS, where none has gone there.
+
+    :ivar seen: the bridges that are known there.
+    :ivar heard: those that have answered.
+    :ivar drives: full names of their drives.
+    """
+
+    seen: Collection[str] = ()
+    heard: Collection[str] = ()
+    drives: Collection[str] = ()
+
+    def answers(self, present: Iterable[Present] = ()) -> list[Answer]:
+        """Return what became of drives, and of bridges that do not answer."""
+        return []
+
+
+def finished(early: Early) -> int | None:
+    """
+    Wait for the answers to a stop that was sent by the local way, and show them.
+
+    :return: the exit code; None: they take longer, or there may be bridges elsewhere.
+    """
+    stop: LocalStop = early.stop
+    if not _answered(stop):
+        stop.go_on(_QUIET)
+        return None
+    look_after_outputs()
+    try:
+        code = show(answers(stop, None, early.namespace, early.words), 'stop', json=early.json)
+        sys.stdout.flush()
+    except OSError:     # told as for all commands, if to anybody
+        return None
+    return code
+
+
+def _answered(stop: LocalStop) -> bool:
+    """Take answers as long as they come at once; return whether these were all."""
+    for _ in range(_WORDS):
+        if stop.look(0.0):
+            return True
+        if stop.wants_ros(0.0) or not stop.wait(_QUIET):
+            break
+    return False
+
+
+def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
+            words: Sequence[str]) -> list[Answer]:
+    """
+    Return what became of a stop.
+
+    :param ros: the part of it that has gone through ROS; None: none has.
+    :param words: names, patterns or full names of the drives that are meant; none: all.
+    """
+    through = ros or WithoutRos()
+    heard = {short(name) for name in through.heard}
+    told = [Answer(each.name, False, f'{each.silence(local.domain)}: its drives {RUNNING}',
+                   bridge=True)
+            for each in local.unheard
+            if each.domain != local.domain or each.name not in heard] + local.answers()
+    named = {answer.name for answer in told if answer.bridge}
+    told += [answer for answer in through.answers(local.present)
+             if not answer.bridge or short(answer.name) not in named]
+    known = {*local.known, *through.seen}
+    nodes = {answer.name for answer in told if not answer.bridge}
+    there = ', '.join(node.lstrip('/') for node in dict.fromkeys(
+        [*local.drives, *through.drives])) or 'none'
+    told += [Answer(word, False, f'no such drive; there are: {there}') for word in words
+             if known and not any(matches(word, node) for node in nodes)]
+    own = any(each.domain in (None, local.domain) for each in local.present)
+    if not known and (not told or not own and ros is not None):
+        from drive_can_bridge.process.environment import nobody     # takes its time
+        # those of other domains may be all that there are, or discovery was too slow
+        told.append(Answer('', bool(told), nobody(namespace), bridge=True))
+    return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
+                    for name in known]
+
+
+def show(told: Sequence[Answer], order: str, *, json: bool) -> int:
+    """
+    Print what became of it, failures first; return the exit code.
+
+    :param order: what drives were told.
+    :param json: for a program.
+    """
+    for answer in sorted(told, key=lambda each: each.ok):
+        name, elsewhere = answer.name.lstrip('/'), answer.domain is not None
+        if json:
+            print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
+                        'message': answer.text,
+                        **({'domain': answer.domain} if elsewhere else {})})
+        else:
+            verdict = '' if answer.ok or order != 'stop' else 'NOT STOPPED'
+            say((f'[domain {answer.domain}] ' if elsewhere else '')
+                + ': '.join(filter(None, (name, verdict, answer.text))))
+    return 0 if told and all(answer.ok for answer in told) else FAILED
