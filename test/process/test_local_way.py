@@ -452,7 +452,7 @@ def test_a_stop_that_is_answered_imports_nothing_more(success: str, said: str) -
     name = f'/of_a_test/bridge{os.getpid()}'
     presence = Presence(231, name)
 
-    def serve(asked: Asked) -> None:
+    def serve(asked: LocalRequest) -> None:
         assert (asked.action, asked.words) == ('stop', ['/of_a_test', 'lift'])
         asked.answer('drives', '/of_a_test/lift')
         asked.answer('bridge', name, '231', name)
