@@ -11,6 +11,7 @@ from collections.abc import Callable, Container, Hashable, Sequence
 import math
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.observer import DriveObserver, Observed, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
@@ -98,7 +99,7 @@ class CyclicWatch:
     def _miss(self, now: float) -> None:
         self._observer.tell(now, Direction.RESPONSE, TelegramKind.CYCLIC, 'cyclic response',
                             verdict=Verdict.LOST,
-                            remark=f'no answer in {1e3 * (now - self._asked):.0f} ms')
+                            remark=frame_sentences.unanswered_for(1e3 * (now - self._asked)))
         self._asked = math.nan
         self._stale = True
         self._observed.missed += 1
@@ -355,5 +356,4 @@ class WriteGap:
         distance, self._last = now - self._last, now
         if distance >= self._gap - STAMP_TOLERANCE:
             return ''
-        return (f'EEPROM write {1e3 * distance:.1f} ms after the last, the drive wants '
-                f'{1e3 * self._gap:g} ms')
+        return frame_sentences.eeprom_written_fast(1e3 * distance, 1e3 * self._gap)

@@ -17,6 +17,7 @@ from collections.abc import Callable, Generator
 from enum import Enum
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame, Route
 
@@ -115,7 +116,7 @@ class Scanner(ABC):
         if not self._ours:
             self._alone[key] += 1
             if self._alone[key] >= _MASTER_REQUESTS:
-                self.master = f'what looks like requests of {self.protocol}'
+                self.master = frame_sentences.seems_requests(self.protocol)
 
     def _answer(self, station: int, text: str, now: float,
                 fits: Callable[[bytes], bool] = lambda request: True, *,
@@ -136,7 +137,7 @@ class Scanner(ABC):
             self._pairs[station] += 1
             if self._pairs[station] < 2:
                 return True
-            self.master = f'requests to station {station} of {self.protocol}'
+            self.master = frame_sentences.requests_to_station(station, self.protocol)
         self._see(station, text, certainty)
         return True
 
@@ -225,12 +226,12 @@ def conclude(key: str, votes: dict[str, list[str]], *, what: str, missing: str) 
     told = '; '.join(text for texts in votes.values() for text in texts)
     if len(votes) == 1:
         return Finding(key, next(iter(votes)), told)
-    return Finding(key, None, f'{what} contradict each other: {told}' if votes else missing)
+    return Finding(key, None, frame_sentences.contradiction(what, told) if votes else missing)
 
 
 def undecided(key: str, why: str) -> Finding:
     """Return that nothing is concluded about a key: silence and most refusals prove nothing."""
-    return Finding(key, None, f'undecided: {why}')
+    return Finding(key, None, frame_sentences.undecided(why))
 
 
 def spaced(data: bytes) -> str:

@@ -17,6 +17,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
@@ -89,16 +90,16 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
     def receive(self, answer: bytes, now: float) -> TaskResult:
         response, task = self._layout.decode(answer), self.step
         if task is None:
-            raise Unasked('parameter response that nobody asked for')
+            raise Unasked(sentences.unasked('parameter response'))
         if not _belongs(response, task):
-            raise Unasked(f'parameter response {response.identifier} for '
-                          f'P{response.number}.{response.index} does not belong to '
-                          f'task {task.task} for P{task.number}.{task.index}')
+            raise Unasked(frame_sentences.other_task_answered(
+                response.identifier, response.number, response.index,
+                task.task, task.number, task.index))
         if task.task.writes and response.identifier != Response.REFUSED and not _echoes(
                 response, task):
             self.silent = TaskResult(None, response)
-            raise RemoteProtocolError(f'response to writing P{task.number}.{task.index} with '
-                                      'another value')
+            raise RemoteProtocolError(
+                frame_sentences.other_value_echoed(task.number, task.index))
         self.finish()
         return TaskResult(response)
 

@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 from functools import partial
 from typing import TypeVar
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord.identifiers import (
@@ -93,7 +94,7 @@ class CannordObserver(DriveObserver):
 
     def _take_foreign(self, data: bytes, now: float) -> None:
         self._show_request(data, now, 'broadcast', Verdict.SUSPICIOUS,
-                           'of another master: the file has no drive with this broadcast')
+                           frame_sentences.broadcast_of_others())
 
     def _take_request(self, data: bytes, now: float) -> None:
         if len(data) != EXTRA_LENGTH:
@@ -122,14 +123,14 @@ class CannordObserver(DriveObserver):
         if not raws:
             return
         parameters, word = self._parameters[_RESPONSE][0], raws[0]
-        remark = state_of(word).value
+        remark: str = state_of(word).value
         needed = len(parameters)
         verdict, latency = self._cycle.answer(now)
         if len(raws) < needed:      # also where nobody was heard to ask
             verdict = Verdict.MALFORMED if verdict is Verdict.NORMAL else verdict
-            remark = f'{len(raws) - 1} values, {needed - 1} needed; {remark}'
+            remark = frame_sentences.fewer_values(len(raws) - 1, needed - 1, remark)
         if latency != latency and is_faulted(word):     # NaN: nobody asked
-            verdict, remark = Verdict.NORMAL, f'{remark}, told without being asked'
+            verdict, remark = Verdict.NORMAL, frame_sentences.said_unasked(remark)
         self.tell(now, _RESPONSE, _CYCLIC, title, parameters, raws, verdict=verdict,
                   remark=remark, latency=latency)
 
@@ -158,7 +159,7 @@ class CannordObserver(DriveObserver):
             key, RequestContent(span, task.writes, title=_ANSWER_TITLES.get(response, '')), now,
             (frame.answered,) if valued else None,
             refusal=error_text(frame.word) if refused else '',
-            wrong='' if fits else f'response {int(response)} to task {int(task)}',
+            wrong='' if fits else frame_sentences.response_to_task(int(response), int(task)),
             remark=f'{frame.word} elements' if response is Response.ELEMENTS else '')
 
     def _key_of(self, frame: ParameterFrame, response: Response) -> TaskKey:

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 import struct
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 
 NUMBER_MAX = 0x7FF
@@ -207,10 +208,10 @@ class ParameterLayout:
             not exist.
         """
         if len(data) != LENGTH:
-            raise RemoteProtocolError(f'{len(data)} data bytes: parameter frames have {LENGTH}')
+            raise RemoteProtocolError(frame_sentences.parameter_frame_length(len(data), LENGTH))
         pke, ind, first, second = _FIELDS.unpack(data)
         if pke & _SPONTANEOUS:
-            raise RemoteProtocolError('bit 11 of the task identifier is set')
+            raise RemoteProtocolError(frame_sentences.task_bit_set())
         if self.value_order == 'low_first':
             first, second = second, first
         index = ind >> 8 if self.index_byte == 'high' else ind & INDEX_MAX

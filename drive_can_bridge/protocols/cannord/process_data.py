@@ -27,7 +27,7 @@ from collections.abc import Sequence
 import struct
 from typing import NamedTuple
 
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.events import ProcessDataReceived
@@ -101,8 +101,8 @@ def decode_main(data: bytes, *, swap: bool = False) -> ProcessData:
     if len(data) == LONG_LENGTH:
         word, first, second, third = _LONG.unpack(data)
         return ProcessData(word, (first, third, second) if swap else (first, second, third))
-    raise RemoteProtocolError(f'{len(data)} data bytes: process data have {SHORT_LENGTH} or '
-                              f'{LONG_LENGTH}')
+    raise RemoteProtocolError(
+        frame_sentences.process_data_length(len(data), SHORT_LENGTH, LONG_LENGTH))
 
 
 def encode_extra(values: Sequence[int]) -> bytes:
@@ -124,8 +124,7 @@ def decode_extra(data: bytes) -> tuple[int, int]:
     :raises RemoteProtocolError: not 5 bytes.
     """
     if len(data) != EXTRA_LENGTH:
-        raise RemoteProtocolError(f'{len(data)} data bytes: the additional process data have '
-                                  f'{EXTRA_LENGTH}')
+        raise RemoteProtocolError(frame_sentences.extra_data_length(len(data), EXTRA_LENGTH))
     fourth, fifth, _ = _EXTRA.unpack(data)
     return fourth, fifth
 

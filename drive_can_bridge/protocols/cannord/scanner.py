@@ -13,6 +13,7 @@ so that neither key needs the other.
 from collections.abc import Generator
 from typing import NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
@@ -57,9 +58,7 @@ class CannordScanner(Scanner):
     """Recognises process data and parameter frames of 11 bits, and reads one parameter."""
 
     protocol = 'cannord'
-    hazard = ('a task on 200h + 2·address is RPDO1 (process data) or TPDO of CANopen nodes, '
-              'on 300h to 3FEh RPDO2 and TPDO3: a CANopen drive may take it for a command; an '
-              'inverter whose P513 is not 0 supervises telegrams once it has got one')
+    hazard = frame_sentences.hazard_cannord()
 
     def begin(self) -> None:
         data = ParameterLayout().encode(Task.READ, PARAMETER)
@@ -148,12 +147,10 @@ class CannordProber(Prober):
         # -0.1 s is none, as 0 is
         if timeout is not None and timeout.response == Response.WORD and any(
                 timeout.words) and max(timeout.words) < _NEGATIVE:
-            self.notes.append('P513 is not 0: the inverter supervises telegrams once it has got '
-                              'one, and trips when they end')
+            self.notes.append(frame_sentences.supervises_telegrams())
         findings = [(yield from self._value_order()), (yield from self._index_byte())]
         if not self.answered:
-            return [Finding(key, None, 'no answer to parameter tasks: check station, bit rate and '
-                                       'extended_identifiers')
+            return [Finding(key, None, frame_sentences.no_tasks_answered())
                     for key, _, _ in findings]
         return findings
 
@@ -164,29 +161,29 @@ class CannordProber(Prober):
             if refusal is None or refusal.error is None or refusal.alone is None:
                 continue
             votes.setdefault(refusal.alone[1], []).append(
-                f'array read of P{number}: {error_text(refusal.error)}, in bytes '
-                f'{"6, 7" if refusal.alone[1] == "high_first" else "4, 5"} '
-                f'({spaced(refusal.data)})')
+                frame_sentences.array_read_refused(
+                    number, error_text(refusal.error),
+                    '6, 7' if refusal.alone[1] == 'high_first' else '4, 5', spaced(refusal.data)))
             value = yield from self._ask(Task.READ, number)
             if value is not None and value.response == Response.WORD and value.alone is not None:
                 votes.setdefault(value.alone[1], []).append(
-                    f'read of P{number}: {value.alone[0]} ({spaced(value.data)})')
+                    frame_sentences.parameter_reads(number, value.alone[0], spaced(value.data)))
             if refusal.error == _NOT_AN_ARRAY:
                 break
         return conclude('value_order', votes, what='answers',
-                        missing='no array read was refused with an error number')
+                        missing=frame_sentences.no_refusal_with_number())
 
     def _index_byte(self) -> Generator[Question, Frame | None, Finding]:
-        told = 'no parameter is an array'
+        told = frame_sentences.no_array()
         for number in self._numbers(ARRAYS, arrays=True):
             results = {}
             for key, ind in (('low', _BEYOND), ('high', _BEYOND << 8)):
                 results[key] = yield from self._twice(Task.READ_ARRAY, number, ind)
             if any(each is not None and each.error == _NOT_AN_ARRAY for each in results.values()):
                 continue
-            told = f'array read of P{number}: ' + '; '.join(
-                f'sub-index {_BEYOND} in byte {place}: {_told(results[key])}'
-                for key, place in (('low', 2), ('high', 3)))
+            told = frame_sentences.array_read(number, [
+                frame_sentences.subindex_in_byte(_BEYOND, place, _told(results[key]))
+                for key, place in (('low', 2), ('high', 3))])
             wrong = [key for key, each in results.items()
                      if each is not None and each.error == _WRONG_SUBINDEX]
             served = [key for key, each in results.items()
@@ -233,7 +230,7 @@ class CannordProber(Prober):
 
 def _told(answer: _Answer | None) -> str:
     if answer is None:
-        return 'no answer, or not twice the same'
+        return frame_sentences.not_twice()
     if answer.response == Response.REFUSED:
         error = 'an error' if answer.error is None else error_text(answer.error)
         return f'{error} ({spaced(answer.data)})'

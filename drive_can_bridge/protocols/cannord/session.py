@@ -183,10 +183,10 @@ class CannordSession(Session):
             else:
                 self.report.reject(sentences.not_of_this_drive(str(frame)))
         except Unasked as error:
-            self.report.unasked(sentences.malformed(str(error)), self._channel.late(
+            self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
                 now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
-            self.report.reject(sentences.malformed(str(error)))
+            self.report.reject(sentences.malformed(error.sentence))
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
         """Take status word and actual values. The fast path of the reader."""

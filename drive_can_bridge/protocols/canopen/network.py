@@ -21,6 +21,7 @@ boot-up a node waits in *pre-operational* for the command ``start``.
 from enum import IntEnum
 from typing import NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 
@@ -201,7 +202,7 @@ def decode_nmt(data: bytes) -> tuple[int, int]:
     :raises RemoteProtocolError: not two bytes.
     """
     if len(data) != 2:
-        raise RemoteProtocolError(f'NMT frame with {len(data)} data bytes instead of 2')
+        raise RemoteProtocolError(frame_sentences.telegram_length('NMT frame', len(data), 2))
     return data[0], data[1]
 
 
@@ -215,13 +216,13 @@ def decode_heartbeat(data: bytes) -> NmtState:
     :raises RemoteProtocolError: not one byte, nor eight, or a state that does not exist.
     """
     if not data:
-        raise RemoteProtocolError('heartbeat without content')
+        raise RemoteProtocolError(frame_sentences.heartbeat_empty())
     if len(data) not in (1, 8):
-        raise RemoteProtocolError(f'heartbeat with {len(data)} data bytes instead of 1')
+        raise RemoteProtocolError(frame_sentences.telegram_length('heartbeat', len(data), 1))
     try:
         return NmtState(data[0] & 0x7F)
     except ValueError:
-        raise RemoteProtocolError(f'heartbeat with unknown state {data[0]:02X}h') from None
+        raise RemoteProtocolError(frame_sentences.heartbeat_unknown(data[0])) from None
 
 
 def decode_emergency(data: bytes) -> Emergency:
@@ -231,6 +232,6 @@ def decode_emergency(data: bytes) -> Emergency:
     :raises RemoteProtocolError: not eight bytes.
     """
     if len(data) != EMERGENCY_LENGTH:
-        raise RemoteProtocolError(f'emergency with {len(data)} data bytes instead of '
-                                  f'{EMERGENCY_LENGTH}')
+        raise RemoteProtocolError(
+            frame_sentences.telegram_length('emergency', len(data), EMERGENCY_LENGTH))
     return Emergency(int.from_bytes(data[:2], 'little'), data[2], data[3:])

@@ -3,6 +3,8 @@
 
 from collections.abc import Callable
 
+from drive_can_bridge.core import frame_sentences
+from drive_can_bridge.core.messages import around
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.observer import (
@@ -36,7 +38,7 @@ def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None],
         if state is NmtState.BOOT_UP:
             booted()
             observer.tell(now, _RESPONSE, _NETWORK, 'boot-up', verdict=Verdict.SUSPICIOUS,
-                          remark='the device has started')
+                          remark=frame_sentences.device_started())
         else:
             latency = guarding.answer(now)
             title = 'node guarding' if latency == latency else 'heartbeat'  # NaN: of itself
@@ -73,5 +75,6 @@ class NmtObserver(DriveObserver):
         self.emit(Telegram(
             now, self._nodes.get(node, ''), _REQUEST, _NETWORK, 'NMT',
             verdict=Verdict.MALFORMED if what is None else Verdict.NORMAL,
-            remark=f'{what or f"unknown command {command:02X}h"}'
-                   f'{" all nodes" if node == 0 else f" node {node}"}'))
+            remark=around(
+                frame_sentences.unknown_command(command) if what is None else what,
+                behind=' all nodes' if node == 0 else f' node {node}')))

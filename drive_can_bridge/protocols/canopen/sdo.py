@@ -20,6 +20,7 @@ segments               4: toggle; bits 3 to 1: unused bytes, bit 0: the last one
 from enum import Enum
 from typing import NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.requests import ABSENT_CODES
@@ -207,11 +208,11 @@ def decode(direction: Direction, data: bytes, *, segments: bool = True) -> SdoMe
                  and (segments or 'index' in kind.value.names)), None)
     least = LENGTH if kind is None or direction is _REQUEST else _promised(kind, head)
     if not least <= len(data) <= LENGTH:
-        raise RemoteProtocolError(f'SDO with {len(data)} data bytes instead of {least}')
+        raise RemoteProtocolError(frame_sentences.telegram_length('SDO', len(data), least))
     if kind is None:
-        raise RemoteProtocolError(f'SDO command {head:02X}h is no ' + (
-            'request that is known here' if direction is _REQUEST
-            else 'answer that was asked for'))
+        raise RemoteProtocolError(
+            frame_sentences.sdo_request_unknown(head) if direction is _REQUEST
+            else frame_sentences.sdo_answer_unknown(head))
     fields = kind.value.unpack(data.ljust(LENGTH, b'\0'))
     content, number = fields.get('data', b''), fields.get('number', 0)
     if 'index' not in fields:
@@ -249,7 +250,7 @@ def decode_upload(data: bytes) -> Uploaded:
     """
     answer = decode(_RESPONSE, data, segments=False)
     if answer.object is None or answer.kind is SdoCommand.DOWNLOADED:
-        raise RemoteProtocolError(f'SDO command {data[0]:02X}h is no answer to an upload')
+        raise RemoteProtocolError(frame_sentences.sdo_no_upload(data[0]))
     return Uploaded(answer.object, int.from_bytes(answer.data, 'little')
                     if answer.kind is SdoCommand.UPLOADED else None,
                     answer.kind is SdoCommand.ABORT and answer.number in ABSENT)

@@ -9,6 +9,7 @@ shown, and no answer is expected.
 from collections.abc import Sequence
 from functools import partial
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
@@ -62,8 +63,7 @@ class PkwObserver(DriveObserver):
             return
         self._requests.ask(
             _key(message), asked.span, now, message.words if asked.writes else None,
-            futile=repeated, wrong='the function byte is that of the request before: nothing is '
-            'started' if repeated else '')
+            futile=repeated, wrong=frame_sentences.same_function_byte() if repeated else '')
 
     def _take_response(self, message: PkwMessage, now: float) -> None:
         if message.code == Function.NONE:
@@ -91,7 +91,7 @@ class PkwObserver(DriveObserver):
         meaning = message.meaning
         if meaning is None:
             self.tell(now, direction, _PARAMETER, title, verdict=Verdict.MALFORMED,
-                      remark=f'unknown function {message.code:02X}h')
+                      remark=frame_sentences.unknown_function_code(message.code))
             return None
         return RequestContent(Span(message.address, meaning.count), meaning.writes)
 

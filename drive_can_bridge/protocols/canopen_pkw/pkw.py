@@ -58,6 +58,7 @@ from enum import Enum, IntEnum
 import struct
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import TEXTS
@@ -286,7 +287,7 @@ def decode(data: bytes, layout: Layout) -> PkwMessage:
     :raises RemoteProtocolError: not eight bytes.
     """
     if len(data) != PAYLOAD:
-        raise RemoteProtocolError(f'{len(data)} data bytes instead of {PAYLOAD}')
+        raise RemoteProtocolError(frame_sentences.length_differs(len(data), PAYLOAD))
     packing, places = _PLACES[layout]
     _, (word, low, function, third, fourth) = zip(*sorted(zip(places, packing.unpack(data))))
     return PkwMessage(word, function & CODE_MASK, bool(function & TOGGLE), low, (third, fourth))

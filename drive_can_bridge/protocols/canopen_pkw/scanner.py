@@ -16,6 +16,7 @@ map something else than 3000h, a read of the mailbox would be process data, and 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
@@ -43,8 +44,6 @@ ORDERS = ('high_first', 'low_first')
 _WIDE_MAX = 12
 #: values that have to agree where no limits help
 _AGREEING = 2
-_SILENT = ('no answer: a node that is not operational answers no PKW (--nmt-start starts it); '
-           'check station, bit rate, request_cob_id and response_cob_id')
 _Asking = Generator[Question, Frame | None, tuple[bytes, PkwMessage] | None]
 
 
@@ -93,7 +92,7 @@ class CanopenScanner(Scanner):
                 self._take_upload(node, sdo.decode_upload(frame.data), now)
             elif base == sdo.REQUEST_BASE and len(frame.data) == 8:
                 self.hear_request(frame, now)
-                self.master = f'SDO requests to node {node}'
+                self.master = frame_sentences.sdo_requests_to(node)
             elif base == network.REQUEST_BASE and len(frame.data) == 8:
                 self.hear_request(frame, now)
             elif base == network.RESPONSE_BASE and len(frame.data) == 8:
@@ -182,7 +181,7 @@ class PkwProber(Prober):
     def converse(self) -> Conversation:
         mapped = yield from self._mapped()
         if mapped not in (None, _MAILBOX):
-            why = f'receive PDO4 (1603h) maps {mapped:04X}h, no mailbox (3000h): nothing was asked'
+            why = frame_sentences.no_mailbox(mapped)
             return [Finding(key, None, why) for key in KEYS]
         seen = {}
         for layout in Layout:
@@ -190,14 +189,14 @@ class PkwProber(Prober):
         layout_found, reason = _conclude(seen)
         findings = [Finding('layout', layout_found and layout_found.value, reason)]
         if layout_found is None:
-            why = 'the layout comes first'
+            why = frame_sentences.layout_first()
             findings += [Finding(key, None, why) for key in KEYS[1:]]
         else:
             findings.append((yield from self._word_order(layout_found)))
             findings.append(_abort_code_order(seen[layout_found]))
         yield self._idle()      # the next one may begin with any function
         if not self.answered:
-            return [finding._replace(reason=_SILENT) for finding in findings]
+            return [finding._replace(reason=frame_sentences.node_silent()) for finding in findings]
         return findings
 
     def _mapped(self) -> Generator[Question, Frame | None, int | None]:
@@ -229,7 +228,7 @@ class PkwProber(Prober):
 
     def _word_order(self, layout: Layout) -> Generator[Question, Frame | None, Finding]:
         votes: dict[str, list[str]] = {}
-        certain, again = False, '; try again while the motor runs'
+        certain = False
         for parameter in self._wide():
             span = Placement.of(self.drive).span(parameter)
             answer = yield from self._ask(span.address, span.count, layout)
@@ -241,15 +240,16 @@ class PkwProber(Prober):
                 values = [f'{pkw.value_from_words(answer[1].words, each == ORDERS[0])}'
                           for each in sorted(ORDERS, key=lambda each: each != order)]
                 votes.setdefault(order, []).append(
-                    f'{parameter.name} reads {spaced(answer[0][4:])}: {" and not ".join(values)}')
+                    frame_sentences.reads_this_not_that(
+                        parameter.name, spaced(answer[0][4:]), values))
                 if certain or len(votes[order]) > _AGREEING:
                     break
         texts = [text for each in votes.values() for text in each]
         if len(texts) == 1 and not certain:
-            return Finding('word_order', None, f'one value is not enough: {texts[0]}{again}')
+            return Finding('word_order', None, frame_sentences.one_value_only(texts[0]))
         return conclude(
             'word_order', votes, what='values',
-            missing=f'no value of 32 bits has one half that is 0 and one that is not{again}')
+            missing=frame_sentences.no_telling_value())
 
     # -- asking -----------------------------------------------------------------------------------
 
@@ -315,14 +315,14 @@ def _abort_code_order(evidence: _Evidence) -> Finding:
         codes = {order: pkw.value_from_words(words, order == ORDERS[0]) for order in ORDERS}
         known = [order for order in ORDERS if codes[order] in TEXTS]
         if len(known) == 1:
-            votes[known[0]] = (f'{address} refused by {spaced(data)}: '
-                               f'{describe(codes[known[0]])}')
+            votes[known[0]] = frame_sentences.refused_by_bytes(
+                address, spaced(data), describe(codes[known[0]]))
     if len(votes) == 1:
         return Finding(key, *next(iter(votes.items())))
     if not evidence.refusals:
-        return Finding(key, None, 'nothing was refused')
-    return Finding(key, None, 'refused without a code that is known in one order only: '
-                   + '; '.join(spaced(data) for _, data, _ in evidence.refusals))
+        return Finding(key, None, frame_sentences.nothing_refused())
+    return Finding(key, None, frame_sentences.no_known_code(
+        [spaced(data) for _, data, _ in evidence.refusals]))
 
 
 def _order_of(parameter: Parameter, words: pkw.Words) -> tuple[str, bool]:

@@ -421,9 +421,9 @@ class PkwSession(Session):
                 self.report.note(ForeignMasterSeen(
                     masters.sdo_request(frame, self.configuration.station)))
         except RemoteProtocolError as error:
-            self.report.reject(sentences.malformed(str(error)))
+            self.report.reject(sentences.malformed(error.sentence))
             if not self.online:
-                self._heard.wrong(sentences.answers_otherwise(str(error)), now)
+                self._heard.wrong(sentences.answers_otherwise(error.sentence), now)
 
     @property
     def offline_advice(self) -> Sentence:

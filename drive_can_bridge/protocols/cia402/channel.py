@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
+from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.errors import RemoteProtocolError, Unasked
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent
@@ -148,9 +149,9 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
             if upload is not step and now < until:
                 if found.kind is SdoCommand.UPLOAD_BEGUN:
                     self._give_up(_BROKEN_OFF, upload)
-                raise Unasked(f'SDO response {answer.hex(" ").upper()} to what was given up')
+                raise Unasked(frame_sentences.sdo_given_up(answer.hex(' ').upper()))
         if step is None or not _belongs(found, step):
-            raise Unasked(f'SDO response {answer.hex(" ").upper()} that nobody asked for')
+            raise Unasked(sentences.unasked(f'SDO response {answer.hex(" ").upper()}'))
         if found.kind is SdoCommand.UPLOAD_BEGUN:
             self._collected, self._toggle = bytearray(), 0
             return self._ask_segment(now)
@@ -179,7 +180,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
 
     def _take_segment(self, found: SdoMessage, now: float) -> TransferResult | bool:
         if self._collected is None or found.toggle != self._toggle:
-            raise RemoteProtocolError('SDO segment out of turn')
+            raise RemoteProtocolError(frame_sentences.sdo_out_of_turn())
         self._collected += found.data
         self._toggle ^= sdo.TOGGLE
         if not found.last:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import partial
 import math
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.text import printable, TEXT_MAX
@@ -202,7 +203,7 @@ class Cia402Observer(DriveObserver):
             self.observed.unanswered += 1
             self.tell(now, _RESPONSE, _PARAMETER, 'write' if self._writes else 'read',
                       self._content(self._transfer, None)[0], verdict=Verdict.LOST,
-                      remark='no answer to a segment')
+                      remark=frame_sentences.segment_unanswered())
 
     def _end_transfer(self, now: float) -> None:
         self._segments.answer(now)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 import struct
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.parameters import Parameter, ParameterType
@@ -146,8 +147,8 @@ class Pdo:
         try:
             return self._layout.unpack_from(data)
         except struct.error:
-            raise RemoteProtocolError(f'PDO {self.number} with {len(data)} data bytes instead of '
-                                      f'{self.length}') from None
+            raise RemoteProtocolError(frame_sentences.telegram_length(
+                f'PDO {self.number}', len(data), self.length)) from None
 
     def part(self, data: bytes) -> tuple[int, ...]:
         """Return the raw integers that are there of one that is too short."""

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
@@ -46,7 +47,6 @@ _DEVICE_PROFILE = 402
 _CONSUMER_HEARTBEAT = 0x1016
 #: what 605Bh and 605Ch say
 _COASTS, _RAMP = 0, 1
-_SILENT = 'no answer: check station, bit rate and power'
 
 
 class Cia402Scanner(Scanner):
@@ -102,7 +102,7 @@ class Cia402Scanner(Scanner):
         request = pdo.RPDO_BASE + node
         if identifier == pdo.TPDO_BASE + node and min(self._cycles[each] for each in (
                 identifier, request, network.SYNC_IDENTIFIER)) >= _CYCLES:
-            self.master = f'process data for node {node}'
+            self.master = frame_sentences.process_data_for(node)
             self.nodes.setdefault(node, f'status word {word:04X}h')
             self._see(node, f'status word {word:04X}h ({told.value}), answered with SYNC',
                       Certainty.LIKELY)
@@ -178,16 +178,13 @@ class Cia402Prober(Prober):
     def converse(self) -> Conversation:
         device = (yield from self._value(sdo.DEVICE_TYPE, 0)).value
         if device is None and not self.answered:
-            return [Finding(key, None, _SILENT) for key in KEYS]
+            return [Finding(key, None, frame_sentences.no_answer_to_scan()) for key in KEYS]
         if device is not None and device & 0xFFFF != _DEVICE_PROFILE:
-            self.notes.append(f'1000h says {device:08X}h: no drive of CiA 402 (0192h in the lower '
-                              'half)')
+            self.notes.append(frame_sentences.no_cia402(device))
         axes = yield from self._axes()
         if axes:
-            self.notes.append(
-                f'there are {len(axes) + 1} axes behind this node '
-                f'({", ".join(f"{index:04X}h is {word:04X}h" for index, word in axes)}): the '
-                'bridge drives the first (6040h), and leaves the others alone')
+            self.notes.append(frame_sentences.several_axes(
+                len(axes) + 1, [f'{index:04X}h is {word:04X}h' for index, word in axes]))
         return [(yield from self._mode()), (yield from self._mapping()),
                 (yield from self._disable_word()), (yield from self._bridge_heartbeat())]
 
@@ -207,7 +204,7 @@ class Cia402Prober(Prober):
         if offered.value is None:
             return undecided('mode', offered.why)
         names = [name for name, mode in MODES.items() if offered.value >> mode.number - 1 & 1]
-        told = f'6502h is {offered.value:08X}h: {", ".join(names) or "none of those known here"}'
+        told = frame_sentences.modes_offered(offered.value, names)
         wanted = self.drive.options.mode
         return Finding('mode', wanted if wanted in names else None, told)
 
@@ -218,11 +215,9 @@ class Cia402Prober(Prober):
             if why:
                 return undecided('mapping', why)
             if not same_mapping(found, wanted.entries):
-                return Finding('mapping', 'configure', (
-                    f'{place} holds {_entries_text(found)} and not '
-                    f'{_entries_text(wanted.entries)}'))
-        return Finding('mapping', 'verify', 'all PDOs are mapped as the file wants them; '
-                                            'configure does no harm')
+                return Finding('mapping', 'configure', frame_sentences.mapping_holds(
+                    place, _entries_text(found), _entries_text(wanted.entries)))
+        return Finding('mapping', 'verify', frame_sentences.mapping_fits())
 
     def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, tuple[list[int], str]]:
         """Return what a PDO holds, or why that is not known."""
@@ -248,17 +243,18 @@ class Cia402Prober(Prober):
             f'{index:04X}h is {"missing" if each.absent else each.signed}'
             for index, each in options.items())
         if disable == _RAMP:
-            return Finding('disable_word', 'disable_operation', f'{told}: 0007h brakes by ramp')
+            return Finding('disable_word', 'disable_operation',
+                           frame_sentences.brakes_by_ramp(told, '0007h'))
         if any(each.unknown for each in options.values()):
             return undecided('disable_word', told)
         if shutdown == _RAMP:
-            return Finding('disable_word', 'shutdown', f'{told}: 0006h brakes by ramp')
+            return Finding('disable_word', 'shutdown',
+                           frame_sentences.brakes_by_ramp(told, '0006h'))
         if disable != _COASTS:      # others are the maker's own
-            return Finding('disable_word', None, f'{told}: the manual says what 0007h does')
+            return Finding('disable_word', None, frame_sentences.manual_says(told, '0007h'))
         if shutdown not in (_COASTS, None):
-            return Finding('disable_word', None, f'{told}: the manual says what 0006h does')
-        return Finding('disable_word', 'disable_operation', (
-            f'{told}: the axis coasts with every word; write 605Ch := 1 if it may be'))
+            return Finding('disable_word', None, frame_sentences.manual_says(told, '0006h'))
+        return Finding('disable_word', 'disable_operation', frame_sentences.always_coasts(told))
 
     def _bridge_heartbeat(self) -> Generator[Question, Frame | None, Finding]:
         places = yield from self._value(_CONSUMER_HEARTBEAT, 0)
@@ -266,16 +262,15 @@ class Cia402Prober(Prober):
             return undecided('bridge_heartbeat', places.why)
         if not places.value:
             told = 'no 1016h' if places.absent else '1016h has no places'
-            return Finding('bridge_heartbeat', 0.0, f'{told}: the drive cannot watch the bridge, '
-                                                    'nothing stops it when the bridge dies')
+            return Finding('bridge_heartbeat', 0.0, frame_sentences.nothing_watches(told))
         option = yield from self._value(ABORT_CONNECTION_OPTION, 0)
         told = f'1016h has {places.value} places, ' + (
             option.why if option.unknown else
             f'6007h is {"missing" if option.absent else option.value}')
         if option.value == 0:
-            told += ': it does nothing when it misses the bridge; write 6007h'
+            told = frame_sentences.misses_without_effect(told)
         elif option.value is None:
-            told += ': what it does when it misses the bridge is not known'
+            told = frame_sentences.misses_unknown(told)
         return Finding('bridge_heartbeat', self.drive.options.bridge_heartbeat, told)
 
     # -- asking -----------------------------------------------------------------------------------
@@ -289,12 +284,12 @@ class Cia402Prober(Prober):
         answer = None if data is None else _answer(data, place)
         text = f'{index:04X}h' + (f'.{subindex:02X}h' if subindex else '')
         if answer is None:
-            return _Read(why=f'{text} was not answered')
+            return _Read(why=frame_sentences.probed_object_unanswered(text))
         if answer.kind is not SdoCommand.ABORT:
             return _Read(int.from_bytes(answer.data, 'little'))
         if answer.number in sdo.ABSENT:
-            return _Read(absent=True, why=f'the drive has no {text}')
-        return _Read(why=f'{text} was refused: {sdo.describe(answer.number)}')
+            return _Read(absent=True, why=frame_sentences.probed_object_absent(text))
+        return _Read(why=frame_sentences.probed_object_refused(text, sdo.describe(answer.number)))
 
 
 def _answer(data: bytes, place: tuple[int, int]) -> SdoMessage | None:

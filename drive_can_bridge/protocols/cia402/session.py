@@ -436,12 +436,12 @@ class Cia402Session(Session):
                 if self._missed_bridge:
                     self._heartbeats.was_missed(self._answers.slack, now)
         except Unasked as error:
-            self.report.unasked(sentences.malformed(str(error)), self._channel.late(
+            self.report.unasked(sentences.malformed(error.sentence), self._channel.late(
                 now - age, partial(self._transactor.answers, data)), now)
         except RemoteProtocolError as error:
-            self.report.reject(sentences.malformed(str(error)))
+            self.report.reject(sentences.malformed(error.sentence))
             if not self.online:
-                self._heard.wrong(sentences.answers_otherwise(str(error)), now)
+                self._heard.wrong(sentences.answers_otherwise(error.sentence), now)
 
     def _hear(self, identifier: int, place: int | None, data: bytes, now: float) -> None:
         """Note what a drive sends that is not online."""
@@ -475,7 +475,7 @@ class Cia402Session(Session):
         try:
             raws = self._responses[place].unpack(data)
         except RemoteProtocolError as error:
-            self.report.reject(sentences.malformed(str(error)))
+            self.report.reject(sentences.malformed(error.sentence))
             raws = self._responses[place].part(data)
             if place < count - 1 or not (raws or place):
                 return

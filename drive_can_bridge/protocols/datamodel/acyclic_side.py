@@ -118,10 +118,10 @@ class AcyclicSide:
             words = self._decode(frame, None if asked is None else asked.key)
         except Unasked as error:
             late = self.channel.late(now, partial(self._answers, frame))
-            session.report.unasked(sentences.malformed(str(error)), late, now)
+            session.report.unasked(sentences.malformed(error.sentence), late, now)
             return
         except RemoteProtocolError as error:
-            session.report.reject(sentences.malformed(str(error)))
+            session.report.reject(sentences.malformed(error.sentence))
             return
         if len(frame.data) != PAYLOAD:
             session.statistics.short += 1

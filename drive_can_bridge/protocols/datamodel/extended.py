@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import struct
 from typing import Union
 
+from drive_can_bridge.core import frame_sentences, sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError, Unasked
 from drive_can_bridge.core.frame import Frame
 
@@ -173,7 +174,7 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     """
     identifier, data, extended = frame
     if not extended:
-        raise RemoteProtocolError(f'{frame}: not a 29-bit identifier')
+        raise RemoteProtocolError(frame_sentences.not_29_bit(frame))
     response = bool(identifier & DIR)
     if identifier & CYCLIC == CYCLIC and not identifier & COUNT_MASK:
         words = unpack_words(data, count, strict=strict)
@@ -183,7 +184,7 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     check_received(frame, number, length)
     if identifier & W:
         if response:
-            raise RemoteProtocolError(f'{frame}: drives do not acknowledge writes')
+            raise RemoteProtocolError(frame_sentences.write_acknowledged(frame))
         return Write(number, unpack_words(data, length, strict=strict))
     if response:
         return ReadResponse(number, unpack_words(data, length, strict=strict))
@@ -197,10 +198,10 @@ def check_received(frame: Frame, number: int, count: int) -> None:
     :raises RemoteProtocolError: none or more than four, or some of them cannot exist.
     """
     if not 1 <= count <= SLOTS:
-        raise RemoteProtocolError(f'{frame}: parameter count {count} is not 1 to {SLOTS}')
+        raise RemoteProtocolError(frame_sentences.count_impossible(frame, count, SLOTS))
     if number + count - 1 > 0xFFFF:
-        raise RemoteProtocolError(f'{frame}: parameters {number} to {number + count - 1} run '
-                                  f'past 65535')
+        raise RemoteProtocolError(
+            frame_sentences.numbers_past_end(frame, number, number + count - 1))
 
 
 def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, *,
@@ -215,10 +216,10 @@ def decode_answer(frame: Frame, station: int, question: tuple[int, int] | None, 
     """
     telegram = decode(frame, strict=strict)
     if station_of(frame.identifier) != station:
-        raise RemoteProtocolError(f'{frame}: not from station {station}')
+        raise RemoteProtocolError(frame_sentences.not_from_station(frame, station))
     if not isinstance(telegram, ReadResponse) or (
             (telegram.number, len(telegram.words)) != question):
-        raise Unasked(f'{frame}: nobody asked for it')
+        raise Unasked(sentences.nobody_asked(frame))
     return telegram.words
 
 
@@ -229,9 +230,9 @@ def unpack_words(data: bytes, count: int, *, strict: bool = False) -> tuple[int,
     :raises RemoteProtocolError: too short, or not eight bytes although ``strict``.
     """
     if len(data) < 2 * count:
-        raise RemoteProtocolError(f'{len(data)} data bytes do not hold {count} words')
+        raise RemoteProtocolError(frame_sentences.words_missing(len(data), count))
     if strict and len(data) != PAYLOAD:
-        raise RemoteProtocolError(f'{len(data)} data bytes instead of {PAYLOAD}')
+        raise RemoteProtocolError(frame_sentences.length_differs(len(data), PAYLOAD))
     return WORDS[count].unpack_from(data)
 
 

@@ -9,6 +9,7 @@ Words are 16 bit, high byte first, slot 0 in BYTE0 and BYTE1, as in all telegram
 from collections.abc import Sequence
 import struct
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
@@ -62,7 +63,7 @@ class CyclicCodec:
         :return: the raw integers; and what is wrong with it, '' for nothing.
         """
         if len(data) != PAYLOAD:
-            return (), f'{len(data)} data bytes instead of {PAYLOAD}'
+            return (), frame_sentences.length_differs(len(data), PAYLOAD)
         return self._unpack_request(data), ''
 
     def decode_response(self, data: bytes) -> tuple[tuple[int, ...], str]:
@@ -75,10 +76,11 @@ class CyclicCodec:
         if len(data) == PAYLOAD:
             return self._unpack_response(data), ''
         if self._strict:
-            return (), f'{len(data)} data bytes instead of {PAYLOAD}'
+            return (), frame_sentences.length_differs(len(data), PAYLOAD)
         needed = 2 * len(self._response)
         raws = _words_struct(self._response[:len(data) // 2]).unpack_from(data)
-        return raws, '' if len(data) >= needed else f'{len(data)} data bytes, {needed} needed'
+        return raws, ('' if len(data) >= needed else
+                      frame_sentences.bytes_missing(len(data), needed))
 
 
 def _words_struct(parameters: Sequence[Parameter], *, unsigned: int | None = None,

@@ -10,9 +10,11 @@ themselves. That a drive does not answer for other numbers shows nothing: an ans
 from collections.abc import Callable, Generator, Sequence
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.options import (
@@ -74,7 +76,7 @@ class ExtendedScanner(Scanner):
         else:
             if not isinstance(telegram, extended.Write):    # which nobody answers
                 self.hear_request(frame, now)
-            self.master = f'requests to station {station} of {self.protocol}'
+            self.master = frame_sentences.requests_to_station(station, self.protocol)
 
     def _take_map(self, station: int, base: int, words: tuple[int, ...]) -> None:
         maps = self.maps.setdefault(station, {})
@@ -93,8 +95,7 @@ class ExtendedScanner(Scanner):
         request, response = maps.get(REQUEST_MAP_BASE, ()), maps.get(RESPONSE_MAP_BASE, ())
         return {'request_numbers': _exchangeable(request),
                 'response_numbers': _exchangeable(response),
-                'remarks': [f'its {name} map, {_numbers(numbers)}, cannot be exchanged: map other '
-                            'parameters, each once'
+                'remarks': [frame_sentences.map_not_exchangeable(name, _numbers(numbers))
                             for name, numbers in (('request', request), ('response', response))
                             if numbers and not _exchangeable(numbers)]}
 
@@ -116,8 +117,7 @@ class StandardScanner(Scanner):
     """
 
     protocol = 'datamodel_standard'
-    hazard = ('a read on 3F1h to 3FFh looks like TPDO3 of CANopen nodes 113 to 127, and on even '
-              'stations like a task that reads, to CANnord inverters 249 to 255')
+    hazard = frame_sentences.hazard_standard()
 
     def begin(self) -> None:
         self._questions += [
@@ -187,7 +187,7 @@ class DataModelProber(Prober):
                 seen[offset] = _Maps(request, response)
         offset_found, reason = self._conclude(seen)
         if not self.answered:
-            reason = 'no answer: check station and bit rate'
+            reason = frame_sentences.scan_silent()
         findings = [Finding('parameter_offset', offset_found, reason)]
         if self._maps_count:
             if offset_found is None and list(seen) == [options.parameter_offset]:
@@ -196,20 +196,18 @@ class DataModelProber(Prober):
                 offset_found, None if offset_found is None else seen[offset_found])
         return findings
 
-    def _conclude(self, seen: dict[int, _Maps]) -> tuple[int | None, str]:
+    def _conclude(self, seen: dict[int, _Maps]) -> tuple[int | None, Sentence]:
         told = '; '.join(
             f'{self._first(offset)}: {maps}' for offset, maps in sorted(seen.items()))
         agreeing = [offset for offset, maps in seen.items() if self._agrees(maps, offset)]
         if len(agreeing) == 1:
-            return agreeing[0], f'the maps of the file are there, {told}'
+            return agreeing[0], frame_sentences.maps_are_there(told)
         if not agreeing and len(seen) == 1:
-            return None, ('undecided: the maps of the file are nowhere, and that others were not '
-                          'answered proves nothing, ' + told)
+            return None, frame_sentences.maps_nowhere(told)
         if not seen:
-            return None, 'the maps are not answered; check request_map_base and response_map_base'
-        return None, ('the maps of the file are in more than one place, ' if agreeing else
-                      'the maps of the file are nowhere, and more than eight numbers answer, '
-                      ) + told
+            return None, frame_sentences.maps_unanswered()
+        return None, (frame_sentences.maps_in_several(told) if agreeing else
+                      frame_sentences.maps_ambiguous(told))
 
     def _agrees(self, maps: _Maps, offset: int) -> bool:
         """Tell whether both maps are those of the file, when all numbers are moved like them."""
@@ -221,7 +219,7 @@ class DataModelProber(Prober):
     def _map_findings(self, offset: int | None, maps: _Maps | None) -> list[Finding]:
         keys = ('cyclic_request', 'cyclic_response')
         if offset is None or maps is None:
-            return [Finding(key, None, 'parameter_offset comes first') for key in keys]
+            return [Finding(key, None, frame_sentences.offset_first()) for key in keys]
         names = {each.number: each.name for each in self.drive.profile.parameters.values()}
         found = []
         bases = self.drive.options.request_map_base, self.drive.options.response_map_base
@@ -229,10 +227,10 @@ class DataModelProber(Prober):
             numbers = [entry - offset for entry in effective(entries)]
             unlisted = [f'P{number}' for number in numbers if number not in names]
             place = f'{base + offset} to {base + offset + SLOTS - 1}'
-            reason = f'{place} hold {_numbers(entries)}'
+            reason = frame_sentences.numbers_hold(place, _numbers(entries))
             if unlisted:
-                found.append(Finding(key, None, f'{reason}; the profile lacks '
-                                                f'{", ".join(unlisted)}'))
+                found.append(Finding(
+                    key, None, frame_sentences.profile_lacks(reason, unlisted)))
             else:
                 found.append(Finding(key, [names[number] for number in numbers], reason))
         return found
@@ -275,8 +273,7 @@ def standard_prober(drive: DriveConfiguration) -> DataModelProber:
                         quiet=options.quarantine)
     # bytes 0 and 1 are 03h 7Ah: task 7, a write to EEPROM, of P515
     hazard = '' if request & 1 or request not in _CANNORD_TASKS else (
-        f'a read of the maps on {request:03X}h is a write of a parameter in EEPROM to a CANnord '
-        'inverter that has it as its identifier for parameter tasks')
+        frame_sentences.hazard_maps(request))
     return DataModelProber(
         drive, [Route(request, STANDARD_IDENTIFIER_MAX, False)], question,
         lambda data: standard.decode_read_response(Frame(response, data, False), SLOTS),

@@ -35,6 +35,7 @@ never acknowledged.
 from collections.abc import Sequence
 import struct
 
+from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.datamodel.extended import (
@@ -105,15 +106,15 @@ def decode_request(frame: Frame) -> ReadRequest | Write:
     :raises RemoteProtocolError: not a request of this protocol.
     """
     if frame.extended:
-        raise RemoteProtocolError(f'{frame}: not an 11-bit identifier')
+        raise RemoteProtocolError(frame_sentences.not_11_bit(frame))
     data = frame.data
     if len(data) != PAYLOAD:
-        raise RemoteProtocolError(f'{frame}: {len(data)} data bytes instead of {PAYLOAD}')
+        raise RemoteProtocolError(frame_sentences.length_differs(len(data), PAYLOAD, frame))
     if data[0] == WRITE:
         _, number, word = _WRITE.unpack(data)
         return Write(number, (word,))
     if data[0] != READ:
-        raise RemoteProtocolError(f'{frame}: function {data[0]} is neither {READ} nor {WRITE}')
+        raise RemoteProtocolError(frame_sentences.unknown_function(frame, data[0], READ, WRITE))
     _, number, count = _READ_REQUEST.unpack(data)
     check_received(frame, number, count)
     return ReadRequest(number, count)
@@ -128,12 +129,12 @@ def decode_read_response(frame: Frame, count: int, *, strict: bool = False) -> t
     :raises RemoteProtocolError: wrong frame format, too short, or not eight bytes while strict.
     """
     if frame.extended:
-        raise RemoteProtocolError(f'{frame}: not an 11-bit identifier')
+        raise RemoteProtocolError(frame_sentences.not_11_bit(frame))
     length = len(frame.data)
     if length < 2 * count:
-        raise RemoteProtocolError(f'{frame}: {length} data bytes do not hold {count} words')
+        raise RemoteProtocolError(frame_sentences.words_missing(length, count, frame))
     if strict and length != PAYLOAD:
-        raise RemoteProtocolError(f'{frame}: {length} data bytes instead of {PAYLOAD}')
+        raise RemoteProtocolError(frame_sentences.length_differs(length, PAYLOAD, frame))
     return _WORDS[count].unpack_from(frame.data)
 
 
