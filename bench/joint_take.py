@@ -1,71 +1,112 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a message with commands for all joints costs who takes it, as a real publisher sends them.
+What takes commands for all joints out of a topic, as a bridge does it every 5 ms.
 
-``joint_take.py JOINTS`` prints µs of this thread for each: taken by rclpy as bytes (floor), and
-taken and read as the bridge does it.
+``joint_take.py`` is told ``take SECONDS``: by the bridge's own code, as nothing but bytes by
+rclpy, and these bytes are read. It answers what each of them took of the processor, and of how
+many messages. It runs in an older build, too, which is compared with this one
+(``run.py --beside``).
 """
 
-from statistics import median
-import sys
+import inspect
 import time
 from typing import Any
 
-from child import child
+from child import serve
 import rclpy
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from drive_can_bridge.clock import SteadyClock
 from drive_can_bridge.ros.joint_reader import JointReader
-from drive_can_bridge.ros.polled_topics import CommandTopic
-from drive_can_bridge.ros.rcl.incoming import subscribe
+from drive_can_bridge.ros.polled_topics import PolledTopics
 
-#: rounds, s between two, and messages that a round has at least
-ROUNDS, PAUSE, ENOUGH = 60, 0.1, 5
-#: s until the publisher is there, and the reader knows its messages
-PATIENCE, KNOWN = 60.0, 50
+TOPIC = '/drive_can_bridge/joint_commands'
+#: s between two looks
+PERIOD = 0.005
+
+
+def nothing(*_: object, **__: object) -> None:
+    """Do nothing with it."""
+
+
+class Taker:
+    """The bridge's own code, from the middleware to what joints are told."""
+
+    def __init__(self, node: Node) -> None:
+        self._clock = SteadyClock()
+        self._topics = PolledTopics(node, self._clock, nothing, nothing)
+        self._count = 0
+        wanted = {'take': self._take, 'old': self._take, 'read': JointReader()}
+        if 'disarm' in inspect.signature(self._topics.subscribe).parameters:
+            wanted['disarm'] = nothing
+        subscribe: Any = self._topics.subscribe
+        subscribe(JointState, TOPIC, **wanted)
+
+    def _take(self, *_: object) -> None:
+        self._count += 1
+
+    def __call__(self) -> int:
+        self._count = 0
+        self._topics.take(self._clock.now())
+        return self._count
+
+
+class Floor:
+    """What rclpy takes to hand over the bytes of messages, and to say that there are no more."""
+
+    def __init__(self, node: Node) -> None:
+        subscription = node.create_subscription(
+            JointState, TOPIC, nothing,
+            QoSProfile(depth=8, reliability=ReliabilityPolicy.BEST_EFFORT))
+        self._handle: Any = subscription.handle
+        #: what it has handed over
+        self.taken: list[bytes] = []
+
+    def __call__(self) -> int:
+        self.taken.clear()
+        while (found := self._handle.take_message(JointState, True)) is not None:
+            self.taken.append(found[0])
+        return len(self.taken)
+
+
+class Reading:
+    """What the bridge makes of those bytes."""
+
+    def __init__(self, floor: Floor) -> None:
+        self._floor = floor
+        self._read = JointReader()
+
+    def __call__(self) -> int:
+        for data in self._floor.taken:
+            self._read(data)
+        return len(self._floor.taken)
 
 
 def main() -> None:
-    """Measure."""
-    joints = int(sys.argv[1])
+    """Take when asked."""
     rclpy.init(args=[])
-    node = Node('bench_joint_take', enable_rosout=False, start_parameter_services=False)
-    incoming = subscribe(node, JointState, '/drive_can_bridge/joint_commands',
-                         QoSProfile(depth=1000), None, print)
-    clock, got = SteadyClock(), list[Any]()
-    topic = CommandTopic(incoming, use=lambda message, _: got.append(message),
-                         old=got.append, aged=lambda *_: None, unreadable=print,
-                         read=JointReader())
+    node = Node(f'bench_joint_take_{time.monotonic_ns()}', enable_rosout=False,
+                start_parameter_services=False)
+    floor = Floor(node)
+    actions = {'bridge': Taker(node), 'rclpy': floor, 'read': Reading(floor)}
+    orders = [('bridge', 'rclpy', 'read'), ('rclpy', 'read', 'bridge')]
 
-    def take() -> int:
-        got.clear()
-        now = round(1e9 * clock.now())
-        topic.take(clock.now(), (now, clock.stamp() - now))
-        return len(got)
-
-    def bare() -> int:
-        count = 0
-        while incoming.take() is not None:
-            count += 1
-        return count
-    with child('publisher.py', 'joints', joints) as publisher:
-        publisher.ask('rate 1000')
-        known, deadline = 0, time.monotonic() + PATIENCE
-        while known < KNOWN and time.monotonic() < deadline:
-            time.sleep(PAUSE)
-            known += take()
-        for name, action in (('taken by rclpy', bare), ('taken and read', take)):
-            found = []
-            for _ in range(ROUNDS):
-                time.sleep(PAUSE)
+    def take(seconds: float) -> dict[str, tuple[float, int]]:
+        spent, count = dict.fromkeys(actions, 0.0), dict.fromkeys(actions, 0)
+        for each in actions.values():   # what waits from before
+            each()
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            time.sleep(PERIOD)
+            orders.reverse()    # who comes second finds the caches warm
+            for name in orders[0]:
                 begun = time.thread_time()
-                count = action()
-                if count >= ENOUGH:
-                    found.append(1e6 * (time.thread_time() - begun) / count)
-            print(f'{name}: {median(found):.1f} µs')
+                count[name] += actions[name]()
+                spent[name] += time.thread_time() - begun
+        return {name: (spent[name], count[name]) for name in actions}
+    serve({'take': take})
 
 
 if __name__ == '__main__':

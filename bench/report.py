@@ -333,6 +333,31 @@ def joints_figures(found: dict[str, Any]) -> list[Figure]:
             for name, goal in (('states', 1.05), ('states and commands', 1.3))]
 
 
+def joint_take_figures(found: dict[str, Any]) -> list[Figure]:
+    """Judge the way of a message for all joints, beside that of rclpy alone and another build."""
+    ours = found['ours']
+    figures = [Figure(
+        'a joint command, taken, its age judged, and read', _microseconds(ours['bridge']),
+        f'taken by rclpy as bytes {_microseconds(ours["rclpy"])}',
+        _by_pairs(ours['bridge'], ours['rclpy']), 5.0)]
+    if 'other' in found:
+        figures += [Figure(
+            f'{name}, beside the other build', _microseconds(ours[key]),
+            _microseconds(found['other'][key]), _by_pairs(ours[key], found['other'][key]), 0.2)
+            for key, name in (('read', 'a joint command, read'), ('bridge', 'the same, taken and '
+                                                                  'its age judged, too'))]
+    return figures
+
+
+def _microseconds(samples: list[float]) -> str:
+    return f'{median(samples):.1f} ({min(samples):.1f}–{max(samples):.1f}) µs'
+
+
+def _by_pairs(ours: list[float], others: list[float]) -> float:
+    """Return the median of the ratios of what was measured one right after the other."""
+    return median([one / other for one, other in zip(ours, others) if other])
+
+
 def _beside_figure(name: str, pairs: list[tuple[float, float]], goal: float) -> Figure:
     """Compare two bridges that ran at the same time."""
     with_it, without = (median([pair[place] for pair in pairs]) for place in (0, 1))
@@ -387,7 +412,8 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
     'drives': drives_figures, 'builds': builds_figures, 'decode': decode_figures,
-    'flight': flight_figures, 'joints': joints_figures, 'start': start_figures,
+    'flight': flight_figures, 'joints': joints_figures,
+    'joint take': joint_take_figures, 'start': start_figures,
 }
 
 

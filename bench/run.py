@@ -96,6 +96,7 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(drives, period, subscribed=False, trace=2 * duration), duration, pace.rounds),
         'joints': lambda: scenarios.joints(
             Load(drives, period, subscribed=False), duration, 100.0, pace.rounds),
+        'joint take': lambda: scenarios.joint_take(drives, 1000.0, pace.rounds, options.beside),
         'builds': lambda: scenarios.builds(
             drives, pace.windows, 0.2 * duration, options.beside),
         'decode': lambda: scenarios.decode(options.frames),
@@ -172,7 +173,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--repeat', type=int, default=1, help='runs; the median one is shown')
     parser.add_argument('--beside', metavar='PYTHON', default='', help=(
         'of another build (its .venv/bin/python): `hand` measures its commands as well, `builds` '
-        'its bridge'))
+        'its bridge, `joint take` how it takes commands'))
     parser.add_argument('--json', type=Path, help='write figures and samples to this file')
     parser.add_argument('--plot', type=Path, help='write the distributions to this PNG file')
     parser.add_argument('--sweep-plot', type=Path,

@@ -31,6 +31,8 @@ DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
 #: a process that computes, until who started it has ended
 COMPUTES = 'import os; own = os.getppid()\nwhile os.getppid() == own: pass'
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
+#: messages after which a reader knows what they look like
+JOINTS_KNOWN = 20
 #: number of the first setting
 SETTINGS_AT = 1000
 #: bit/s, and s that a drive takes to answer, for a backup
@@ -665,6 +667,33 @@ def joints(load: Load, duration: float, rate: float, rounds: int = 40) -> dict[s
             listener.ask('clear'), commander.ask(f'rate {rate if commanded else 0.0}')))
         return {'states': states, 'states and commands': commands,
                 'received': listener.ask('count')}
+
+
+def joint_take(joints: int, rate: float, rounds: int, other: str = '') -> dict[str, Any]:
+    """
+    Measure what takes a message for all joints out of a topic, and reads it, each in µs.
+
+    :param rate: Hz, of messages.
+    :param other: the Python of another build, measured in turn with this one; '': none.
+    """
+    builds = {'ours': sys.executable, **({'other': other} if other else {})}
+    found: dict[str, dict[str, list[float]]] = {name: {} for name in builds}
+    with ExitStack() as stack:
+        publisher = stack.enter_context(child('publisher.py', 'joints', joints))
+        takers = {name: stack.enter_context(child('joint_take.py', python=python))
+                  for name, python in builds.items()}
+        publisher.ask(f'rate {rate}')
+        for taker in takers.values():
+            known, until = 0, time.monotonic() + PATIENCE
+            while known < JOINTS_KNOWN:
+                if time.monotonic() > until:
+                    raise SystemExit('no command for joints has come')
+                known += min(count for _, count in taker.ask('take 0.1').values())
+        for number in range(rounds):
+            for name in list(takers)[::1 - 2 * (number % 2)]:
+                for what, (spent, count) in takers[name].ask('take 0.25').items():
+                    found[name].setdefault(what, []).append(1e6 * spent / max(1, count))
+    return found
 
 
 def builds(drives: int, windows: int, duration: float, other: str) -> dict[str, Any]:

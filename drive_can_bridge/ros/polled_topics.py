@@ -159,7 +159,9 @@ class CommandTopic:
 def _gid(info: dict[str, Any]) -> bytes | None:
     """Return who published a message; None: this rclpy or middleware does not tell."""
     gid = info.get('publisher_gid')
-    data = bytes(gid['data'] if isinstance(gid, dict) else gid or b'')
+    if gid is None:
+        return None
+    data = bytes(gid['data'] if isinstance(gid, dict) else gid)
     return data if any(data) else None
 
 

@@ -128,6 +128,23 @@ def test_another_shape_in_between(arrive: Arrive, message: JointState) -> None:
     assert (read.names, exact(read.columns)) == (NAMES, exact([('velocity', VALUES)]))
 
 
+def test_commanders_who_take_turns(arrive: Arrive) -> None:
+    def turn(number: int) -> list[JointState]:
+        return [JointState(name=['a', 'b'], velocity=[1.0, float(number)]),
+                JointState(name=['c', 'd'], velocity=[2.0, float(number)]),     # as long
+                JointState(name=NAMES, position=VALUES, velocity=[float(number)] * 3)]
+    reader = JointReader()
+    known = [[reader(arrive(message)).names for message in turn(number)]
+             for number in range(ALIKE)][-1]
+    for number in range(3):
+        for message, names in zip(turn(number), known):
+            read = reader(arrive(message))
+            assert read.names is names, 'it does not know it'
+            assert read.names == list(message.name)
+            assert exact(read.columns) == exact(
+                (kind, getattr(message, kind)) for kind in KINDS if getattr(message, kind))
+
+
 def test_a_frame_is_no_part_of_a_joint(arrive: Arrive) -> None:
     reader = knowing(arrive, JointState(name=NAMES, velocity=[0.0] * 3))
     message = JointState(name=NAMES, velocity=VALUES)
