@@ -24,8 +24,10 @@ INTERNAL: dict[str, set[str]] = {
     'resources': {''},
     'clock': {'', 'memory'},
     'memory': {''},
-    'process': {'', 'clock'},
-    'core': {''},
+    # mere texts: for who may import no catalogue, and for the catalogue
+    'host_texts': {''},
+    'process': {'', 'clock', 'host_texts'},
+    'core': {'', 'host_texts'},
     'protocols': {'', 'core'},
     'configuration': {'', 'core', 'protocols', 'resources'},
     'profiles': {'', 'core', 'configuration', 'protocols', 'resources'},
@@ -65,7 +67,7 @@ INTERNAL: dict[str, set[str]] = {
     'backup': {'', 'core', 'configuration', 'protocols', 'client.drive'},
     'cli': {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
-        'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
+        'host_texts', 'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
         'demo', 'client', 'client.drive', 'client.jog', 'client.local', 'backup', 'ros',
         'ros.client', 'ros.monitor', 'ros.demo'},
 }

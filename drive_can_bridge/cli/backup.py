@@ -14,6 +14,7 @@ from drive_can_bridge.cli.drives import (
     add_words, by_short_names, chosen, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.client.drive import Drive
+from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.text import counted, printable
@@ -153,5 +154,6 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
         *([f'left out, the drive does not have them: {", ".join(absent)}'] if absent else ())]), {
             'drive': drive.name, 'file': str(file), 'settings': len(settings),
             'identity': head.identity,
-            'left_out': [{'parameter': name, 'reason': reason} for name, reason in (
+            'left_out': [{'parameter': name, 'reason': reason, 'code': code_of(reason)}
+                         for name, reason in (
                 *left_out, *((name, outcomes[name].reason) for name in absent))]}

@@ -12,6 +12,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.drives import chosen, split_words
 from drive_can_bridge.cli.output import print_table, waiting
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
 )
@@ -210,7 +211,8 @@ def _show(args: Namespace, results: Sequence[tuple[Prober, list[Finding]]]) -> N
             configured = _configured(drive, finding.key)
             if args.json:
                 print_json({'drive': drive.name, 'key': finding.key, 'value': finding.value,
-                            'configured': configured, 'reason': finding.reason})
+                            'configured': configured, 'reason': finding.reason,
+                            'code': code_of(finding.reason)})
                 continue
             value = UNDECIDED if finding.value is None else _written(finding.value)
             rows.append((drive.name, finding.key, value, _written(configured), finding.reason))

@@ -9,9 +9,10 @@ sends a stop and says what became of it.
 from collections.abc import Collection, Iterable, Sequence
 import sys
 
+from drive_can_bridge import host_texts
 from drive_can_bridge.cli.saying import FAILED, print_json, say
 from drive_can_bridge.process.beginning import look_after_outputs
-from drive_can_bridge.process.local_stop import Answer, Early, LocalStop, RUNNING
+from drive_can_bridge.process.local_stop import Answer, Early, LocalStop
 from drive_can_bridge.process.local_way import matches
 from drive_can_bridge.process.presence import Present, short
 
@@ -76,7 +77,8 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
     """
     through = ros or WithoutRos()
     heard = {short(name) for name in through.heard}
-    told = [Answer(each.name, False, f'{each.silence(local.domain)}: its drives {RUNNING}',
+    told = [Answer(each.name, False, host_texts.drives_may_run.format(
+        why=each.silence(local.domain)),
                    bridge=True)
             for each in local.unheard
             if each.domain != local.domain or each.name not in heard] + local.answers()
@@ -87,14 +89,14 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
     nodes = {answer.name for answer in told if not answer.bridge}
     there = ', '.join(node.lstrip('/') for node in dict.fromkeys(
         [*local.drives, *through.drives])) or 'none'
-    told += [Answer(word, False, f'no such drive; there are: {there}') for word in words
+    told += [Answer(word, False, host_texts.no_such_drive.format(there=there)) for word in words
              if known and not any(matches(word, node) for node in nodes)]
     own = any(each.domain in (None, local.domain) for each in local.present)
     if not known and (not told or not own and ros is not None):
         from drive_can_bridge.process.environment import nobody     # takes its time
         # those of other domains may be all that there are, or discovery was too slow
         told.append(Answer('', bool(told), nobody(namespace), bridge=True))
-    return told or [Answer(name, False, 'has no drives: it is not configured', bridge=True)
+    return told or [Answer(name, False, host_texts.has_no_drives, bridge=True)
                     for name in known]
 
 
@@ -108,8 +110,9 @@ def show(told: Sequence[Answer], order: str, *, json: bool) -> int:
     for answer in sorted(told, key=lambda each: each.ok):
         name, elsewhere = answer.name.lstrip('/'), answer.domain is not None
         if json:
+            from drive_can_bridge.core.codes import code_of     # takes its time: all is over
             print_json({'bridge' if answer.bridge else 'drive': name, 'ok': answer.ok,
-                        'message': answer.text,
+                        'message': answer.text, 'code': code_of(answer.text),
                         **({'domain': answer.domain} if elsewhere else {})})
         else:
             verdict = '' if answer.ok or order != 'stop' else 'NOT STOPPED'

@@ -334,7 +334,7 @@ class LocalWays:
         asked: dict[_Bridge, list[str]] = {}
         for node in nodes:
             asked.setdefault(self._at[node], []).append(node)
-        answers = {node: Answer(node, False, 'no answer: its bridge has gone') for node in nodes}
+        answers = {node: Answer(node, False, sentences.bridge_has_gone()) for node in nodes}
         waiting = []
         for bridge, names in asked.items():
             try:
@@ -351,7 +351,7 @@ class LocalWays:
             except TimeoutError:
                 answers.update((node, unanswered(node, CONTROL_TIMEOUT)) for node in asked[bridge])
             except _SENSELESS:      # it lives
-                answers.update((node, Answer(node, False, 'no answer'))
+                answers.update((node, Answer(node, False, sentences.no_answer_briefly()))
                                for node in asked[bridge])
             except OSError:
                 continue

@@ -3,12 +3,13 @@
 
 from types import ModuleType
 
-from drive_can_bridge.core import bus_sentences, complaints, frame_sentences, messages, sentences
+from drive_can_bridge.core import (
+    bus_sentences, complaints, frame_sentences, host_sentences, messages, sentences)
 from drive_can_bridge.core.messages import Sentence, Text
 
 #: the modules of rows, by what they are about; a code stands once in each of these parts
 MODULES: dict[str, tuple[ModuleType, ...]] = {
-    'drives and buses': (sentences, bus_sentences, frame_sentences),
+    'drives and buses': (sentences, bus_sentences, frame_sentences, host_sentences),
     'files': (complaints,),
 }
 CODES: dict[str, dict[str, Text]] = {

@@ -48,6 +48,9 @@ drive_offline_because = Text(
     do='start the node (nmt_start), or wait until it is started by others')
 bus_down = Text('bus down', do='see what diagnostics say of the bus; it is opened again by itself')
 bridge_inactive = Text('bridge inactive', do='activate the bridge')
+bridge_has_gone = Text(
+    'no answer: its bridge has gone',
+    do='see why the bridge has ended; make sure that the drive stands still')
 not_sent = Text(
     'not sent: the bus takes no frames',
     do='look at cable, termination and bit rate; ask again')
@@ -334,6 +337,9 @@ partner_failed = Text('{name}: {why}', do='report it')
 may_still_be_running = Text(
     '{why}: it may still be running',
     do='make sure that the drive stands still, by other means if need be')
+stop_not_passed_on = Text(
+    'a stop cannot be passed on to this bridge ({why}): its drives may still be running',
+    do='stop it from its own host; make sure that its drives stand still')
 no_answer_to_stop = Text('no answer in {seconds:g} s', do='see whether the drive stands still')
 nobody_takes = Text(
     'nobody offers its ~/{service}',

@@ -7,6 +7,8 @@ from pathlib import Path
 import shlex
 import sys
 
+from drive_can_bridge import host_texts
+
 DOMAIN_ID = 'ROS_DOMAIN_ID'
 DISCOVERY_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 _LOCALHOST_ONLY = 'ROS_LOCALHOST_ONLY'
@@ -42,7 +44,8 @@ def domain_problem() -> str:
         return ''
     if -1 <= domain <= DOMAIN_ID_MAX:   # rcl takes -1 for none
         return ''
-    return f'{DOMAIN_ID} is {domain}, allowed are 0 to {DOMAIN_ID_MAX}'
+    return host_texts.domain_impossible.format(
+        variable=DOMAIN_ID, domain=domain, most=DOMAIN_ID_MAX)
 
 
 def in_words() -> str:
@@ -72,10 +75,6 @@ def activate_command() -> str:
             if sys.prefix != sys.base_prefix and script.is_file() else '')
 
 
-#: why somebody may not have answered yet
-BUSY = 'the computer may be busy'
-
-
 def nobody(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
     """
     Say that there is no bridge, or none that answers.
@@ -86,6 +85,7 @@ def nobody(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.
     where = '' if namespace is None else f' in namespace {namespace or "/"}'
     domain = os.environ.get(DOMAIN_ID) or '0'
     if silent:
-        return (f'no bridge answers{where} (ROS domain {domain}): {", ".join(silent)} '
-                f'{"does" if len(silent) == 1 else "do"} not, for {waited:.0f} s ({BUSY})')
-    return f'no configured bridge is running{where} (ROS domain {domain})'
+        return host_texts.no_bridge_answers.format(
+            where=where, domain=domain, silent=', '.join(silent),
+            do='does' if len(silent) == 1 else 'do', waited=waited)
+    return host_texts.no_bridge_running.format(where=where, domain=domain)

@@ -14,6 +14,7 @@ import select
 import socket
 import threading
 
+from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock, Worker
 from drive_can_bridge.process.local_way import (
     ASKED_MAX, END, Inbound, NO, PACKET, packets_of, PATIENCE, Rubbish, trusted_users, user_of,
@@ -188,7 +189,8 @@ class LocalServer:
             try:
                 self._turn()
             except Exception as error:  # noqa: BLE001  outermost loop of a thread
-                self._report(f'internal error in the local way: {type(error).__name__}: {error}')
+                self._report(host_texts.local_way_failed.format(
+                    kind=type(error).__name__, text=error))
                 self._clock.wait(self._clock.now() + _LOOK_PERIOD)
             keep()
 
@@ -293,15 +295,15 @@ class LocalServer:
         caller.busy, caller.has_asked = action or '?', True
         asked = LocalRequest(caller, action, words, trusted=not self._is_strange(caller))
         if version != VERSION:
-            asked.refuse(f'version {VERSION} is understood here')
+            asked.refuse(host_texts.version_differs.format(version=VERSION))
         elif action not in STOPPING and not asked.trusted:
-            asked.refuse('another user')
+            asked.refuse(host_texts.another_user)
         elif action not in STOPPING and caller.left:    # nothing but a stop is done too late
             caller.gone = True
         elif action not in STOPPING and sum(
                 bool(each.busy) and each.busy not in STOPPING
                 for each in self._callers.values()) > BUSY_MAX:
-            asked.refuse('too many ask')
+            asked.refuse(host_texts.too_many_ask)
         else:
             self._serve(asked)
 

@@ -10,6 +10,7 @@ from collections import namedtuple
 from collections.abc import Iterable, Sequence
 import select
 
+from drive_can_bridge import host_texts
 from drive_can_bridge.process.local_way import (
     ANYWHERE, END, Line, meant, NO, PATIENCE, Rubbish)
 from drive_can_bridge.process.presence import (
@@ -21,7 +22,6 @@ SOON = 0.15
 STOP_TIMEOUT = 10.0
 #: messages of one bridge that are taken in a row: one that never ends holds up nobody
 _AT_ONCE = 1000
-RUNNING = 'may still be running'
 
 
 class Answer(namedtuple('Answer', 'name ok text bridge domain', defaults=(False, None))):
@@ -42,7 +42,8 @@ def stop_answer(node: str, success: bool, message: str, online: bool) -> Answer:
     if not success:
         return Answer(node, False, message)
     said = message or 'stopped'
-    return Answer(node, online, said if online else f'{said}; not online: {RUNNING}')
+    return Answer(node, online,
+                  said if online else host_texts.not_online_may_run.format(said=said))
 
 
 class _Told:
@@ -311,7 +312,8 @@ class LocalStop:
         found: list[Answer] = []
         for each in self._told:
             domain = None if each.present.domain == self.domain else each.present.domain
-            told = [each.answers.get(node, Answer(node, False, f'no answer: {RUNNING}'))
+            told = [each.answers.get(node, Answer(
+                        node, False, host_texts.may_run.format(why='no answer')))
                     for node in each.drives if meant(self._words, node)]
             if each.here and each.seen.count(each.name) > 1:
                 told.append(twins(each.name, each.seen.count(each.name)))
@@ -398,13 +400,13 @@ def begun(namespace: str | None, words: Sequence[str]) -> LocalStop:
 
 def twins(name: str, number: int) -> Answer:
     """Say that bridges cannot be told apart."""
-    return Answer(name, False, f'{number} bridges are called so, and one answer hides the other: '
-                               f'drives {RUNNING}', bridge=True)
+    return Answer(name, False, host_texts.bridges_hide_each_other.format(number=number),
+                  bridge=True)
 
 
 def does_not_answer() -> str:
     """Say it of a bridge."""
-    return f'this bridge does not answer: its drives {RUNNING}'
+    return host_texts.bridge_does_not_answer
 
 
 def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> bool:

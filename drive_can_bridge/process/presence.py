@@ -16,6 +16,8 @@ from collections.abc import Sequence
 import os
 import socket
 
+from drive_can_bridge import host_texts
+
 #: all names begin with this
 PREFIX = 'drive_can_bridge'
 #: what a bridge calls itself where it locks drives
@@ -90,7 +92,7 @@ class Present(namedtuple('Present', 'process domain name locks')):
         where = f'process {self.process}'
         if self.domain not in (None, domain):
             where += f', ROS domain {self.domain}'
-        return f'this bridge of this host ({where}) does not answer here'
+        return host_texts.not_here.format(where=where)
 
 
 class Presence:

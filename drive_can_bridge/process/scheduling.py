@@ -7,6 +7,8 @@ import sys
 import threading
 import time
 
+from drive_can_bridge import host_texts
+
 #: s for which a thread that computes may keep others waiting, at least and at most. Python's 5 ms
 #: are as long as the shortest period: a service call that is being answered would hold up a cycle
 #: by all of it.
@@ -29,8 +31,7 @@ NICE = -10
 PRIORITY = 40
 
 RAISED = f'real-time priority {PRIORITY}'
-NOT_RAISED = ('no real-time priority, periods are less regular on a busy machine; to allow it see '
-              'docs/performance.md')
+NOT_RAISED = host_texts.no_real_time
 
 
 def be_punctual() -> None:

@@ -25,6 +25,7 @@ import threading
 from types import TracebackType
 from typing import Any
 
+from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
 
@@ -37,8 +38,7 @@ GRACE = 0.3
 #: breath, to its whole process group; a terminal and a launcher both signal
 SAME_BREATH = 0.05
 #: why what moves drives is not suspended
-NOT_SUSPENDED = ('Ctrl-Z refused: drives would run on with nobody to stop them; Ctrl-C stops '
-                 'them')
+NOT_SUSPENDED = host_texts.not_suspended
 
 
 class SignalWatcher:

@@ -25,6 +25,7 @@ import select
 import termios
 import threading
 
+from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock
 
 #: s after which nobody takes what is being written
@@ -186,8 +187,8 @@ class Output:
                     chunk, lines = self._chunks.popleft(), 0
                 elif self._dropped:
                     lines = self._dropped
-                    chunk = (f'drive_can_bridge: {lines} lines left out here: {self._name} was '
-                             f'not read\n').encode()
+                    chunk = (host_texts.output_not_read.format(
+                        lines=lines, output=self._name) + '\n').encode()
                 else:
                     return
             if not self._put(chunk):

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core import sentences
 from drive_can_bridge.process.local_server import LocalRequest
-from drive_can_bridge.process.local_stop import Answer, RUNNING
+from drive_can_bridge.process.local_stop import Answer
 from drive_can_bridge.process.local_way import PASSING_PERIOD
 from drive_can_bridge.ros.client.control import Stop
 from drive_can_bridge.ros.client.search import LOOK_PERIOD
@@ -118,9 +118,8 @@ class _Way:
             with self._told():
                 drives, answers = self._stop.drives, self._stop.answers()
         if answers is None:
-            answers = [Answer(name, False, f'a stop cannot be passed on to this bridge '
-                                           f'({self._failure}): its drives {RUNNING}', bridge=True)
-                       for name in self.wanted.bridges]
+            answers = [Answer(name, False, sentences.stop_not_passed_on(self._failure),
+                              bridge=True) for name in self.wanted.bridges]
         for one in self.asked:
             one.answer('drives', *drives)
             for answer in answers:

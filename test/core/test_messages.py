@@ -16,7 +16,8 @@ from types import ModuleType
 import pytest
 from saying import says
 
-from drive_can_bridge.core import complaints, sentences
+from drive_can_bridge import host_texts
+from drive_can_bridge.core import complaints, host_sentences, sentences
 from drive_can_bridge.core.codes import code_of, MODULES
 from drive_can_bridge.core.messages import around, NOTHING, Sentence, Text, together
 from drive_can_bridge.core.sentences import Absence
@@ -172,8 +173,18 @@ def test_every_call_gives_the_right_fields() -> None:
 
 def test_every_row_is_said() -> None:
     said = {row for path, module in product() for _, _, row in rows_named_in(parsed(path), module)}
+    said.update(host_sentences.CODES.get(node.attr) for path in PRODUCT.rglob('*.py')
+                if path.stem != 'host_sentences' and 'host_texts' in path.read_text('utf-8')
+                for node in ast.walk(parsed(path))
+                if isinstance(node, ast.Attribute)
+                and getattr(node.value, 'id', '') == 'host_texts')
     assert [row.code for rows in CATALOGUES.values() for row in rows.values()
             if row not in said] == []
+
+
+def test_what_may_import_no_catalogue_says_rows_of_it() -> None:
+    texts = {name: text for name, text in vars(host_texts).items() if not name.startswith('_')}
+    assert texts == {code: row.texts[0] for code, row in host_sentences.CODES.items()}
 
 
 def named(files: Iterable[Path], *functions: str) -> Iterator[str]:

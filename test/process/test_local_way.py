@@ -407,6 +407,7 @@ def test_the_version_needs_no_argparse() -> None:
 # -- what is imported before a stop is sent -------------------------------------------------------
 
 NEEDED = {'drive_can_bridge', 'drive_can_bridge.cli', 'drive_can_bridge.cli.start',
+          'drive_can_bridge.host_texts',
           'drive_can_bridge.process', 'drive_can_bridge.process.beginning',
           'drive_can_bridge.process.local_stop', 'drive_can_bridge.process.local_way',
           'drive_can_bridge.process.presence'}

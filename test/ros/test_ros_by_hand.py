@@ -140,6 +140,7 @@ def test_one_that_holds_drives_of_this_host_is_named(
         assert [(each.get('bridge'), each.get('drive'), each['ok']) for each in documents] == [
             ('b/bridge', None, False), ('drive_can_bridge', None, False), (None, 'lift', True)]
         assert f'domain {domain + 1}' in documents[1]['message']
+        assert [each['code'] for each in documents] == ['drives_may_run', 'drives_may_run', '']
         # with a name, or a namespace, only what was named counts: nobody else cries
         assert run('stop', '/lift') == (0, ['lift: ready'], '')
         assert run('stop', '--namespace', '') == (0, ['lift: ready'], '')

@@ -65,8 +65,9 @@ def test_other_domains_are_stopped_too_unless_something_is_named(
     assert run('stop') == (0, ['a/lift: ready', f'[domain {domain + 1}] b/lift: ready'], '')
     documents = [json.loads(line) for line in run('stop', '--json')[1]]
     assert documents == [
-        {'drive': 'a/lift', 'ok': True, 'message': 'ready'},
-        {'drive': 'b/lift', 'ok': True, 'message': 'ready', 'domain': domain + 1}]
+        {'drive': 'a/lift', 'ok': True, 'message': 'ready', 'code': ''},
+        {'drive': 'b/lift', 'ok': True, 'message': 'ready', 'code': '',
+         'domain': domain + 1}]
     locally.asked.clear()
     assert run('stop', 'lift') == (0, ['a/lift: ready'], '')
     assert locally.asked == [['stop', '*', 'lift']]

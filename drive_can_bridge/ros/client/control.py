@@ -15,9 +15,10 @@ from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from drive_can_bridge.core import host_sentences
 from drive_can_bridge.core.bridges import is_some
 from drive_can_bridge.process.local_stop import (
-    Answer, does_not_answer, may_match, RUNNING, stop_answer, STOP_TIMEOUT, twins)
+    Answer, does_not_answer, may_match, stop_answer, STOP_TIMEOUT, twins)
 from drive_can_bridge.process.local_way import meant
 from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unanswered, unoffered
 from drive_can_bridge.process.presence import Present, short
@@ -55,13 +56,13 @@ class _Stopping:
         if reason is None:
             self._take(None)
         else:
-            self.answer = Answer(self.node, False, f'{reason}: {RUNNING}')
+            self.answer = Answer(self.node, False, host_sentences.may_run(reason))
 
     def _take(self, response: Any) -> None:
         self._said = response
         if response is None:
             what = 'no answer' if self._service.ready else 'nobody offers its ~/quick_stop'
-            self.answer = Answer(self.node, False, f'{what}: {RUNNING}')
+            self.answer = Answer(self.node, False, host_sentences.may_run(what))
         elif not response.success:
             self.answer = stop_answer(self.node, False, response.message, False)
 
@@ -180,7 +181,8 @@ class Stop:
                 if may_match(shown.get(short(name), Present(0, None, name, 0)), around,
                              self._words)]
         told += [twins(name, names.count(name)) for name in found if names.count(name) > 1]
-        return told + [drive.answer or Answer(node, False, f'no answer yet: {RUNNING}')
+        return told + [drive.answer or Answer(
+            node, False, host_sentences.may_run('no answer yet'))
                        for node, drive in self._drives.items() if node not in self._elsewhere
                        or drive.answer is not None]
 

@@ -1,0 +1,57 @@
+# Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
+"""
+What processes of this host say before the catalogue may be imported: its rows, by their codes.
+
+Their texts stand in :mod:`drive_can_bridge.host_texts`; the rows add what to do.
+"""
+
+from drive_can_bridge import host_texts
+from drive_can_bridge.core.messages import catalogue, Text
+
+_STANDS_STILL = 'make sure that the drive stands still, by other means if need be'
+_HANGS = 'see whether that process hangs; end it, and start the bridge again'
+_SAME_VERSION = 'use a command of the same version as the bridge; the way through ROS is taken'
+
+# -- drive_can stop, enable, disable, reset: what became of it ------------------------------------
+may_run = Text(host_texts.may_run, do=_STANDS_STILL)
+drives_may_run = Text(host_texts.drives_may_run, do=_STANDS_STILL)
+bridge_does_not_answer = Text(
+    host_texts.bridge_does_not_answer, do=f'{_STANDS_STILL}; see whether the bridge hangs')
+bridges_hide_each_other = Text(
+    host_texts.bridges_hide_each_other,
+    do=f'{_STANDS_STILL}; start each bridge in a namespace of its own')
+not_online_may_run = Text(host_texts.not_online_may_run, do=_STANDS_STILL)
+not_here = Text(host_texts.not_here, do=_HANGS)
+order_unanswered = Text(
+    host_texts.order_unanswered,
+    do='see diagnostics of the drive, and what else the computer does')
+order_unoffered = Text(
+    host_texts.order_unoffered,
+    do='add a control section to its profile, or start its bridge; drive_can stop works without')
+no_such_drive = Text(host_texts.no_such_drive, do='use one of these names')
+has_no_drives = Text(
+    host_texts.has_no_drives, do='see the log of the bridge: why it is not configured')
+no_bridge_running = Text(
+    host_texts.no_bridge_running,
+    do='start a bridge; see whether ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE are the same '
+       'there')
+no_bridge_answers = Text(host_texts.no_bridge_answers, do=_HANGS)
+domain_impossible = Text(host_texts.domain_impossible, do='set that variable to such a number')
+
+# -- the local way, and the process itself --------------------------------------------------------
+version_differs = Text(host_texts.version_differs, do=_SAME_VERSION)
+another_user = Text(
+    host_texts.another_user,
+    do='nothing: the way through ROS is taken; only a stop is heard from every user')
+too_many_ask = Text(host_texts.too_many_ask, do='ask again with fewer commands at a time')
+local_way_failed = Text(
+    host_texts.local_way_failed,
+    do='report it, with the log of the bridge; the way through ROS goes on')
+no_real_time = Text(
+    host_texts.no_real_time, do='nothing, or allow it as docs/performance.md says')
+not_suspended = Text(host_texts.not_suspended, do='end it by Ctrl-C, which stops the drives')
+output_not_read = Text(
+    host_texts.output_not_read, do='read that output faster, or send it to a file')
+
+#: all of them, by their codes
+CODES = catalogue(globals())
