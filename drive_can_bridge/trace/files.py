@@ -2,9 +2,9 @@
 """
 Trace files: which formats there are, what each of them loses, reading and writing them.
 
-Formats are python-can's, by suffix; ``.blf`` and ``.trc`` have readers of ours. One damaged line
-does not cost a trace. Errors of files say which one it was. The two texts that candump writes, its
-log file (``-l``, ``-L``) and its screen, have a reader and writer of their own:
+Formats are python-can's, by suffix; ``.blf``, ``.mf4`` and ``.trc`` have readers of ours. One
+damaged line does not cost a trace. Errors of files say which one it was. The two texts that
+candump writes, log file (``-l``, ``-L``) and screen, have a reader and writer of their own:
 
 .. code-block:: text
 
@@ -42,6 +42,7 @@ from drive_can_bridge.core.frame import (
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.trace.blf import read_blf
 from drive_can_bridge.trace.captures import BEGINNINGS, read_capture
+from drive_can_bridge.trace.measured import BEGINNINGS as MEASURED_BEGINNINGS, read_measured
 from drive_can_bridge.trace.peak import read_peak
 from drive_can_bridge.trace.vector import of_vector
 from drive_can_bridge.transport.tap import message_of, record_of
@@ -292,7 +293,7 @@ _HEADS = {
                   'numbered entry'),
     '.blf': _Head(re.compile(b'LOGG'), 'this is no .blf trace of Vector'),
     '.db': _Head(re.compile(b'SQLite format 3'), 'this is no .db trace of python-can'),
-    '.mf4': _Head(re.compile(b'MDF '), 'this is no .mf4 trace (ASAM MDF 4)'),
+    '.mf4': _Head(re.compile(MEASURED_BEGINNINGS), 'this is no .mf4 trace (ASAM MDF 4)'),
     '.pcap': _Head(re.compile(BEGINNINGS), 'this is no capture of Wireshark'),
     '.pcapng': _Head(re.compile(BEGINNINGS), 'this is no capture of Wireshark'),
 }
@@ -301,6 +302,12 @@ _STRANGERS = (
     (re.compile(r'\W*\*{3}BUSMASTER'), 'this is a .log of BUSMASTER, which editcap (of Wireshark) '
      'turns into a .pcapng: editcap FILE.log FILE.pcapng'),
     (re.compile(r'Time Stamp,ID,Extended,'), 'this is a .csv of SavvyCAN (GVRET), which SavvyCAN '
+     'saves as a .log of candump'),
+    (re.compile(r'//-+\s+Microchip'), 'this is a .log of Microchip (CAN BUS Analyzer), which '
+     'SavvyCAN reads, and saves as a .log of candump'),
+    (re.compile(r'[0-9]+\.[0-9]+ [0-9]?(?:CXX|[RT](?:11|29)) '), 'this is a trace of OVMS (CRTD), '
+     'which SavvyCAN reads, and saves as a .log of candump'),
+    (re.compile(r'@ TEXT @'), 'this is a .trc of CAN Bus Analyzer, which SavvyCAN reads, and '
      'saves as a .log of candump'),
 )
 #: kinds of entries that are passed over and named
@@ -344,14 +351,18 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
                 begin += itertools.islice(stream, 1)
             if not begin or not begin[-1].strip():
                 return
-            stranger = next((told for pattern, told in _STRANGERS if pattern.match(begin[-1])), '')
+            first = head_text = begin[-1]
+            if first.startswith('//'):      # a comment; the name stands below it
+                begin += itertools.islice(stream, 1)
+                head_text += begin[-1]
+            stranger = next((told for pattern, told in _STRANGERS if pattern.match(head_text)), '')
             head = _HEADS.get(suffix)
             lines = itertools.chain(begin, stream)
             if stranger:
                 complain(stranger)
             elif head is None:
                 yield from _candump_records(lines, complain)
-            elif not head.pattern.match(begin[-1].encode()):
+            elif not head.pattern.match(first.encode()):
                 complain(head.otherwise)
             elif suffix == _PEAK:
                 yield from _peak_records(lines, complain)
@@ -610,21 +621,9 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
 
 
 def _measured_records(path: Path, complain: Complain) -> Iterator[Record]:
-    """Read an .mf4: behind something damaged there is nothing to hold on to."""
-    try:
-        with can.LogReader(str(path)) as reader:
-            for number, message in enumerate(reader, 1):
-                try:
-                    record = _record(message, 0)
-                except ValueError as error:
-                    complain(f'entry {number}: {error}')
-                    continue
-                yield record
-    except NotImplementedError:     # of .mf4 only
-        raise DriveCanError(
-            f'{path}: .mf4 needs the Python module asammdf (pip install asammdf)') from None
-    except Exception:  # noqa: BLE001  readers raise whatever a file makes them
-        complain('the rest cannot be read: it is damaged, or cut')
+    passed: Counter[str] = Counter()
+    yield from _possible(read_measured(path, complain, passed), complain)
+    _tell_passed(passed, complain)
 
 
 def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
@@ -824,6 +823,14 @@ def parse_line(line: str) -> Record | None:
         return None
     if len(line) > LINE_MAX:
         raise ValueError('too long')
+    if words[0] == '(' and count > 1:   # a time that was filled up with blanks
+        words[:2] = [f'({words[1]}']
+    if len(words) > 2 and '#' in words[2] and words[0][:1] == '(':
+        # what tools and people write behind a frame is no part of it, unless it is another one
+        if any(mark in word for word in words[3:] for mark in '#('):
+            raise ValueError('more than one frame in a line')
+        digits, _, data = words[2].partition('#')
+        return _logged(words, digits, data)
     return _shown(words)
 
 
@@ -831,7 +838,7 @@ def _logged(words: list[str], identifier: str, data: str) -> Record:
     """Read a line of a log file."""
     time, number = _time(words[0]), _number(identifier)
     extended = len(identifier) == 8
-    sent = _DIRECTIONS.get(words[3]) if len(words) == 4 else None
+    sent = _DIRECTIONS.get(words[3]) if len(words) > 3 else None
     kind = DATA
     if data[-2:-1] == '_' and data[-1] in _LONG_DLC and len(data) == 2 * _CLASSICAL_MAX + 2:
         data = data[:-2]        # `candump -8`: eight bytes whose DLC is higher

@@ -40,7 +40,6 @@ class BusTrace:
     :ivar frames: entries that were frames.
     :ivar error_frames: those that were not.
     :ivar strays: frames of nobody in the parameter file.
-    :ivar peak_load: highest load within one second, 0 to 1 and more.
     :ivar shift: s to add to stamps, so that time goes on where a clock was set back.
     :ivar newest: time of the last entry.
     """
@@ -59,7 +58,7 @@ class BusTrace:
         self.bits = 0
         self.first = math.nan
         self.last = math.nan
-        self.peak_load = 0.0 if bitrate else math.nan
+        self._peak = 0.0
         self.somebody_sent = False
         self._second = math.nan
         self._second_bits = 0
@@ -93,7 +92,12 @@ class BusTrace:
     def close_second(self) -> None:
         """See whether the second that ends was the busiest."""
         if self.bitrate:
-            self.peak_load = max(self.peak_load, STUFFING * self._second_bits / self.bitrate)
+            self._peak = max(self._peak, STUFFING * self._second_bits / self.bitrate)
+
+    @property
+    def peak_load(self) -> float:
+        """Highest load within one second, 0 to 1 and more; NaN: nobody knows."""
+        return self._peak if self.bitrate and self.last > self.first else math.nan
 
     @property
     def load(self) -> float:

@@ -168,6 +168,13 @@ def test_without_the_library_a_sentence_says_what_brings_it(
      'which editcap (of Wireshark) turns into a .pcapng: editcap FILE.log FILE.pcapng'),
     ('a.csv', 'Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,0000021A,false,Rx,0,1,FE,\n',
      'this is a .csv of SavvyCAN (GVRET), which SavvyCAN saves as a .log of candump'),
+    ('a.log', '//-----\nMicrochip Technology Inc.\nCAN BUS Analyzer\n',
+     'this is a .log of Microchip (CAN BUS Analyzer), which SavvyCAN reads, and saves as a .log '
+     'of candump'),
+    ('a.txt', '166.064000 CXX made by hand\n166.064000 R11 0000021A FE 36\n',
+     'this is a trace of OVMS (CRTD), which SavvyCAN reads, and saves as a .log of candump'),
+    ('a.trc', '@ TEXT @ 2 @ 64 @\n', 'this is a .trc of CAN Bus Analyzer, which SavvyCAN reads, '
+     'and saves as a .log of candump'),
     ('a.pcapng', 'no capture', 'this is no capture of Wireshark'),
 ])
 def test_what_is_read_otherwise(name: str, content: str, told: str, tmp_path: Path) -> None:

@@ -126,7 +126,7 @@ def test_a_picture_on_a_full_disk(file: Path, trace: Path, tmp_path: Path,
 def test_a_format_whose_module_is_not_there(file: Path, trace: Path,
                                              monkeypatch: pytest.MonkeyPatch,
                                              capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr('can.io.mf4.asammdf', None)
+    monkeypatch.setitem(sys.modules, 'asammdf', None)
     wrong = trace.with_suffix('.mf4')
     wrong.write_bytes(b'MDF     4.10    ')
     assert drive_can('decode', wrong, '--params-file', file) == 1

@@ -54,6 +54,12 @@ DATA, ERROR = RecordKind.DATA, RecordKind.ERROR
      Record(datetime(2026, 11, 21, 23, 4, 38, 250_000).timestamp(), 'can0', 0x123, b'', False)),
     ('  can0  123   [4]  remote request', Record(0.0, 'can0', 0x123, b'', False,
                                                  RecordKind.REMOTE)),
+    # times that were filled up with blanks, remarks of tools and people behind a frame
+    ('(         0.191254) can0 06314000#40', Record(0.191254, 'can0', 0x6314000, b'\x40', True)),
+    ('(    0.5) can0 0E094003#000A   T  answers', Record(
+        0.5, 'can0', 0xE094003, b'\0\x0A', True, DATA, True)),
+    ('(0.5) can0 0E094003#000A   the body computer asks', Record(
+        0.5, 'can0', 0xE094003, b'\0\x0A', True)),
     # candump -8
     ('(1.5) can0 5A1#0011223344556677_9 R', Record(1.5, 'can0', 0x5A1, bytes.fromhex(
         '0011223344556677'), False, DATA, False)),
@@ -91,7 +97,9 @@ def test_nothing(line: str) -> None:
     '(2026-11-21 23:04:38.250000)  123  [0]',
     '(1.0) can0 123#0102_C', 'can0 123 {C} 00',
     '(1.0) can0 123#0102030405060708_8', 'can0 123 {8} 01 02 03 04 05 06 07 08',
-    '(2026-11-21  can0  123   [0]',
+    '(2026-11-21  can0  123   [0]', '(', '( 1.0) can0', '( x) can0 123#00',
+    # two lines, of which the first has lost its end
+    '(1.0) can0 123#00 (1.1) can0 123#01', '(1.0) can0 123#00 can0 123#01',
 ])
 def test_what_is_no_line_of_candump(line: str) -> None:
     with pytest.raises(ValueError):
