@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from statistics import quantiles
 from typing import Any
 
 from scenarios import median, p99
@@ -66,7 +67,10 @@ def distributions(results: dict[str, list[Any]], path: Path) -> str:
 
 def sweep(results: dict[str, list[Any]], path: Path) -> str:
     """
-    Draw CPU time and period error over the number of drives, medians of all runs.
+    Draw CPU time and period error over the number of drives.
+
+    Lines are medians of all runs; where there are several, the ground goes from the lower quartile
+    to the upper one.
 
     :return: why not, or ''.
     """
@@ -76,22 +80,33 @@ def sweep(results: dict[str, list[Any]], path: Path) -> str:
     chart, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.2), layout='constrained')
     numbers = list(runs[0])
 
-    def over_numbers(name: str, measure: Callable[[dict[str, Any]], float]) -> Sequence[float]:
-        return [median([measure(run[number][name]) for run in runs]) for number in numbers]
+    def over_numbers(name: str, measure: Callable[[dict[str, Any]], float],
+                     ) -> Sequence[Sequence[float]]:
+        return [[measure(run[number][name]) for run in runs] for number in numbers]
     for name, colour in COLOURS.items():
-        held = over_numbers(name, lambda each: each['requests_per_s'] / each['wanted'])
-        for axes, values in ((left, over_numbers(name, lambda each: 100 * each['cpu'])),
-                             (right, over_numbers(
-                                 name, lambda each: 1e3 * p99(each['period_errors'])))):
+        held = [median(each) for each in over_numbers(
+            name, lambda each: each['requests_per_s'] / each['wanted'])]
+        for axes, found in ((left, over_numbers(name, lambda each: 100 * each['cpu'])),
+                            (right, over_numbers(
+                                name, lambda each: 1e3 * p99(each['period_errors'])))):
+            values = [median(each) for each in found]
             axes.plot(numbers, values, color=colour, marker='o', label=LABELS[name])
+            if len(runs) > 1:
+                ends = [quantiles(each, n=4, method='inclusive') for each in found]
+                axes.fill_between(numbers, [low for low, _, _ in ends],
+                                  [high for _, _, high in ends], color=colour, alpha=0.2,
+                                  linewidth=0)
             late = [place for place, share in enumerate(held) if share < HELD]
             axes.plot([numbers[place] for place in late], [values[place] for place in late], 'o',
                       color=colour, markerfacecolor='white')
-    left.set(ylabel='CPU of the process, % of a core', ylim=(0, None))
-    right.set(ylabel='period error at the drive, p99, ms', yscale='log')
+    left.set(title='what it costs', ylabel='CPU of the process, % of a core', ylim=(0, None))
+    right.set(title='how evenly drives are served', ylabel='period error, p99, ms', yscale='log')
+    right.yaxis.set_major_formatter('{x:g}')
     for axes in (left, right):
         axes.set(xlabel='drives, one exchange each 10 ms', xlim=(0, None))
         axes.grid(which='both', alpha=0.3)
     left.legend(fontsize='small')
-    chart.savefig(path, dpi=80)
+    if len(runs) > 1:
+        chart.suptitle(f'medians and quartiles of {len(runs)} runs', fontsize='small')
+    chart.savefig(path, dpi=100)
     return ''

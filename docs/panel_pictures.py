@@ -69,6 +69,8 @@ def _take(browser: 'Browser', base: str, token: str, path: Path, address: str,  
     browser.open(f'{base}/{token}')
     browser.shows('lift.*online.*enabled.*turntable.*offline')
     browser.open(f'{base}{address}')
+    if patience > 30.0:     # the chart is full then
+        browser.click('.chart-buttons button', '30 s')
     time.sleep(min(patience, care.wait))
     browser.picture(path)
     browser.close()

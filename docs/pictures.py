@@ -43,7 +43,7 @@ from drive_can_bridge.view.parts import TREND_SPAN
 
 HERE = Path(__file__).resolve().parent
 #: columns and lines of the live view
-SIZE = (150, 29)
+SIZE = (150, 33)
 #: s that the demo may take to come up
 _START_TIMEOUT = 120.0
 _FRAME_PERIOD = 0.25

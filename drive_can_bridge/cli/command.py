@@ -7,7 +7,7 @@ Whatever it raises, :mod:`.main` says in one line.
 """
 
 import argparse
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from contextlib import suppress
 import math
@@ -169,6 +169,42 @@ def add_params_file(parser: ArgumentParser, help_text: str) -> None:
     parser.add_argument('-p', '--params-file', metavar='FILE', type=Path, required=not default,
                         default=Path(default) if default else None,
                         help=f'{help_text} (default: ${PARAMS_FILE})')
+
+
+def add_words_for_a_bridge(parser: ArgumentParser, metavar: str, nargs: str, help_text: str, *,
+                           namespace_help: str, yes: str) -> None:
+    """
+    Add words and options of a subcommand that goes through a running bridge, and no other way.
+
+    Options may stand between the words; :func:`only_through_a_bridge` refuses what it must.
+
+    :param metavar: how the words are written, as usage lines have it.
+    :param yes: what ``--yes`` means.
+    """
+    parser.allow_abbrev = False
+    parser.usage = f'%(prog)s [option …] {metavar}'
+    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=help_text)
+    words.completer = _complete_drives      # type: ignore[attr-defined]  # for argcomplete
+    parser.add_argument('--namespace', metavar='NS', type=namespace, help=namespace_help)
+    parser.add_argument('--json', action='store_true', help='a JSON document a line')
+    parser.add_argument('--yes', action='store_true', help=yes)
+    parser.add_argument('-p', '--params-file', metavar='FILE',
+                        help='refused: goes through the running bridge only')
+
+
+def _complete_drives(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
+    from drive_can_bridge.cli.drives import complete_drives     # a stop has no time for that
+    return complete_drives(prefix, parsed_args, **more)
+
+
+def only_through_a_bridge(args: Namespace) -> None:
+    """
+    Refuse a parameter file.
+
+    :raises WrongUsage: there is one.
+    """
+    if args.params_file is not None:
+        raise WrongUsage('goes through the running bridge: leave --params-file away')
 
 
 def add_seconds(parser: ArgumentParser) -> None:

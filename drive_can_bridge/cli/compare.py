@@ -14,7 +14,7 @@ from drive_can_bridge.backup.document import (
     settings_of)
 from drive_can_bridge.cli.command import complain, print_json, say, WrongUsage
 from drive_can_bridge.cli.drives import (
-    add_words, chosen_one, complete_drives, opened, read_all, source_of, unread)
+    add_words, by_short_names, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
@@ -27,7 +27,8 @@ from drive_can_bridge.core.text import printable, value_text
 #: of values of which no profile says how fine they are
 _RELATIVE_TOLERANCE = 1e-9
 SAME, DIFFERENT = 0, 1
-_DRIVE = re.compile(r'[a-z][a-z0-9_]*')
+#: a drive by its name, or by its full one
+_DRIVE = re.compile(r'(?P<place>/?(?:[A-Za-z_][A-Za-z0-9_]*/)*)[a-z][a-z0-9_]*')
 _NONE = '-'
 #: settings that may all be misspelt
 _FEW = 3
@@ -139,7 +140,8 @@ def define(parser: ArgumentParser) -> None:
     """Define the words and options of the subcommand."""
     parser.description = (
         'Compare the settings of A and B, each of them a backup file or a drive: what '
-        'looks like the name of a drive is one, ./NAME is a file. Sends reads only.')
+        'looks like the name of a drive, or like a full one (/cell/lift) that is no file, is one; '
+        './NAME is a file. Sends reads only.')
     parser.epilog = (
         'Exit code 0: the same. 1: different. 2: trouble, a drive in use included. '
         '--json, for each setting that differs: parameter, unit, a, b (null: not there).')
@@ -174,7 +176,11 @@ def _sides_of(args: Namespace) -> list[Side]:
     words = args.words
     if len(words) != 2:
         raise WrongUsage(f'{" ".join(words)}: allowed are two, A and B')
-    files = {word: read_backup(Path(word)) for word in words if not _DRIVE.fullmatch(word)}
+    for place, word in enumerate(words):
+        if _is_drive(args, word):
+            words[place:place + 1] = by_short_names(args, [word])
+    files = {word: read_backup(Path(word)) for word in words if not _DRIVE.fullmatch(word)
+             or '/' in word}
     wanted = [word for word in words if word not in files]
     if not wanted:
         profile = next(filter(None, map(_profile_of, files.values())), None)
@@ -192,6 +198,13 @@ def _sides_of(args: Namespace) -> list[Side]:
             complain(f'{word}: left out, because no settings: {len(side.left_out)} '
                      f'values ({names}{more})')
     return sides
+
+
+def _is_drive(args: Namespace, word: str) -> bool:
+    found = _DRIVE.fullmatch(word)
+    if found is None or not found['place']:
+        return found is not None
+    return args.params_file is None and not Path(word).exists()
 
 
 def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives,

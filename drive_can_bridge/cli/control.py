@@ -10,7 +10,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from drive_can_bridge.cli.command import complain, namespace, WrongUsage
+from drive_can_bridge.cli.command import (
+    add_words_for_a_bridge, complain, only_through_a_bridge, WrongUsage)
 from drive_can_bridge.cli.stopping import answers, show
 from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
@@ -40,26 +41,13 @@ def define(parser: ArgumentParser) -> None:
     command = parser.prog.rpartition(' ')[2]
     metavar, nargs, what, how = _WORDS[command]
     patterns = command in (STOP, 'disable')
-    parser.allow_abbrev = False
     parser.description = f'{what[0].upper()}{what[1:]}. {how}'
-    parser.usage = f'%(prog)s [option …] {metavar}'
-    words = parser.add_argument('words', metavar=metavar, nargs=nargs, help=(
-        'a drive, by its name or its full name in the ROS graph (/cell/lift)'
-        + ('; patterns too' if patterns else '')))
     if command != STOP:     # which says what else it means
         parser.epilog = 'Exit code 0: all did it. 1: not all, or no bridge. 2: wrong usage.'
-    words.completer = _complete     # type: ignore[attr-defined]  # for argcomplete
-    parser.add_argument('--namespace', metavar='NS', type=namespace,
-                        help='only the bridge in this namespace')
-    parser.add_argument('--json', action='store_true', help='a JSON document a line')
-    parser.add_argument('--yes', action='store_true', help='accepted; nothing is asked')
-    parser.add_argument('-p', '--params-file', metavar='FILE', help='refused: these go through '
-                                                                    'the running bridge only')
-
-
-def _complete(prefix: str, parsed_args: Namespace, **more: object) -> list[str]:
-    from drive_can_bridge.cli.drives import complete_drives
-    return complete_drives(prefix, parsed_args, **more)
+    add_words_for_a_bridge(
+        parser, metavar, nargs, 'a drive, by its name or its full name in the ROS graph '
+        '(/cell/lift)' + ('; patterns too' if patterns else ''),
+        namespace_help='only the bridge in this namespace', yes='accepted; nothing is asked')
 
 
 def run(args: Namespace) -> int:
@@ -132,8 +120,7 @@ def _check(args: Namespace) -> None:
 
     :raises WrongUsage: it does.
     """
-    if args.params_file is not None:
-        raise WrongUsage('goes through the running bridge: leave --params-file away')
+    only_through_a_bridge(args)
     if args.subcommand in ('enable', 'reset'):
         for word in args.words:
             if is_pattern(word):

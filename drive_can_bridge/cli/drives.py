@@ -174,26 +174,37 @@ def read_all(drive: Drive, names: Sequence[str], clock: Clock) -> dict[str, Read
 
 def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
     """Propose drives for the first word, and names of their parameters after it."""
+    words = [word for word in parsed_args.words or () if word != prefix]
+    place, slash, own = (words[0] if words else prefix).rpartition('/')
+
     def proposed(source: Source) -> list[str]:
         names = list(source.names)
-        words = [word for word in parsed_args.words or () if word != prefix]
-        drives = matching(names, words[0]) if words else []
+        drives = matching(names, own) if words else []
         end = '=' if parsed_args.subcommand == 'write' else ''
-        return ([] if words else names) + [
+        return ([] if words else [f'{place}{slash}{name}' for name in names]) + [
             f'{name}{end}' for drive in drives or (names if len(names) == 1 else [])
             for name in source.parameter_names(drive)]
-    return _completed(parsed_args, proposed)
+    return _completed(parsed_args, place if slash else None, proposed)
 
 
 def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
     """Propose drives; where none begins so, the shell proposes files."""
-    return _completed(parsed_args, lambda source: source.names)
+    place, slash, _own = prefix.rpartition('/')
+    return _completed(parsed_args, place if slash else None, lambda source: [
+        f'{place}{slash}{name}' for name in source.names])
 
 
-def _completed(args: Namespace, proposed: Callable[[Source], Iterable[str]]) -> list[str]:
+def _completed(args: Namespace, place: str | None,
+               proposed: Callable[[Source], Iterable[str]]) -> list[str]:
+    """
+    Return what a source proposes.
+
+    :param place: the namespace in a full name that is typed.
+    """
     try:
+        where = getattr(args, 'namespace', None) if place is None else namespace(place)
         with closing(find_source(getattr(args, 'params_file', None),
-                                 namespace=getattr(args, 'namespace', None))) as source:
+                                 namespace=where)) as source:
             return list(proposed(source))
     except Exception:  # noqa: BLE001  nothing may be written into the line that is typed
         return []

@@ -9,9 +9,8 @@ import sys
 from typing import Any
 
 from drive_can_bridge.cli.command import (
-    above_zero, agreed, complain, FAILED, must_be_answerable, namespace, print_json, say,
-    WrongUsage)
-from drive_can_bridge.cli.drives import complete_drives
+    above_zero, add_words_for_a_bridge, agreed, complain, FAILED, must_be_answerable,
+    only_through_a_bridge, print_json, say, WrongUsage)
 from drive_can_bridge.cli.output import waiting
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern, printable
@@ -27,7 +26,6 @@ _YES_MEANS = 'answers the question with yes'
 
 def define(parser: ArgumentParser) -> None:
     """Define the words and options of the subcommand."""
-    parser.allow_abbrev = False
     parser.description = (
         'Hold a setpoint for a while, through the running bridge, by the topic that any node '
         'could use: neutral until it is armed, VALUE, neutral. The drive has to be online, and '
@@ -37,19 +35,12 @@ def define(parser: ArgumentParser) -> None:
     parser.epilog = (
         'Exit code 0: an answered exchange carried VALUE, and a later one neutral. 1: not so, or '
         'refused; the line says why. 2: wrong usage.')
-    parser.usage = '%(prog)s [option …] DRIVE [NAME] VALUE'
-    words = parser.add_argument('words', metavar='DRIVE [NAME] VALUE', nargs='+', help=(
-        'the drive, by its name or its full name in the ROS graph (/cell/lift); the setpoint, '
-        'where it has several; and the value, in the unit of the profile'))
-    words.completer = complete_drives   # type: ignore[attr-defined]  # for argcomplete
+    add_words_for_a_bridge(
+        parser, 'DRIVE [NAME] VALUE', '+', 'the drive, by its name or its full name in the ROS '
+        'graph (/cell/lift); the setpoint, where it has several; and the value, in the unit of '
+        'the profile', namespace_help='of the bridge, where there are several', yes='do not ask')
     parser.add_argument('--for', dest='seconds', metavar='S', type=_seconds, default=_SECONDS,
                         help=f'how long, {_LONGEST:g} s at most (default: {_SECONDS})')
-    parser.add_argument('--namespace', metavar='NS', type=namespace,
-                        help='of the bridge, where there are several')
-    parser.add_argument('--yes', action='store_true', help='do not ask')
-    parser.add_argument('--json', action='store_true', help='a JSON document a line')
-    parser.add_argument('-p', '--params-file', metavar='FILE', help='refused: this goes through '
-                                                                    'the running bridge only')
 
 
 def _seconds(text: str) -> float:
@@ -99,8 +90,7 @@ def _understood(args: Namespace) -> tuple[str, str | None, str]:
 
     :raises WrongUsage: something is missing, or too much.
     """
-    if args.params_file is not None:
-        raise WrongUsage('goes through the running bridge: leave --params-file away')
+    only_through_a_bridge(args)
     if len(args.words) not in (2, 3):
         raise WrongUsage('write DRIVE VALUE, or DRIVE NAME VALUE')
     drive, value = args.words[0], args.words[-1]

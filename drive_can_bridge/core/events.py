@@ -5,7 +5,7 @@ What a session tells the outside: events, and the state of its drive in one word
 Times are ``now`` of the call that caused the event.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple, Union
 
@@ -69,9 +69,14 @@ class MappingWritten:
 
 @dataclass(frozen=True)
 class SetpointsExpired:
-    """No fresh command: these setpoints went neutral and want re-arming."""
+    """
+    No fresh command: these setpoints went neutral and want re-arming.
+
+    :param orderly: each of them was at neutral already: whoever commanded them has ended.
+    """
 
     names: tuple[str, ...]
+    orderly: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -40,9 +40,12 @@ class Setpoint:
     :ivar neutral: raw integer that is sent without a fresh command.
     :ivar armed: commands go through.
     :ivar commanded_at: ``now`` of the last accepted command, or None.
+    :ivar expired_at_neutral: when it was disarmed because no fresh command kept it, the last one
+        was neutral: nothing changed for the drive.
     """
 
-    __slots__ = ('armed', 'commanded_at', 'neutral', 'parameter', 'raw')
+    __slots__ = (
+        'armed', 'commanded_at', 'expired_at_neutral', 'neutral', 'parameter', 'raw')
 
     def __init__(self, parameter: Parameter) -> None:
         self.parameter = parameter
@@ -50,6 +53,7 @@ class Setpoint:
         self.raw = self.neutral
         self.armed = False
         self.commanded_at: float | None = None
+        self.expired_at_neutral = False
 
     @property
     def known(self) -> bool:
@@ -75,6 +79,11 @@ class Setpoint:
         self.raw = self.neutral
         self.armed = False
         self.commanded_at = None
+
+    def expire(self) -> None:
+        """Disarm it, because no fresh command keeps it."""
+        self.expired_at_neutral = self.raw == self.neutral
+        self.disarm()
 
 
 class HeldSetpoint(Setpoint):

@@ -113,5 +113,7 @@ class Reporter:
 
     def expired(self, setpoints: Iterable[Setpoint]) -> None:
         """Tell that no fresh command keeps these setpoints: they went neutral."""
+        found = tuple(setpoints)
         self.events.append(SetpointsExpired(
-            tuple(setpoint.parameter.name for setpoint in setpoints)))
+            tuple(setpoint.parameter.name for setpoint in found),
+            all(setpoint.expired_at_neutral for setpoint in found)))

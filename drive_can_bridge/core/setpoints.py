@@ -81,7 +81,7 @@ class Setpoints:
             self.ignored_at = now
             return CommandOutcome.NOT_ARMED
         if self._overdue(setpoint, now):  # however long it takes until the next cycle
-            setpoint.disarm()
+            setpoint.expire()
             self._expired.append(setpoint)
             self.expires_at = now
             self.changed = True
@@ -123,7 +123,7 @@ class Setpoints:
         for setpoint in self.items:
             if self._overdue(setpoint, now):
                 self.changed |= setpoint.raw != setpoint.neutral
-                setpoint.disarm()
+                setpoint.expire()
                 expired.append(setpoint)
         self.expires_at = self._soonest()
         return expired

@@ -260,9 +260,12 @@ class DriveNode(DriveListener):
             self.samples.forget()
             self.times_lost += 1
         elif isinstance(event, SetpointsExpired):
-            self.warn('command timeout',
-                      sentences.command_timed_out(
-                          self.session.configuration.command_timeout, event.names))
+            text = sentences.command_timed_out(
+                self.session.configuration.command_timeout, event.names)
+            if event.orderly:   # nothing changed for the drive: whoever commanded it has ended
+                self._log.info(text)
+            else:
+                self.warn('command timeout', text)
         elif isinstance(event, MappingDiffered):
             self._log.error(sentences.no_cyclic_frame(how=event.text))
         elif isinstance(event, MappingWritten):

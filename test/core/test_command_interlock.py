@@ -99,4 +99,16 @@ def test_commands_that_nobody_repeats_go_neutral_and_are_told_of() -> None:
     assert not stand.interlock.expire(1.5)
     assert stand.interlock.expire(1.6)
     assert stand.setpoints.at_rest
-    assert stand.report.take() == [SetpointsExpired(('speed_setpoint',))]
+    told, = stand.report.take()
+    assert told == SetpointsExpired(('speed_setpoint',)) and not told.orderly
+
+
+def test_whoever_ends_with_neutral_ends_in_order() -> None:
+    stand = Stand(controlled=False)
+    stand.interlock.follow()
+    stand.command(5.0)
+    stand.command(0.0)
+    assert stand.interlock.expire(1.6) and stand.setpoints.at_rest
+    assert not stand.setpoints.items[0].armed, 'it is disarmed all the same'
+    told, = stand.report.take()
+    assert told == SetpointsExpired(('speed_setpoint',)) and told.orderly

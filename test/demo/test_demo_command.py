@@ -23,7 +23,7 @@ LINE = re.compile(r'(conveyor|lift|turntable) '
 FRAME = re.compile(r'\(\d+\.\d{6}\) (\w+) ([0-9A-F]{3}|[0-9A-F]{8})#((?:[0-9A-F]{2}){0,8})')
 #: what drives are sent that stand still: torque limits stay at 100 %
 NEUTRAL = {'003FFFF0': '000003E800000000', '005FFFF0': '0000000000000000',
-           '007FFFF0': '0000000003E80000'}
+           '007FFFF0': '000003E800000000'}
 
 OWN_FILE = """
 /cell/own_name:

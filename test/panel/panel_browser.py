@@ -196,8 +196,12 @@ class Browser:
         return self._requests
 
     def picture(self, path: Path) -> None:
-        """Save what is seen, in the format of the suffix."""
+        """Save what is seen, down to where the page ends, in the format of the suffix."""
+        width, seen, end = self.run(
+            'return [innerWidth, innerHeight, Math.max(...[...document.querySelectorAll('
+            '".page, .page *")].map(each => each.getBoundingClientRect().bottom)) + 12]')
         taken = self._driver.execute_cdp_cmd('Page.captureScreenshot', {
+            'clip': {'x': 0, 'y': 0, 'width': width, 'height': min(seen, end), 'scale': 1},
             'format': path.suffix[1:], **({'quality': 80} if path.suffix == '.webp' else {})})
         path.write_bytes(base64.b64decode(taken['data']))
 

@@ -164,6 +164,15 @@ def test_charts_draw_pause_and_zoom(site: Site, browser: Browser) -> None:
     assert browser.zoom() == [50, 100]
 
 
+def test_a_value_that_does_not_change_has_an_axis_around_it(site: Site, browser: Browser) -> None:
+    browser.open(site.addresses['operator'])
+    browser.open(f'http://{site.host}/drive/lift')
+    wait_for(lambda: browser.points() > 5, 'points in the chart')
+    assert browser.run(
+        'return getElement(document.querySelector(".chart").id.slice(1)).chart.getModel()'
+        '.getComponent("yAxis").axis.scale.getExtent()') == [-1, 1]
+
+
 def test_a_stop_that_takes_long_is_not_forgotten(site: Site, browser: Browser) -> None:
     browser.open(site.addresses['operator'])
     browser.open(f'http://{site.host}/drive/lift')

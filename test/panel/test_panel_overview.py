@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from drive_can_bridge.monitor.snapshot import (
-    BridgeSnapshot, DriveSnapshot, Level, LogLine, Snapshot,
+    BridgeSnapshot, DriveSnapshot, Level, LogLine, Place, Snapshot,
 )
 from drive_can_bridge.monitor.summary import silence
 from drive_can_bridge.monitor.values import ParameterInfo
@@ -129,6 +129,14 @@ def test_bits_stand_by_number_and_those_without_a_name_are_folded(page: Any) -> 
     folded, = texts(page, 'folded')
     assert folded == '2 bits without a name812'
     assert texts(page, 'lamp') == ['0 ready', '3 fault', '8', '9 remote', '12', 'unheard_of']
+
+
+def test_bits_that_no_descriptor_numbers_are_known_of_the_family(page: Any) -> None:
+    drive = DriveSnapshot(
+        '/axis', 'axis', BRIDGE, 'online', Level.OK, True, '', place=Place(protocol='cia402'),
+        bits={'status_word': {'remote': True, 'bit_8': False, 'ready_to_switch_on': True}})
+    assert [(bit.number, bit.name) for bit in drive.bits_of('status_word')] == [
+        (0, 'ready_to_switch_on'), (8, 'bit_8'), (9, 'remote')]
 
 
 def test_the_banner_says_so_once(page: Any) -> None:

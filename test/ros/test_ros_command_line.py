@@ -129,5 +129,5 @@ def test_topics_and_services(ros2: Ros2, demo: Bridge) -> None:
         'service', 'call', '/lift/enable', 'std_srvs/srv/SetBool', '{data: true}')
     ros2('topic', 'pub', '--once', '-w', '1', '/turntable/command/torque_limit',
          'std_msgs/msg/Float64', '{data: 0.0}')
-    wait_until(lambda: demo.node.drives['turntable'].session.setpoints.items[2].armed)
+    wait_until(lambda: demo.node.drives['turntable'].session.setpoints.items[1].armed)
     replay('inactive', ros2)

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 from bridges import Bridge, CONVEYOR, HASTY, late, parameters, Recorder, StartBridge
-from clients import Client, wait_until
+from clients import WARN, Client, wait_until
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -60,8 +60,8 @@ def test_a_time_out_is_told_and_wants_arming_again(bridge: StartBridge,
     with one.record() as recorder:
         arm(client, recorder)
         until_sent(recorder, 0, 0)
-        client.wait_logged(
-            'conveyor: no command for 2 s: speed_setpoint neutral until armed again')
+        told = 'conveyor: no command for 2 s: speed_setpoint neutral until armed again'
+        client.wait_logged(told, WARN)
         client.publish(SPEED, Float64(data=100.0))
         cycles_pass(one)
         assert recorder.words()[0] == 0

@@ -56,6 +56,13 @@ def test_holds_the_value_and_ends_with_neutral(bridge: StartBridge, run: Run) ->
     assert speeds(one) == [0.0]
 
 
+def test_its_end_is_no_warning(bridge: StartBridge, client: Client, run: Run) -> None:
+    enabled(bridge, run)
+    assert run('jog', 'lift', '300', '--yes', '--for', '1')[0] == 0
+    told = client.wait_logged('no command for 2 s: speed_setpoint neutral until armed again')
+    assert told not in client.logged()
+
+
 def test_json(bridge: StartBridge, run: Run) -> None:
     enabled(bridge, run)
     code, lines, _ = run('jog', '/lift', 'speed_setpoint', '-300', '--yes', '--json', '--for', '1')

@@ -223,10 +223,13 @@ const panel = (() => {
 
   // a value that does not change has an axis around it, not one that begins at 0
   function narrow() {
-    const room = ({min, max}) => (max > min || !isFinite(min) ? null
-      : Math.max(0.05 * Math.abs(min), 0.5));
-    return {min: (found) => (room(found) === null ? null : found.min - room(found)),
-      max: (found) => (room(found) === null ? null : found.max + room(found))};
+    const end = ({min, max}, sign) => {
+      if (max > min || !isFinite(min)) return null;
+      const room = 0.05 * Math.abs(min) || 1;
+      const step = 10 ** Math.floor(Math.log10(room));
+      return Number((Math.round((min + sign * room) / step) * step).toPrecision(6));
+    };
+    return {min: (found) => end(found, -1), max: (found) => end(found, 1)};
   }
 
   function draw(id, changed) {

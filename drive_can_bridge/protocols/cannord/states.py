@@ -22,6 +22,7 @@ from enum import Enum
 
 from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.parameters import AccessMode, Parameter
+from drive_can_bridge.core.status_bits import CANNORD, STATUS_NAME
 
 READY = 0x047E
 RUN = 0x047F
@@ -44,24 +45,8 @@ PARAMETER_SET_SHIFT = 14
 PARAMETER_SETS = 4
 
 #: names of the bits of the status word, as they are published
-STATUS_BITS = {
-    'ready_to_switch_on': 0,
-    'ready': 1,
-    'enabled': 2,
-    'fault': 3,
-    'voltage_enabled': 4,
-    'no_quick_stop': 5,
-    'switch_on_disabled': 6,
-    'warning': 7,
-    'setpoint_reached': 8,
-    'bus_control': 9,
-    'bit_10': 10,
-    'rotating_right': 11,
-    'rotating_left': 12,
-    'bit_13': 13,
-}
-#: name of the status word among the parameters of a drive
-STATUS_WORD = 'status_word'
+STATUS_BITS = CANNORD
+STATUS_WORD = STATUS_NAME
 FAULT_BIT = 0x0008
 
 STATUS_PARAMETER = Parameter(

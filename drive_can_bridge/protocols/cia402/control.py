@@ -31,6 +31,7 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, TableRules
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import PATTERNS, State
@@ -51,7 +52,7 @@ def control_table(options: Any) -> ControlTable:
     return ControlTable(
         parameter='', disable=states.SHUTDOWN, enable=states.ENABLE,
         quick_stop=states.QUICK_STOP, reset_fault=states.FAULT_RESET,
-        status_parameter=states.STATUS_NAME,
+        status_parameter=STATUS_NAME,
         ready=StatusPattern(*PATTERNS[State.READY_TO_SWITCH_ON]),
         enabled=StatusPattern(*PATTERNS[State.OPERATION_ENABLED]),
         fault=StatusPattern(states.FAULT_BIT, states.FAULT_BIT), running=_RUNNING,

@@ -10,6 +10,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
     node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints)
@@ -18,7 +19,7 @@ from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of, STATUS_NAME,
+    CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of,
     STATUS_PARAMETER, STATUS_WORD)
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, IntegerList, option, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit

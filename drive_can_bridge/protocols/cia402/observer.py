@@ -13,6 +13,7 @@ import math
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
@@ -20,7 +21,7 @@ from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
 from drive_can_bridge.protocols.canopen.sdo import SdoMessage, SdoCommand as Said
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
-from drive_can_bridge.protocols.cia402.states import state_of, STATUS_NAME
+from drive_can_bridge.protocols.cia402.states import state_of
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, listed_by, Observed, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import (
