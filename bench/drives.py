@@ -46,6 +46,8 @@ class Drives:
         self._values = 0
         self._enabled: set[int] = set()
         self._stops = array('d')
+        #: by station and number
+        self._written: dict[tuple[int, int], int] = {}
 
     def asked(self, station: int) -> float:
         """Note that a drive is asked in an exchange; return the time."""
@@ -59,7 +61,7 @@ class Drives:
 
     def answers(self, frame: bytes) -> Sequence[bytes]:
         """Return what the drives answer to a frame."""
-        identifier, _, request = CAN_FRAME.unpack(frame)
+        identifier, length, request = CAN_FRAME.unpack(frame)
         if identifier & CYCLIC == CYCLIC:
             station = identifier >> 21 & 127
             now = self.asked(station)
@@ -72,11 +74,14 @@ class Drives:
                 self._stops.append(now)
             data = struct.pack('>4H', self._values, 1, 2, 1 | enabled << 1)
         elif identifier & 0x00100000:
+            station, number = identifier >> 21 & 127, identifier >> 4 & 0xFFFF
+            for place, word in enumerate(struct.unpack('>4H', request)[:length // 2]):
+                self._written[station, number + place] = word
             return ()
         else:
-            number = identifier >> 4 & 0xFFFF
-            data = {122: REQUEST_MAP, 126: RESPONSE_MAP}.get(
-                number, struct.pack('>4H', 7, 8, 9, 10))
+            station, number = identifier >> 21 & 127, identifier >> 4 & 0xFFFF
+            data = {122: REQUEST_MAP, 126: RESPONSE_MAP}.get(number) or struct.pack('>4H', *(
+                self._written.get((station, number + place), 7 + place) for place in range(4)))
         return (CAN_FRAME.pack(identifier | DIR, 8, data),)
 
     def clear(self) -> bool:

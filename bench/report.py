@@ -214,8 +214,11 @@ def hand_figures(found: dict[str, Any]) -> list[Figure]:
              'read': '`drive_can read` of one value', 'write': '`drive_can write` of one value'}
     goals = {'stop': 1 / 25, 'stop done': 1 / 15, 'read': 1 / 12, 'write': 1 / 12}
     other_goals = {'stop': 1 / 40, 'stop done': 1 / 20, 'read': 1 / 15, 'write': 1 / 15}
-    figures = [Figure(text, _spread(found[name]['ours']), f'{who} {_spread(found[name][key])}',
-                      median(found[name]['ours']) / median(found[name][key]), goal)
+    failed = f', {found["failed"]} failed' if found['failed'] else ''
+    figures = [Figure(text, _spread(found[name]['ours']),
+                      f'{who} {_spread(found[name][key])}{failed}',
+                      math.inf if failed else (
+                          median(found[name]['ours']) / median(found[name][key])), goal)
                for name, text in names.items()
                for key, who, goal in (('bare', 'bare client', goals[name]),
                                       ('other', 'the other build', other_goals[name]))

@@ -497,13 +497,16 @@ def by_hand(load: Load, rounds: int, other: str = '') -> dict[str, Any]:
     """
     bare = [sys.executable, str(HERE / 'bare_client.py')]
     who = {'ours': DRIVE_CAN, **({'other': (other, *DRIVE_CAN[1:])} if other else {})}
-    found: dict[str, Any] = {name: {each: [] for each in (*who, 'bare')} for name in (
-        'stop', 'stop done', 'read', 'write')}
-    found['floor'] = []
+    names = 'stop', 'stop done', 'read', 'write'
+    found: dict[str, Any] = {}
     with ExitStack() as stack:
         bus = Bus(stack, load)
+        typed = Typed(stack)
         with bridge_under(load, bus), child('stopper.py') as stopper:
-            for number in range(rounds):
+            for number in range(rounds + 1):
+                if number < 2:      # with the first ones modules are compiled
+                    found.update({name: {each: [] for each in (*who, 'bare')} for name in names},
+                                 floor=[], failed=0)
                 value = str(1.0 + number / 100)
                 turn = [(name, [[*command, 'stop'], [*command, 'read', 'drive0', 'ramp_time'],
                                 [*command, 'write', 'drive0', f'ramp_time={value}']])
@@ -515,12 +518,13 @@ def by_hand(load: Load, rounds: int, other: str = '') -> dict[str, Any]:
                     bus.drives[0].ask('clear')
                     if each == 'bare':   # as much Python as nobody does without
                         begun = time.monotonic()
-                        _typed([sys.executable, '-c', 'import socket'])
+                        typed([sys.executable, '-c', 'import socket'])
                         found['floor'].append(time.monotonic() - begun)
                     for name, command in zip(('stop', 'read', 'write'), commands):
                         begun = time.monotonic()
-                        _typed(command)
+                        code, _ = typed(command)
                         elapsed = time.monotonic() - begun
+                        found['failed'] += each == 'ours' and code != 0
                         if name == 'stop':
                             found['stop done'][each].append(elapsed)
                             elapsed = min(bus.drives[0].ask('stops'), default=math.inf) - begun
@@ -528,11 +532,24 @@ def by_hand(load: Load, rounds: int, other: str = '') -> dict[str, Any]:
     return found
 
 
-def _typed(command: Sequence[str]) -> tuple[int, str]:
-    """Run a command as a shell does, nowhere near these sources."""
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          check=False, cwd='/')
-    return done.returncode, done.stdout
+class Typed:
+    """
+    Runs commands as a shell does, nowhere near these sources.
+
+    Python keeps what it has compiled, as it does with what is installed, whatever the environment
+    of the bench says: else each command would compile all of its modules.
+    """
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._environment = {**os.environ, 'PYTHONPYCACHEPREFIX': stack.enter_context(
+            TemporaryDirectory())}
+        self._environment.pop('PYTHONDONTWRITEBYTECODE', None)
+
+    def __call__(self, command: Sequence[str]) -> tuple[int, str]:
+        """Run one; return its exit code, and what it has said."""
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              check=False, cwd='/', env=self._environment)
+        return done.returncode, done.stdout
 
 
 def one_hangs(load: Load, rounds: int) -> dict[str, Any]:
@@ -540,10 +557,13 @@ def one_hangs(load: Load, rounds: int) -> dict[str, Any]:
     found: dict[str, Any] = {'stop': [], 'done': [], 'named': 0}
     with ExitStack() as stack:
         bus = Bus(stack, replace(load, drives=2 * load.drives, buses=2))
+        typed = Typed(stack)
         with (bridge_under(replace(load, drives=2 * load.drives, buses=2), bus,
                            *bus.files_each()) as bridges, child('stopper.py') as stopper):
             hung = bridges.processes[1].process
-            for _ in range(rounds):
+            for number in range(rounds + 1):
+                if number < 2:      # with the first one modules are compiled
+                    found = {'stop': [], 'done': [], 'named': 0}
                 if not stopper.ask('enable'):
                     raise SystemExit('the drive was not enabled')
                 bus.drives[0].ask('clear')
@@ -551,7 +571,7 @@ def one_hangs(load: Load, rounds: int) -> dict[str, Any]:
                 try:
                     time.sleep(0.1)
                     begun = time.monotonic()
-                    _, told = _typed([*DRIVE_CAN, 'stop'])
+                    _, told = typed([*DRIVE_CAN, 'stop'])
                     found['done'].append(time.monotonic() - begun)
                 finally:
                     hung.send_signal(signal.SIGCONT)
@@ -566,7 +586,9 @@ def busy_hand(load: Load, commands: int, loops: int) -> dict[str, Any]:
     found: dict[str, Any] = {'done': [], 'failed': 0, 'loops': loops}
     with ExitStack() as stack:
         bus = Bus(stack, load)
+        typed = Typed(stack)
         stack.enter_context(bridge_under(load, bus))
+        typed([*DRIVE_CAN, 'stop'])     # compiles modules
         for _ in range(loops):
             loop = subprocess.Popen(    # in another terminal
                 [sys.executable, '-c', COMPUTES], start_new_session=True)
@@ -574,7 +596,7 @@ def busy_hand(load: Load, commands: int, loops: int) -> dict[str, Any]:
             stack.callback(loop.kill)
         for _ in range(commands):
             begun = time.monotonic()
-            code, _ = _typed(['nice', '-n', '10', *DRIVE_CAN, 'stop'])
+            code, _ = typed(['nice', '-n', '10', *DRIVE_CAN, 'stop'])
             found['done'].append(time.monotonic() - begun)
             found['failed'] += code != 0
     return found

@@ -13,7 +13,6 @@ limit for a moment. Where there is no glibc, there is only the limit.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import ctypes
 import os
 import re
 import resource
@@ -113,7 +112,8 @@ data_limit = DataLimit()
 def keep_reserves() -> None:
     """Have every thread that begins from now on keep a reserve. First of all."""
     try:
-        mallopt = ctypes.CDLL(None).mallopt
+        from ctypes import CDLL
+        mallopt = CDLL(None).mallopt
     except (AttributeError, OSError):
         return
     if 'MALLOC_ARENA_MAX' not in os.environ:
@@ -123,6 +123,7 @@ def keep_reserves() -> None:
 
 def reserve() -> None:
     """Have the reserve of this thread free beyond what it uses now."""
+    import ctypes
     library = ctypes.CDLL(None)
     malloc, free = library.malloc, library.free
     malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]

@@ -276,7 +276,8 @@ def _run(arguments: list[str], clock: Clock, *, alone: bool) -> int:
     module, args = understood(arguments)
     args.clock = clock
     libraries = None
-    if args.subcommand not in WITHOUT_BUS:
+    if args.subcommand not in WITHOUT_BUS and not (
+            args.subcommand in OF_DRIVES and args.params_file is None):
         from drive_can_bridge.transport.library_logs import Few, LibraryLogs
         libraries = LibraryLogs(Few(complain).say, clock.now)
         libraries.install()

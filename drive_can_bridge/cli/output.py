@@ -14,7 +14,6 @@ from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import sys
-import tempfile
 from typing import TYPE_CHECKING
 
 from drive_can_bridge.cli.command import agreed
@@ -159,6 +158,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _replace(path: Path, data: bytes) -> None:
+    import tempfile     # takes its time
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
     try:
         with os.fdopen(handle, 'wb') as file:

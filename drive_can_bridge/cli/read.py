@@ -12,7 +12,6 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import fitting_table, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.text import value_text
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'raw', 'number', 'storage', 'description',
@@ -100,6 +99,7 @@ def _watch(args: Namespace, drives: Drives, wanted: Sequence[str]) -> int:
 
 def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
     """Return what ``--json`` prints of a parameter; the keys are documented."""
+    from drive_can_bridge.core.codes import code_of     # takes its time
     parameter = outcome.parameter
     return {
         'drive': drive.name, 'name': outcome.name, 'value': outcome.value,

@@ -3,6 +3,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from contextlib import suppress
 import re
 import shlex
 
@@ -12,9 +13,10 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
-from drive_can_bridge.core.codes import code_of
+from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.core.requests import FailureKind
+from drive_can_bridge.protocols.storing import STORING
 
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
@@ -162,6 +164,7 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
     for drive, outcome in outcomes:
         parameter = outcome.parameter
         if args.json:
+            from drive_can_bridge.core.codes import code_of     # takes its time
             print_json({'drive': drive.name, 'name': outcome.name,
                         'value': _shown(parameter, wanted[outcome.name]), 'ok': outcome.ok,
                         'reason': outcome.reason, 'code': code_of(outcome.reason)})
@@ -176,18 +179,19 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
     if rows:
         print_table(_HEADINGS, rows, numbers=('value',))
     losers = [drive for drive, outcome in outcomes if _is_lost(outcome)]
-    if not losers:
+    if args.json:
         return
-    from drive_can_bridge.protocols.families import FAMILIES    # takes its time
-    for name, protocol in dict.fromkeys((drive.name, drive.facts.protocol) for drive in losers):
-        family = FAMILIES[protocol]
-        if family.keeps_by and not args.json:
-            words = ['drive_can', 'write', name, family.stores_by]
+    for name, drive in {drive.name: drive for drive in losers}.items():
+        storing = None
+        with suppress(NoAnswer):    # what was written is told; its bridge has gone since
+            storing = STORING.get(drive.facts.protocol)
+        if storing is not None:
+            words = ['drive_can', 'write', name, storing.word]
             if args.params_file is not None:
                 words += ['-p', str(args.params_file)]
             elif args.namespace is not None:
                 words += ['--namespace', args.namespace or '/']
-            print(f'{family.keeps_by}{shlex.join(words)}')
+            print(f'{storing.text}{shlex.join(words)}')
 
 
 def _is_lost(outcome: WriteOutcome) -> bool:

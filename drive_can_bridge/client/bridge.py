@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The way to drives through a running bridge."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 import json
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from drive_can_bridge.client.drive import (
     Drive, DriveFacts, Drives, Enabled, ReadOutcome, WriteOutcome)
@@ -14,10 +14,12 @@ from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import (
     AccessMode, Parameter, ParameterType as WireType, Storage, Value, ValueKind)
-from drive_can_bridge.core.profile import RestoreStep, RestoreTable
 from drive_can_bridge.core.requests import kind_of
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import facts_in, printable, taken_apart
+
+if TYPE_CHECKING:   # read it is not needed
+    from drive_can_bridge.core.profile import RestoreTable
 
 _TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
 
@@ -79,22 +81,22 @@ class BridgedDrive(Drive):
     """
     One drive.
 
+    :param name: of it.
     :param way: to its bridge.
     :param node: full name of its node.
     :param table: the parameters that it lists.
     :param roles: what the bridge uses them for.
-    :param period: s between diagnostic messages of the bridge.
-    :param identity: asks the bridge who a drive is.
+    :param knowledge: asks the bridge for the rest.
     """
 
-    def __init__(self, way: Way, node: str, facts: DriveFacts, table: dict[str, Parameter],
-                 roles: dict[str, Role], period: float, identity: Callable[[str], str]) -> None:
-        super().__init__(facts, ParameterDirectory(table, self._raw_parameter))
+    def __init__(self, name: str, way: Way, node: str, table: dict[str, Parameter],
+                 roles: dict[str, Role], knowledge: 'BridgeSource') -> None:
+        super().__init__(name, lambda: knowledge.facts(name),
+                         ParameterDirectory(table, self._raw_parameter))
         self._way = way
         self._node = node
         self._roles = roles
-        self._period = period
-        self._identity = identity
+        self._knowledge = knowledge
         self._raw: dict[str, Parameter | None] = {}
 
     def _raw_parameter(self, name: str) -> Parameter | None:
@@ -161,7 +163,8 @@ class BridgedDrive(Drive):
         return WriteOutcome(name, done, parameter, reason, kind=None if done else kind_of(reason))
 
     def enabled(self) -> Enabled:
-        facts = self._way.condition(self.name, age=self._period, patience=_DIAGNOSTICS_MARGIN)
+        facts = self._way.condition(self.name, age=self._knowledge.period(self.name),
+                                    patience=_DIAGNOSTICS_MARGIN)
         if 'control_state' not in facts:
             return Enabled.UNKNOWN
         if any(part in facts['control_state'] for part in _MOVING):
@@ -169,7 +172,7 @@ class BridgedDrive(Drive):
         return _ENABLED.get(facts.get('state', ''), Enabled.UNKNOWN)
 
     def identity(self) -> str:
-        return self._identity(self.name)
+        return self._knowledge.identity(self.name)
 
 
 #: names in one call
@@ -203,15 +206,11 @@ class BridgeSource:
 
     def open(self, names: Sequence[str]) -> Drives:
         """Ask for what is known of these drives."""
-        wanted = {name: bridge for name, bridge in self._bridges.items() if name in names}
-        period_of = {bridge: self._values(bridge, [_PERIOD])[_PERIOD]
-                     for bridge in dict.fromkeys(wanted.values())}
         opened = {}
-        for name, bridge in wanted.items():
-            table, roles = self._table(name)
-            opened[name] = BridgedDrive(self._way, self._node_of(name), self._facts(name),
-                                        table, roles, float(period_of[bridge] or 1.0),
-                                        self._identity)
+        for name in self._bridges:
+            if name in names:
+                opened[name] = BridgedDrive(name, self._way, self._node_of(name),
+                                            *self._table(name), self)
         return Drives(opened, self.close)
 
     def close(self) -> None:
@@ -230,7 +229,12 @@ class BridgeSource:
                       for name in names]
         return dict(zip(names, values))
 
-    def _facts(self, drive: str) -> DriveFacts:
+    def period(self, drive: str) -> float:
+        """Return the s between diagnostic messages of the bridge of a drive."""
+        return float(self._values(self._bridges[drive], [_PERIOD])[_PERIOD] or 1.0)
+
+    def facts(self, drive: str) -> DriveFacts:
+        """Return what its bridge knows of a drive."""
         prefix, bridge = f'drives.{drive}.', self._bridges[drive]
         values = self._values(bridge, [prefix + key for key in _DRIVE_KEYS])
         bus = str(values[f'{prefix}bus'])
@@ -246,7 +250,8 @@ class BridgeSource:
             restore=_restore_table(values[f'{prefix}restore']), through=bridge,
             persist_writes=self._values(bridge, [persist])[persist] is not False)
 
-    def _identity(self, drive: str) -> str:
+    def identity(self, drive: str) -> str:
+        """Return who a drive is, as its bridge has asked it."""
         name = f'drives.{drive}.identity'
         return str(self._values(self._bridges[drive], [name])[name] or '')
 
@@ -265,8 +270,9 @@ class BridgeSource:
         return table, roles
 
 
-def _restore_table(text: Any) -> RestoreTable | None:
+def _restore_table(text: Any) -> 'RestoreTable | None':
     """Read what :func:`..declare.restore_text` has written."""
+    from drive_can_bridge.core.profile import RestoreStep, RestoreTable
     try:
         read = json.loads(text)
         return RestoreTable(*(tuple(RestoreStep(str(name), int(bits), int(mask))

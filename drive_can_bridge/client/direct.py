@@ -219,11 +219,11 @@ class DirectDrive(Drive):
                  conversation: BusConversation, nmt_start: bool) -> None:
         self._drive = drive
         self._family = family = FAMILIES[drive.protocol]
-        super().__init__(DriveFacts(
+        facts = DriveFacts(
             drive.name, bus.name, bus.interface, str(bus.channel), bus.bitrate, drive.protocol,
             drive.station, drive.profile_key or drive.profile.name, drive.profile.sha256,
-            drive.profile.restore,
-            persist_writes=getattr(drive.options, 'persist_writes', True)), ParameterDirectory(
+            drive.profile.restore, persist_writes=getattr(drive.options, 'persist_writes', True))
+        super().__init__(drive.name, lambda: facts, ParameterDirectory(
             drive.profile.parameters, lambda name: family.raw_parameter(drive, name)))
         self._conversation = conversation
         self._session = conversation.sessions[drive.name]

@@ -28,18 +28,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from functools import cached_property
+from typing import Protocol, TYPE_CHECKING
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.complaints import hint
 from drive_can_bridge.core.directory import contradictions, ParameterDirectory
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
-from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import FailureKind
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.process.signals import finish_first
 
+if TYPE_CHECKING:   # read through a bridge it is not needed
+    from drive_can_bridge.core.profile import RestoreTable
 
 #: of a write under way when the conversation ended, and of those that were to follow
 NOT_CONFIRMED = sentences.write_not_confirmed()
@@ -144,7 +145,7 @@ class DriveFacts:
     station: int
     profile: str
     profile_sha256: str
-    restore: RestoreTable | None
+    restore: 'RestoreTable | None'
     through: str = ''
     persist_writes: bool = True
 
@@ -155,20 +156,27 @@ class Drive(ABC):
 
     Calls block until everything is done. They belong into one thread.
 
-    :ivar facts: what is known of the drive without asking it.
+    :param find_facts: returns what is known of it; called when that is wanted first.
+    :ivar name: of the drive in the configuration.
     """
 
-    def __init__(self, facts: DriveFacts, directory: ParameterDirectory) -> None:
-        self.facts = facts
+    def __init__(self, name: str, find_facts: Callable[[], DriveFacts],
+                 directory: ParameterDirectory) -> None:
+        self.name = name
+        self._find_facts = find_facts
         self._directory = directory
 
     def __repr__(self) -> str:
         return f'<Drive {self.name}>'
 
-    @property
-    def name(self) -> str:
-        """Name of the drive in the configuration."""
-        return self.facts.name
+    @cached_property
+    def facts(self) -> DriveFacts:
+        """
+        What is known of the drive without asking it.
+
+        :raises DriveCanError: its bridge, who knows it, does not answer.
+        """
+        return self._find_facts()
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -338,6 +346,7 @@ class NoDrive(DriveCanError, KeyError):
     """
 
     def __init__(self, name: object, known: Iterable[str]) -> None:
+        from drive_can_bridge.core.complaints import hint   # takes its time
         names = list(known)
         super().__init__(sentences.no_drive_there(
             repr(name), ', '.join(names) or 'none', hint(str(name), names)))

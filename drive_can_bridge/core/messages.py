@@ -20,6 +20,7 @@ A sentence that gives the reason of another one has it among its fields, code an
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
+from functools import cached_property
 from itertools import cycle
 import re
 from string import Formatter
@@ -92,8 +93,6 @@ class Text:
 
     :ivar code: its name in the catalogue.
     :ivar do: what people should do about it.
-    :ivar fields: the names of its fields, in the order in which they may be given.
-    :ivar optional: those that may be missing.
     :param fields: that order, where it is not that of the text, or where a field is in no text.
     :param kinds: what its sentences are for programs: one for all texts, or one for each.
     :param how: writes a field in a way of its own, by name.
@@ -102,21 +101,40 @@ class Text:
     def __init__(self, *texts: str, do: str = '', fields: str = '', kinds: Sequence[Enum] = (),
                  **how: Callable[[Any], str]) -> None:
         self.code, self.do, self.texts = '', do, texts
-        *self._variants, self._last = [_Variant(text, how) for text in texts]
-        for each, kind in zip((*self._variants, self._last), cycle(kinds)):
+        self._order, self._kinds, self._how = fields, kinds, how
+
+    # made when they are wanted: a command says one sentence of some hundreds
+
+    @cached_property
+    def _variants(self) -> list['_Variant']:
+        variants = [_Variant(text, self._how) for text in self.texts]
+        for each, kind in zip(variants, cycle(self._kinds)):
             each.kind = kind
-        in_text = [name for each in (*self._variants, self._last) for name in each.fields]
-        self.fields = tuple(fields.split()) or tuple(dict.fromkeys(in_text))
-        self.optional = frozenset(in_text).difference(self._last.fields)
+        return variants
+
+    @cached_property
+    def _in_text(self) -> list[str]:
+        return [name for each in self._variants for name in each.fields]
+
+    @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """The names of its fields, in the order in which they may be given."""
+        return tuple(self._order.split()) or tuple(dict.fromkeys(self._in_text))
+
+    @cached_property
+    def optional(self) -> frozenset[str]:
+        """The names of the fields that may be missing."""
+        return frozenset(self._in_text).difference(self._variants[-1].fields)
 
     def __call__(self, *args: Any, **fields: Any) -> Sentence:
         if args:
             fields = {**dict(zip(self.fields, args)), **fields}
-        for variant in self._variants:
+        *others, last = self._variants
+        for variant in others:
             if all(_is_there(fields.get(name)) for name in variant.fields
                    if name in self.optional):
                 return Sentence(variant.write(fields), self.code, fields, variant.kind, self)
-        return Sentence(self._last.write(fields), self.code, fields, self._last.kind, self)
+        return Sentence(last.write(fields), self.code, fields, last.kind, self)
 
     def places(self, text: str, *, whole: bool = False) -> frozenset[int]:
         """

@@ -10,12 +10,14 @@ word, a setpoint or a map is the bridge's own.
 
 from collections.abc import Callable, Hashable, Sequence
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import Parameter
-from drive_can_bridge.core.process_image import control_word
+
+if TYPE_CHECKING:   # a command that wants to know a role needs no configuration
+    from drive_can_bridge.core.configuration import DriveConfiguration
 
 #: what a parameter addresses; empty: nothing that acyclic frames reach
 Cells = frozenset[Hashable]
@@ -51,11 +53,12 @@ class Roles:
     :param refusal: why a parameter that is nobody's cannot be written for other reasons.
     """
 
-    def __init__(self, drive: DriveConfiguration, *, controlled: bool,
+    def __init__(self, drive: 'DriveConfiguration', *, controlled: bool,
                  cells: Callable[[Parameter], Cells] = by_number, maps: Cells = frozenset(),
                  cyclic_refusal: Callable[[Parameter], Sentence] = publish_it,
                  refusal: Callable[[Parameter], Sentence] = lambda parameter: NOTHING,
                  built_in: Sequence[Parameter] = ()) -> None:
+        from drive_can_bridge.core.process_image import control_word
         self.cells = cells
         self._cyclic_refusal = cyclic_refusal
         self._further_refusal = refusal

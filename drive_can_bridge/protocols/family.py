@@ -150,10 +150,6 @@ class Family(ABC):
     control_built_in: bool = False
     #: names of what is built in and published like the parameters of a profile
     builtin_names: frozenset[str] = frozenset()
-    #: said behind values that were written, where they are gone without power; '' where not
-    keeps_by: str = ''
-    #: what is written then, behind ``drive_can write DRIVE``
-    stores_by: str = ''
     #: bits of the types that its parameters may have
     widths: frozenset[int] = frozenset((16, 32))
     #: the keys that only this family has: a frozen dataclass

@@ -65,9 +65,10 @@ class ScriptedDrive(Drive):
         table = RestoreTable((RestoreStep('mode', MODE, bits),), (RestoreStep('mode', 0, bits),))
         if stores:
             table = RestoreTable((), (RestoreStep(STORE, SAVE, 0xFFFF),))
+        facts = DriveFacts('lift', 'main', 'virtual', '0', 500000, 'datamodel_extended', 1, 'own',
+                           '', table)
         super().__init__(
-            DriveFacts('lift', 'main', 'virtual', '0', 500000, 'datamodel_extended', 1, 'own', '',
-                       table),
+            'lift', lambda: facts,
             ParameterDirectory({name: Parameter(name, number=number) for number, name in
                                 enumerate(FILE, 30)} | {STORE: Parameter(
                                     STORE, number=60, access=AccessMode.WRITE_ONLY)},

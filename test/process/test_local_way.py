@@ -477,3 +477,23 @@ def test_a_stop_that_is_answered_imports_nothing_more(success: str, said: str) -
     assert {name for name in imported if name.startswith('drive_can_bridge')} == (
         NEEDED | TO_ITS_END)
     assert not imported & HEAVY
+
+
+@pytest.mark.usefixtures('programs')
+@pytest.mark.parametrize('command', ['read', 'write', 'enable'])
+def test_what_goes_through_a_bridge_of_this_host_imports_no_part_of_one(command: str) -> None:
+    code = ('import sys\n'
+            f'sys.argv[1:] = [{command!r}, "lift", "ramp_time=1", "--json"]\n'
+            'from drive_can_bridge.cli import start\n'
+            'from drive_can_bridge.cli.main import understood\n'
+            f'understood(sys.argv[1:] if {command!r} != "enable" else ["enable", "lift"])\n'
+            'from drive_can_bridge.client import bridge, local\n'
+            'print(*sorted(sys.modules))')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    imported = set(done.stdout.split())
+    assert not imported & {
+        'rclpy', 'yaml', 'can', 'subprocess', 'logging', 'tempfile', 'rich', 'numpy', 'ctypes',
+        'importlib.metadata', 'drive_can_bridge.configuration.load',
+        *(f'drive_can_bridge.core.{name}' for name in (
+            'codes', 'complaints', 'configuration', 'process_image', 'profile', 'session')),
+        'drive_can_bridge.protocols.families', 'drive_can_bridge.transport.library_logs'}

@@ -89,8 +89,6 @@ class Cia402(Family):
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
     widths = frozenset((8, 16, 32))
-    keeps_by = 'not stored: lost at power-off; to store all of it: '
-    stores_by = 'x1010.1=0x65766173'
     options_type = Cia402Options
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
