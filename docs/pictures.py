@@ -38,7 +38,7 @@ from drive_can_bridge.ros.monitor.client import MonitorClient
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.sinks import Plotter
 from drive_can_bridge.trace.tracer import Channels, Tracer
-from drive_can_bridge.view.live import Choice, page, Setting
+from drive_can_bridge.view.live import Choice, page, ViewSetting
 from drive_can_bridge.view.parts import TREND_SPAN
 
 HERE = Path(__file__).resolve().parent
@@ -109,7 +109,7 @@ def _watch(demo: 'subprocess.Popen[bytes]') -> tuple[RenderableType, bool]:
             raise SystemExit('pictures: the demo did not come up')
         time.sleep(_FRAME_PERIOD)
     client.close()
-    return (page(snapshot, Choice(drive='/lift'), Setting(), width=SIZE[0], height=SIZE[1]),
+    return (page(snapshot, Choice(drive='/lift'), ViewSetting(), width=SIZE[0], height=SIZE[1]),
             not any(drive.missed for drive in snapshot.drives))
 
 

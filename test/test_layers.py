@@ -258,6 +258,30 @@ def test_ros_packages_are_declared() -> None:
     assert ROS_PACKAGES <= declared
 
 
+# -- names ----------------------------------------------------------------------------------------
+
+#: modules that each family has under the same name; those for all families stand above them
+FLOOR_PLAN = {'control', 'family', 'observer', 'procedures', 'scanner', 'session', 'states',
+              'transactor'}
+
+
+def test_a_name_of_a_class_stands_for_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for path in SOURCES:
+        for node in nodes_of(path):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(f'{path}:{node.lineno}')
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
+def test_a_name_of_a_module_stands_once_in_its_layer() -> None:
+    places: dict[tuple[str, str], list[str]] = {}
+    for path, layer in LAYERS.items():
+        if path.stem != '__init__' and not (layer == 'protocols' and path.stem in FLOOR_PLAN):
+            places.setdefault((layer, path.stem), []).append(str(path))
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
 # -- inheritance ----------------------------------------------------------------------------------
 
 #: steps from a class to the base of all its ancestors in this package: a base, and its subclasses
@@ -285,9 +309,7 @@ def classes() -> dict[str, Class]:
                 names = tuple(base.id for base in bases if isinstance(base, ast.Name))
                 methods = frozenset(each.name for each in node.body
                                     if isinstance(each, ast.FunctionDef))
-                # of two with the same name: the one that says more about its ancestors
-                if node.name not in found or names:
-                    found[node.name] = Class(node.name, path, names, methods)
+                found[node.name] = Class(node.name, path, names, methods)
     return found
 
 

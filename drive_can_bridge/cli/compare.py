@@ -39,7 +39,7 @@ _NAMED_MAX = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ComparedSetting:
     """
     A setting on one side of a comparison.
 
@@ -61,7 +61,7 @@ class Side:
     :param left_out: names in a file that are no settings.
     """
 
-    settings: Mapping[str, Setting]
+    settings: Mapping[str, ComparedSetting]
     parameters: Mapping[str, Parameter]
     left_out: tuple[str, ...] = ()
 
@@ -71,7 +71,8 @@ def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
     bits = mode_bits(drive.facts.restore)
     found = {name: outcome for name, outcome in outcomes.items() if outcome.ok and (
         is_setting(drive, name) or not bits[name].is_over(outcome.raw or 0))}
-    return Side({name: Setting(outcome.value, outcome.raw) for name, outcome in found.items()
+    return Side({name: ComparedSetting(outcome.value, outcome.raw) for name,
+                 outcome in found.items()
                  if outcome.value is not None},
                 {name: outcome.parameter for name, outcome in found.items()
                  if outcome.parameter is not None})
@@ -86,18 +87,18 @@ def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
     :param counts: tells whether a parameter that is known is a setting.
     :raises ConfigurationError: a value of the wrong type.
     """
-    settings: dict[str, Setting] = {}
+    settings: dict[str, ComparedSetting] = {}
     parameters: dict[str, Parameter] = {}
     left_out, problems = [], []
     for name, value in backup.values.items():
         parameter = find(name)
         if parameter is None:
-            settings[name] = Setting(value)     # type: ignore[arg-type]  # the reader saw to it
+            settings[name] = ComparedSetting(value)     # type: ignore[arg-type]  # the reader saw to it
         elif not counts(name):
             left_out.append(name)
         else:
             try:
-                settings[name] = Setting(value, raw_in_file(    # type: ignore[arg-type]
+                settings[name] = ComparedSetting(value, raw_in_file(    # type: ignore[arg-type]
                     parameter, value))
                 parameters[name] = parameter
             except ValueRefused as error:
@@ -128,7 +129,7 @@ def differences(first: Side, second: Side) -> list[Difference]:
     return found
 
 
-def _same(one: Setting, other: Setting, parameter: Parameter | None) -> bool:
+def _same(one: ComparedSetting, other: ComparedSetting, parameter: Parameter | None) -> bool:
     if one.raw is None or other.raw is None or parameter is None:
         # a whole number stands for a double, as it does in every file
         return isinstance(one.value, bool) is isinstance(other.value, bool) and math.isclose(

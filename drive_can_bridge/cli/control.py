@@ -223,7 +223,7 @@ class _RosStop:
             raise self._joining.failure
         if self._joining.done is not None:
             graph, control = self._joining.done
-            self._stop = control.Stop(graph.client_node, args.namespace, args.words, [
+            self._stop = control.StopRequests(graph.client_node, args.namespace, args.words, [
                 each.name for each in local.present
                 if each.domain == local.domain and each.has_place])
 

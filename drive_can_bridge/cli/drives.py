@@ -15,7 +15,7 @@ from typing import Any
 from drive_can_bridge.cli.command import complain, namespace, WrongUsage
 from drive_can_bridge.cli.output import counting, waiting
 from drive_can_bridge.client import find_source
-from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome, Source
+from drive_can_bridge.client.drive import Drive, Drives, DriveSource, ReadOutcome
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.resources import what_is_missing
@@ -46,7 +46,7 @@ def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metav
 
 
 @contextmanager
-def source_of(args: Namespace) -> Iterator[Source]:
+def source_of(args: Namespace) -> Iterator[DriveSource]:
     """
     Find the drives that the options point to.
 
@@ -145,7 +145,7 @@ def chosen_one(names: Sequence[str], word: str) -> str:
 
 
 @contextmanager
-def opened(source: Source, names: Sequence[str]) -> Iterator[Drives]:
+def opened(source: DriveSource, names: Sequence[str]) -> Iterator[Drives]:
     """Open drives, and say what the user should know."""
     with (waiting('listening for another master, and greeting the drives')
           if source.listens else nullcontext()):
@@ -177,7 +177,7 @@ def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
     words = [word for word in parsed_args.words or () if word != prefix]
     place, slash, own = (words[0] if words else prefix).rpartition('/')
 
-    def proposed(source: Source) -> list[str]:
+    def proposed(source: DriveSource) -> list[str]:
         names = list(source.names)
         drives = matching(names, own) if words else []
         end = '=' if parsed_args.subcommand == 'write' else ''
@@ -195,7 +195,7 @@ def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
 
 
 def _completed(args: Namespace, place: str | None,
-               proposed: Callable[[Source], Iterable[str]]) -> list[str]:
+               proposed: Callable[[DriveSource], Iterable[str]]) -> list[str]:
     """
     Return what a source proposes.
 

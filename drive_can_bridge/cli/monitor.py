@@ -16,7 +16,7 @@ from drive_can_bridge.cli.command import namespace
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import Source
+from drive_can_bridge.monitor.snapshot import ModelSource
 from drive_can_bridge.monitor.summary import balance, documents, Lines
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.beginning import leave
@@ -91,14 +91,14 @@ def run(args: argparse.Namespace) -> int:
         return code
 
 
-def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.Namespace,
+def _show(source: ModelSource, model: Model, watcher: SignalWatcher, args: argparse.Namespace,
           refusal: _Refusal) -> int:
     clock: Clock = args.clock
     place = environment.in_words()
     if (not args.json and sys.stdout.isatty()
             and os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown')):
         try:
-            from drive_can_bridge.view.live import Setting, show
+            from drive_can_bridge.view.live import show, ViewSetting
         except ImportError as error:
             print(f'{args.title}: no live view without the Python module {error.name}',
                   file=sys.stderr)
@@ -106,7 +106,7 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
             # a demo starts its bridge itself
             bridge = '' if args.title != _TITLE else (
                 f'{"ros2 run drive_can_bridge " if shutil.which("ros2") else ""}drive_can_bridge')
-            setting = Setting(
+            setting = ViewSetting(
                 args.title, place, args.namespace,
                 tuple(filter(None, (environment.activate_command(),
                                     environment.export_command()))), bridge)
@@ -119,7 +119,7 @@ def _show(source: Source, model: Model, watcher: SignalWatcher, args: argparse.N
     return _print_lines(source, model, watcher, clock, as_json=args.json)
 
 
-def _print_lines(source: Source, model: Model, watcher: SignalWatcher, clock: Clock, *,
+def _print_lines(source: ModelSource, model: Model, watcher: SignalWatcher, clock: Clock, *,
                  as_json: bool) -> int:
     """Print one line per drive and second, until a signal."""
     lines = Lines()

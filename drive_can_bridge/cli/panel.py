@@ -59,15 +59,15 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
     """Serve until the end; return whether the addresses were told before it came."""
     try:
         from drive_can_bridge.ros.monitor.client import MonitorClient
-        from drive_can_bridge.ros.monitor.client import Operations
+        from drive_can_bridge.ros.monitor.client import ServiceOperations
     except ImportError as error:
         raise DriveCanError(what_is_missing(COMMAND, error)) from error
     if ended():     # what follows takes seconds, too
         return False
     try:
-        from drive_can_bridge.panel.access import is_loopback, PanelAccess, Role
+        from drive_can_bridge.panel.access import is_loopback, PanelAccess, PanelRole
         from drive_can_bridge.panel.feed import Feed
-        from drive_can_bridge.panel.pages import application, Setting
+        from drive_can_bridge.panel.pages import application, PanelSetting
         from drive_can_bridge.panel.server import address, listen, serve
     except ImportError as error:
         raise DriveCanError(f'{COMMAND}: the Python module {error.name} is not installed: '
@@ -89,12 +89,13 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
             print(f'{COMMAND}: listens on {args.host}: who reaches this machine and has a '
                   f'token gets in, and who sees the traffic sees the token (no TLS); '
                   f'docs/security.md says how to do better', file=sys.stderr)
-        for role in (Role.OPERATOR, Role.VIEWER):
+        for role in (PanelRole.OPERATOR, PanelRole.VIEWER):
             print(f'{role.value}: {address(listener, access.tokens[role])}', flush=True)
     try:
-        app = application(Feed(source, Operations(source.node), model, args.clock), access,
-                          Setting(place, f'{socket.gethostname()} · {place.partition(",")[0]}',
-                                  args.allow_writes))
+        app = application(Feed(source, ServiceOperations(source.node), model, args.clock), access,
+                          PanelSetting(place,
+                                       f'{socket.gethostname()} · {place.partition(",")[0]}',
+                                       args.allow_writes))
         serve(app, listener, access, args.clock, ended=ended, ready=ready)
     finally:
         source.close()

@@ -18,7 +18,7 @@ from drive_can_bridge.core.configuration import (
 )
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError, TransportError
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
+from drive_can_bridge.exchange.one_master import AnotherMaster, END_FIRST, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Finding, Prober, Question
 from drive_can_bridge.transport.end_point import EndPoint
@@ -29,10 +29,6 @@ LISTEN = 1.2
 #: s that a receive may block
 _PATIENCE = 0.005
 _SEND_TIMEOUT = 0.05
-
-
-class AnotherMaster(DriveCanError):
-    """Somebody else talks to one of the drives."""
 
 
 class Asker:

@@ -14,7 +14,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.drives import (
     add_words, by_short_names, chosen_one, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import counting, print_table
-from drive_can_bridge.client.drive import Drive, Enabled, NOT_CONFIRMED, Source
+from drive_can_bridge.client.drive import Drive, DriveSource, Enabled, NOT_CONFIRMED
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.codes import code_of
@@ -76,7 +76,7 @@ def run(args: Namespace) -> int:
             return _restore(args, backup, drives[name])
 
 
-def _target(backup: Backup, word: str | None, source: Source) -> str:
+def _target(backup: Backup, word: str | None, source: DriveSource) -> str:
     """
     Return the drive that is meant.
 

@@ -23,8 +23,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from drive_can_bridge.client.drive import (
-    Drive, Drives, Enabled, NoDrive, ReadOutcome, Source, WriteOutcome,
-)
+    Drive, Drives, DriveSource, Enabled, NoDrive, ReadOutcome, WriteOutcome)
 from drive_can_bridge.clock import Clock, SteadyClock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.errors import DriveCanError
@@ -35,7 +34,7 @@ __all__ = ['Drive', 'DriveCanError', 'Drives', 'Enabled', 'ReadOutcome', 'WriteO
 
 def find_source(params_file: str | Path | None = None, *, namespace: str | None = None,
                 nmt_start: bool = False, clock: Clock | None = None,
-                slow: Callable[[], AbstractContextManager[object]] = nullcontext) -> Source:
+                slow: Callable[[], AbstractContextManager[object]] = nullcontext) -> DriveSource:
     """
     Say which drives there are, before anything is sent.
 
@@ -79,7 +78,7 @@ def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[s
 
     :param only: their names, or shell patterns; one, or several.
     :raises DriveCanError: no drive of such a name, and what :func:`find_source` and
-        :meth:`.Source.open` raise.
+        :meth:`.DriveSource.open` raise.
     """
     source = find_source(params_file, namespace=namespace, nmt_start=nmt_start)
     try:

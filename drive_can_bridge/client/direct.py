@@ -34,17 +34,13 @@ from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
-from drive_can_bridge.exchange.one_master import Ownership
+from drive_can_bridge.exchange.one_master import AnotherMaster, Ownership
 from drive_can_bridge.protocols.families import FAMILIES
 
 #: s that a bus has to open
 _OPEN_TIMEOUT = 5.0
 #: s between two looks whether all is well, however many wait for something
 _PATIENCE = 0.1
-
-
-class AnotherMaster(DriveCanError):
-    """Somebody else talks to one of the drives."""
 
 
 class BusConversation:

@@ -406,7 +406,7 @@ class Drives(Mapping[str, Drive]):
         self.close()
 
 
-class Source(Protocol):
+class DriveSource(Protocol):
     """
     Where drives come from: known by name before anything is opened or sent.
 

@@ -27,7 +27,7 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.ros.client.calls import (
-    Inbox, latched_quality, NodeCalls, Outbox, undemanding_quality)
+    Inbox, latched_quality, NewestPublisher, NodeCalls, undemanding_quality)
 from drive_can_bridge.ros.client.search import find_drives, Graph
 from drive_can_bridge.ros.messages import drive_value, value_of
 from drive_can_bridge.ros.recognition import namespace_of
@@ -51,11 +51,11 @@ _TYPES: dict[ValueKind, Any] = {
 _UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'
 
 
-class Refused(DriveCanError):
+class JogRefused(DriveCanError):
     """It cannot be done; nothing was published. Says why."""
 
 
-class Outcome(NamedTuple):
+class JogOutcome(NamedTuple):
     """
     What became of it.
 
@@ -112,7 +112,7 @@ def find_target(graph: Graph, namespace: str | None, drive: str, name: str | Non
     :param drive: its name, or its full name.
     :param name: of the setpoint; None: the only one there is.
     :param value: as it was typed.
-    :raises Refused: it cannot be done.
+    :raises JogRefused: it cannot be done.
     :raises DriveCanError: no bridge, or none that answers.
     """
     place = namespace_of(drive) if drive.startswith('/') else namespace
@@ -129,20 +129,21 @@ def find_target(graph: Graph, namespace: str | None, drive: str, name: str | Non
             'setpoints', 'commanders', 'command_timeout', 'cyclic_response')])
     setpoints = _read(text)
     if setpoints is None:
-        raise Refused(sentences.jog_not_told())
+        raise JogRefused(sentences.jog_not_told())
     chosen = _choose(setpoints, name, node)
     parameter, *shown = _described(graph, node, [chosen['name'], *(response or ())])
     wanted = _parsed(parameter, value)
     if not 0.0 < timeout <= LONGEST_TIMEOUT:
-        raise Refused(sentences.jog_timeout(timeout=timeout, longest=LONGEST_TIMEOUT, drive=short))
+        raise JogRefused(sentences.jog_timeout(timeout=timeout, longest=LONGEST_TIMEOUT,
+                                               drive=short))
     facts = graph.newest_status(f'{bridge.lstrip("/")}: drive {short}', age=0.5, patience=5.0)
     state = facts.get('state', 'unknown')
     if state not in READY:
         advice = f'drive_can enable {node.lstrip("/")}' if state == 'disabled' else ''
-        raise Refused(sentences.jog_not_ready(state=printable(state), advice=advice))
+        raise JogRefused(sentences.jog_not_ready(state=printable(state), advice=advice))
     who = list(_others(others, graph.client_node.full_name))
     if who:
-        raise Refused(sentences.jog_commanded(who=who))
+        raise JogRefused(sentences.jog_commanded(who=who))
     return Target(bridge, node, parameter, chosen['neutral'], wanted, float(timeout), tuple(shown))
 
 
@@ -150,7 +151,7 @@ def _values(graph: Graph, node: str, names: Sequence[str]) -> list[Any]:
     answer = graph.call(node, 'get_parameters', GetParameters.Request(names=list(names)),
                         ANSWER_TIMEOUT)
     if len(answer.values) != len(names):    # rclpy answers nothing where one name is unknown
-        raise Refused(sentences.jog_not_told())
+        raise JogRefused(sentences.jog_not_told())
     return [value_of(value) for value in answer.values]
 
 
@@ -166,17 +167,17 @@ def _choose(setpoints: Sequence[dict[str, Any]], name: str | None, node: str) ->
     """Return the setpoint that is meant."""
     moving = [each for each in setpoints if not each.get('limit')]
     if name is None and len(moving) != 1:
-        raise Refused(sentences.jog_which(names=[each['name'] for each in moving]) if moving
-                      else sentences.jog_no_setpoint())
+        raise JogRefused(sentences.jog_which(names=[each['name'] for each in moving]) if moving
+                         else sentences.jog_no_setpoint())
     chosen = moving[0] if name is None else next(
         (each for each in setpoints if each['name'] == name), None)
     if chosen is None:
-        raise Refused(sentences.jog_unknown(name=name, names=[each['name'] for each in moving]))
+        raise JogRefused(sentences.jog_unknown(name=name, names=[each['name'] for each in moving]))
     topic = f'{node}/command/{chosen["name"]}'
     if chosen.get('limit'):
-        raise Refused(sentences.jog_limit(name=chosen['name'], topic=topic))
+        raise JogRefused(sentences.jog_limit(name=chosen['name'], topic=topic))
     if 'neutral' not in chosen:
-        raise Refused(sentences.jog_position(name=chosen['name'], topic=topic))
+        raise JogRefused(sentences.jog_position(name=chosen['name'], topic=topic))
     return chosen
 
 
@@ -186,7 +187,7 @@ def _described(graph: Graph, node: str, names: Sequence[str]) -> list[Parameter]
         names=list(names)), ANSWER_TIMEOUT)
     found = [parameter_of(described(each)) for each in answer.descriptors]
     if not found or found[0] is None:
-        raise Refused(sentences.jog_not_told())
+        raise JogRefused(sentences.jog_not_told())
     return [each for each in found if each is not None]
 
 
@@ -202,7 +203,7 @@ def _parsed(parameter: Parameter, text: str) -> Value:
     try:
         parameter.raw_from_value(value)
     except ValueRefused as error:
-        raise Refused(error.sentence) from None
+        raise JogRefused(error.sentence) from None
     return value
 
 
@@ -232,7 +233,7 @@ class Jog:
                   self._take_response),
             Inbox(node, Bool, f'{target.node}/online', latched_quality(), self._take_online),
             Inbox(node, self._message_type, target.topic, any_publisher, self._take_command))
-        self._out = Outbox(node, self._message_type, target.topic)
+        self._out = NewestPublisher(node, self._message_type, target.topic)
         self._phase, self._since = _Phase.ARMING, graph.now()
         self._published_at = self._due = self._ask_at = -math.inf
         self._asking = self._armed = False
@@ -241,7 +242,7 @@ class Jog:
         self._value_answered = self._neutral_answered = False
         self._why: Sentence | None = None
 
-    def run(self, show: Callable[[float], object]) -> Outcome:
+    def run(self, show: Callable[[float], object]) -> JogOutcome:
         """
         Hold the value, and return when neutral was sent.
 
@@ -254,12 +255,12 @@ class Jog:
             raise
         value = self._target.in_words(self._target.value)
         if self._why is not None:
-            return Outcome(False, self._why)
+            return JogOutcome(False, self._why)
         if not self._value_answered:
-            return Outcome(False, sentences.jog_unanswered(value=value))
+            return JogOutcome(False, sentences.jog_unanswered(value=value))
         if not self._neutral_answered:
-            return Outcome(False, sentences.jog_neutral_unseen())
-        return Outcome(True, sentences.jog_done(value=value))
+            return JogOutcome(False, sentences.jog_neutral_unseen())
+        return JogOutcome(True, sentences.jog_done(value=value))
 
     def close(self) -> None:
         """Publish nothing any more."""

@@ -21,7 +21,7 @@ from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
-    JointConfiguration, Quantity, si_factor)
+    JointConfiguration, JointQuantity, si_factor)
 from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.parameters import AccessMode, Parameter, Storage, ValueKind
@@ -35,7 +35,7 @@ _SLIP = 0.8
 #: what several adapters call a mode in which they send nothing
 _LISTEN_ONLY = 'listen_only'
 _COMMAND = '_command'
-_KEYS = tuple(quantity.value + suffix for suffix in ('', _COMMAND) for quantity in Quantity)
+_KEYS = tuple(quantity.value + suffix for suffix in ('', _COMMAND) for quantity in JointQuantity)
 
 
 class Adapters(Protocol):
@@ -477,7 +477,7 @@ class _JointChecker:
         return parameter
 
     def _factor(self, key: str, parameter: Parameter, values: dict[str, Any]) -> float | None:
-        quantity = Quantity(key.removesuffix(_COMMAND))
+        quantity = JointQuantity(key.removesuffix(_COMMAND))
         factor = si_factor(quantity, parameter.unit, gear_ratio=values['gear_ratio'],
                            pole_pairs=values['pole_pairs'])
         if factor is None:

@@ -37,7 +37,7 @@ _NODE = 'drive_can_bridge'
 _TOKEN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*|\*\*?', re.ASCII)
 
 
-class Section(NamedTuple):
+class NodeSection(NamedTuple):
     """
     The parameters of one node name; the tree has the problems that only they have.
 
@@ -59,7 +59,7 @@ class _FileReader:
     """
 
     def __init__(self, path: FilePath) -> None:
-        self.sections: list[Section] = []
+        self.sections: list[NodeSection] = []
         self.problems: list[Problem] = []
         self.twice: list[Problem] = []      # of them, and of the sections: keys that stand twice
         self.broken = False
@@ -80,7 +80,7 @@ class _FileReader:
             else:
                 self._note(root.line, (), complaints.no_mapping(entry=PARAMETERS_KEY))
 
-    def sections_with(self, key: str) -> list[Section]:
+    def sections_with(self, key: str) -> list[NodeSection]:
         """Return the sections that have a key, or one that begins with it and a dot."""
         return [section for section in self.sections if any(
             str(place[0]).split('.')[0] == key for place in section.tree.lines if place)]
@@ -135,11 +135,11 @@ class _FileReader:
         reader = TreeReader(self._file, Rules.PARAMETERS, {
             (name,): definition(kind)['properties'] for name, kind in _OURS.items()})
         reader.read(node)
-        self.sections.append(Section(name, reader.tree, reader.refused, reader.twice))
+        self.sections.append(NodeSection(name, reader.tree, reader.refused, reader.twice))
         self.problems.extend(reader.refused)
 
 
-def read_sections(path: FilePath) -> tuple[list[Section], list[Problem]]:
+def read_sections(path: FilePath) -> tuple[list[NodeSection], list[Problem]]:
     """
     Read the sections of all nodes, and what makes rcl refuse the file.
 
@@ -249,7 +249,7 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     return None, problems
 
 
-def _as_rcl_merges(sections: Iterable[Section], own: Section) -> Tree:
+def _as_rcl_merges(sections: Iterable[NodeSection], own: NodeSection) -> Tree:
     """
     Return what the node of a section gets from all sections of a file.
 

@@ -20,7 +20,7 @@ from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import Setpoints
 
 
-class Presence(Protocol):
+class DriveStatus(Protocol):
     """Where a session stands with its drive; the session itself."""
 
     active: bool
@@ -42,7 +42,7 @@ class CommandInterlock:
     :ivar obeyed: the machine whose control word the drive obeys; None: there is none.
     """
 
-    def __init__(self, presence: Presence, setpoints: Setpoints, control: ControlMachine | None,
+    def __init__(self, presence: DriveStatus, setpoints: Setpoints, control: ControlMachine | None,
                  sample: Sequence[Parameter], report: Reporter,
                  leader: ControlMachine | None = None, missed_limit: int = 3) -> None:
         self._presence = presence

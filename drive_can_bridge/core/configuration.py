@@ -135,7 +135,7 @@ class BridgeConfiguration:
     standard: dict[str, Any] = field(default_factory=dict)
 
 
-class Quantity(Enum):
+class JointQuantity(Enum):
     """A quantity of a joint."""
 
     POSITION = 'position'
@@ -146,13 +146,13 @@ class Quantity(Enum):
 #: an electrical frequency; divided by the pole pairs it is a speed of the shaft
 ELECTRICAL_FREQUENCY = 'Hz'
 
-_FACTORS: dict[Quantity, dict[str, float]] = {
-    Quantity.POSITION: {
+_FACTORS: dict[JointQuantity, dict[str, float]] = {
+    JointQuantity.POSITION: {
         'rad': 1.0,
         'deg': math.pi / 180.0,
         'rev': 2.0 * math.pi,
     },
-    Quantity.VELOCITY: {
+    JointQuantity.VELOCITY: {
         'rad/s': 1.0,
         'deg/s': math.pi / 180.0,
         'rpm': 2.0 * math.pi / 60.0,
@@ -161,12 +161,12 @@ _FACTORS: dict[Quantity, dict[str, float]] = {
 }
 
 
-def convertible_units(quantity: Quantity) -> tuple[str, ...]:
+def convertible_units(quantity: JointQuantity) -> tuple[str, ...]:
     """Return the units that convert; empty for effort, where every unit passes as it is."""
     return tuple(_FACTORS.get(quantity, ()))
 
 
-def si_factor(quantity: Quantity, unit: str, *, gear_ratio: float = 1.0,
+def si_factor(quantity: JointQuantity, unit: str, *, gear_ratio: float = 1.0,
               pole_pairs: int = 1) -> float | None:
     """
     Return the factor from a motor's value in ``unit`` to the joint's SI value.
@@ -176,7 +176,7 @@ def si_factor(quantity: Quantity, unit: str, *, gear_ratio: float = 1.0,
     :param pole_pairs: of the motor; only an electrical frequency is divided by them.
     :return: the factor, or None where the unit does not convert.
     """
-    if quantity is Quantity.EFFORT:
+    if quantity is JointQuantity.EFFORT:
         return 1.0
     factor = _FACTORS[quantity].get(unit)
     if factor is None:

@@ -132,7 +132,7 @@ class Then(Enum):
     ANSWER = 'success, and the word stays until the time is over'
 
 
-class Step(NamedTuple):
+class ControlStep(NamedTuple):
     """
     One step of a request.
 
@@ -151,16 +151,18 @@ class Step(NamedTuple):
 
 
 #: the first one that fits is taken; every other end of a request is a failure, and ``disable``
-STEPS: tuple[Step, ...] = (
-    Step(_ENABLE, _DISABLE, (Seen.NO_FAULT, Seen.OFF, Seen.READY), Then.SEND_ENABLE),
-    Step(_ENABLE, _ENABLE, (Seen.ENABLED,), Then.SUCCEED_AND_STAY),
-    Step(_DISABLE, _DISABLE, (Seen.OFF,), Then.SUCCEED),
-    Step(_QUICK_STOP, _DISABLE, (Seen.OFF,), Then.SUCCEED),     # of a drive that does not run
-    Step(_QUICK_STOP, _QUICK_STOP, (Seen.OFF, Seen.REPORTS), Then.SUCCEED),
-    Step(_QUICK_STOP, _QUICK_STOP, (Seen.OFF,), Then.ANSWER),   # disable would end the braking
-    Step(_RESET, _DISABLE, (Seen.RESETTABLE,), Then.SEND_RESET),
-    Step(_RESET, _DISABLE, (Seen.NO_FAULT,), Then.SUCCEED),
-    Step(_RESET, _RESET, (Seen.PULSED,), Then.SEND_DISABLE),
+STEPS: tuple[ControlStep, ...] = (
+    ControlStep(_ENABLE, _DISABLE, (Seen.NO_FAULT, Seen.OFF, Seen.READY), Then.SEND_ENABLE),
+    ControlStep(_ENABLE, _ENABLE, (Seen.ENABLED,), Then.SUCCEED_AND_STAY),
+    ControlStep(_DISABLE, _DISABLE, (Seen.OFF,), Then.SUCCEED),
+    ControlStep(_QUICK_STOP, _DISABLE, (Seen.OFF,), Then.SUCCEED),
+    # of a drive that does not run
+    ControlStep(_QUICK_STOP, _QUICK_STOP, (Seen.OFF, Seen.REPORTS), Then.SUCCEED),
+    ControlStep(_QUICK_STOP, _QUICK_STOP, (Seen.OFF,), Then.ANSWER),
+    # disable would end the braking
+    ControlStep(_RESET, _DISABLE, (Seen.RESETTABLE,), Then.SEND_RESET),
+    ControlStep(_RESET, _DISABLE, (Seen.NO_FAULT,), Then.SUCCEED),
+    ControlStep(_RESET, _RESET, (Seen.PULSED,), Then.SEND_DISABLE),
 )
 
 

@@ -86,7 +86,7 @@ class Do(IntEnum):
     WARN = 3
 
 
-class Row(NamedTuple):
+class DutyRow(NamedTuple):
     """
     One rule.
 
@@ -137,38 +137,39 @@ _NAMED = ('It is named as one that may still be running, too, when the bridge en
           'is lost or takes nothing')
 _THIS = 'A drive that this activation has told anything but neutral and disable'
 
-ROWS: tuple[Row, ...] = (
+ROWS: tuple[DutyRow, ...] = (
     # what leaves
-    Row((_NONE,), Happened.RUN_WRITTEN, _OWED, Do.NOTHING, _ACKNOWLEDGED),
-    Row((_NONE,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
-    Row((_STOP_SENT,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
-    Row((_UNHEARD,), Happened.RUN_LEFT, _RUNS_UNHEARD, Do.NOTHING, _THIS),
-    Row((_OWED,), Happened.STOP_LEFT, _NONE, Do.NOTHING, _ACKNOWLEDGED),
-    Row((_RUNS,), Happened.STOP_LEFT, _STOP_SENT, Do.NOTHING, _SHOWN),
-    Row((_RUNS_UNHEARD,), Happened.STOP_LEFT, _UNHEARD, Do.NOTHING, _SILENT),
+    DutyRow((_NONE,), Happened.RUN_WRITTEN, _OWED, Do.NOTHING, _ACKNOWLEDGED),
+    DutyRow((_NONE,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
+    DutyRow((_STOP_SENT,), Happened.RUN_LEFT, _RUNS, Do.NOTHING, _THIS),
+    DutyRow((_UNHEARD,), Happened.RUN_LEFT, _RUNS_UNHEARD, Do.NOTHING, _THIS),
+    DutyRow((_OWED,), Happened.STOP_LEFT, _NONE, Do.NOTHING, _ACKNOWLEDGED),
+    DutyRow((_RUNS,), Happened.STOP_LEFT, _STOP_SENT, Do.NOTHING, _SHOWN),
+    DutyRow((_RUNS_UNHEARD,), Happened.STOP_LEFT, _UNHEARD, Do.NOTHING, _SILENT),
     # what comes back
-    Row(_ANY, Happened.STOPPED, _NONE, Do.NOTHING, _ACKNOWLEDGED),
-    Row((_STOP_SENT,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
-    Row((_UNHEARD,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
+    DutyRow(_ANY, Happened.STOPPED, _NONE, Do.NOTHING, _ACKNOWLEDGED),
+    DutyRow((_STOP_SENT,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
+    DutyRow((_UNHEARD,), Happened.ANSWERED, _NONE, Do.NOTHING, _SHOWN),
     # what does not
-    Row((_RUNS,), Happened.SILENT, _RUNS_UNHEARD, Do.NOTHING, _SILENT),
-    Row((_STOP_SENT,), Happened.SILENT, _UNHEARD, Do.NOTHING, _SILENT),
-    Row(_ANY, Happened.LOST, None, Do.STOP, _WHATEVER),
-    Row(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),  # neutral cycles go on
-    Row((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
+    DutyRow((_RUNS,), Happened.SILENT, _RUNS_UNHEARD, Do.NOTHING, _SILENT),
+    DutyRow((_STOP_SENT,), Happened.SILENT, _UNHEARD, Do.NOTHING, _SILENT),
+    DutyRow(_ANY, Happened.LOST, None, Do.STOP, _WHATEVER),
+    DutyRow(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),  # neutral cycles go on
+    DutyRow((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
     # what the session turns to is told to stop before
-    Row((_STOP_SENT,), Happened.MISROUTED, _RUNS, Do.NOTHING, _ROUTE),
-    Row((_RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
-    Row((_RUNS_UNHEARD, _UNHEARD), Happened.MAPS_DIFFER, None, Do.STOP_BY_NUMBER, _ROUTE),
-    Row(OWING, Happened.STARTED, None, Do.STOP, _BEGUN),
-    Row((_OWED, _RUNS_UNHEARD, _UNHEARD), Happened.SHOWED_UP, None, Do.STOP_BY_NUMBER, _WHATEVER),
-    Row((_RUNS,), Happened.SHOWED_UP, _RUNS_UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
-    Row((_STOP_SENT,), Happened.SHOWED_UP, _UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
-    Row(OWING, Happened.ENDS, None, Do.STOP, _END),
-    Row(OWING, Happened.LEFT_ALONE, None, Do.WARN, _NAMED),
+    DutyRow((_STOP_SENT,), Happened.MISROUTED, _RUNS, Do.NOTHING, _ROUTE),
+    DutyRow((_RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
+    DutyRow((_RUNS_UNHEARD, _UNHEARD), Happened.MAPS_DIFFER, None, Do.STOP_BY_NUMBER, _ROUTE),
+    DutyRow(OWING, Happened.STARTED, None, Do.STOP, _BEGUN),
+    DutyRow((_OWED, _RUNS_UNHEARD, _UNHEARD), Happened.SHOWED_UP, None, Do.STOP_BY_NUMBER,
+            _WHATEVER),
+    DutyRow((_RUNS,), Happened.SHOWED_UP, _RUNS_UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
+    DutyRow((_STOP_SENT,), Happened.SHOWED_UP, _UNHEARD, Do.STOP_BY_NUMBER, _WHATEVER),
+    DutyRow(OWING, Happened.ENDS, None, Do.STOP, _END),
+    DutyRow(OWING, Happened.LEFT_ALONE, None, Do.WARN, _NAMED),
     # what is over
-    Row(_ANY, Happened.SAID, _NONE, Do.NOTHING, _NAMED),
-    Row(_ANY, Happened.ACTIVATED, _NONE, Do.NOTHING, _THIS),
+    DutyRow(_ANY, Happened.SAID, _NONE, Do.NOTHING, _NAMED),
+    DutyRow(_ANY, Happened.ACTIVATED, _NONE, Do.NOTHING, _THIS),
 )
 
 RULES: dict[tuple[Debt, Happened], Rule] = {

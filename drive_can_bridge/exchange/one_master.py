@@ -25,6 +25,10 @@ class InUse(DriveCanError):
     """Another process talks to a drive, or has the serial port open."""
 
 
+class AnotherMaster(DriveCanError):
+    """Somebody else talks to one of the drives."""
+
+
 class Ownership:
     """
     The locks that a process has; a context manager.

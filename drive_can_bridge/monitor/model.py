@@ -14,9 +14,9 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.core.parameters import Value, ValueKind
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.monitor.snapshot import (
-    BridgeSnapshot, BusSnapshot, DriveSnapshot, History, Level, LOG_LIMIT, LogLine, Place,
-    Rate, read_status, Reading, Report, Shown, Snapshot, Status, Times, UNKNOWN,
-)
+    BridgeSnapshot, BusSnapshot, DriveSnapshot, History, Level, LOG_LIMIT, LogLine,
+    ParameterReading, Place, Rate, read_status, Shown, Snapshot, Status, StatusReport, Times,
+    UNKNOWN)
 from drive_can_bridge.monitor.values import ParameterInfo
 
 OFFLINE, ONLINE = 'offline', 'online'
@@ -77,7 +77,7 @@ class DriveRecord:
         self.parameters: dict[str, ParameterInfo] = {}
         self.responses, self.requests = _Values(), _Values()
         self.bits: dict[str, dict[str, bool]] = {}
-        self._report: Report | None = None
+        self._report: StatusReport | None = None
         self._reported_at = math.nan
         self._rate = Rate()
         self._online: bool | None = None
@@ -91,7 +91,7 @@ class DriveRecord:
         """Exchanges per second."""
         return self._rate.value
 
-    def reported(self, report: Report, stamp: float, now: float) -> bool:
+    def reported(self, report: StatusReport, stamp: float, now: float) -> bool:
         """Take what the bridge says; return whether it has begun anew."""
         self._report, self._reported_at = report, now
         if report.state in _SILENT_STATES:
@@ -140,7 +140,7 @@ class DriveRecord:
 
         :param silent: s for which the bridge says nothing any more, or 0.
         """
-        report = self._report or Report('', True, '', Level.STALE, 'nothing known yet')
+        report = self._report or StatusReport('', True, '', Level.STALE, 'nothing known yet')
         state, level, advice, online = self._judge(report, now, silent)
         responses, requests = self.responses, self.requests
         # what it said before it was away is no news of how it is
@@ -159,11 +159,12 @@ class DriveRecord:
             asked_for=0.0 if self._sampled_since is None else now - self._sampled_since,
             place=self.place,
             parameters=tuple(self.parameters.values()),
-            readings={name: Reading(text, now - at)
+            readings={name: ParameterReading(text, now - at)
                       for name, (text, at) in self._readings.items()},
             silent=bool(silent))
 
-    def _judge(self, report: Report, now: float, silent: float) -> tuple[str, Level, str, bool]:
+    def _judge(self, report: StatusReport, now: float, silent: float) -> tuple[str, Level, str,
+                                                                               bool]:
         """Return state, level, advice, and whether it is online."""
         if silent:
             return UNKNOWN, Level.STALE, sentences.bridge_silent_may_run(), False
@@ -180,7 +181,7 @@ class DriveRecord:
         return report.state, report.level, report.message, told_online
 
 
-def _times(report: Report, name: str) -> Times:
+def _times(report: StatusReport, name: str) -> Times:
     return Times(*(report.number(f'{name}_{kind}_ms') for kind in ('mean', 'p99', 'max')))
 
 
@@ -198,9 +199,9 @@ class _BusRecord:
 
     def __init__(self) -> None:
         self._sent, self._received = Rate(), Rate()
-        self._report: Report | None = None
+        self._report: StatusReport | None = None
 
-    def reported(self, report: Report, stamp: float) -> bool:
+    def reported(self, report: StatusReport, stamp: float) -> bool:
         """Take a report; return whether its bridge has begun anew."""
         self._report = report
         anew = self._sent.went_back(report.count('frames_sent'))
@@ -209,7 +210,7 @@ class _BusRecord:
         return anew
 
     def look(self, name: str, *, label: str, silent: float) -> BusSnapshot:
-        report = self._report or Report('', False, name, Level.STALE, '')
+        report = self._report or StatusReport('', False, name, Level.STALE, '')
         if silent:
             return BusSnapshot(name, label, report.bridge, UNKNOWN, Level.STALE,
                                sentences.bridge_silent(bridge=report.bridge))
@@ -275,7 +276,7 @@ class Model:
 
         :param stamp: s, of the message.
         """
-        reports: dict[str, list[Report]] = {}
+        reports: dict[str, list[StatusReport]] = {}
         for status in statuses:
             report = read_status(status)
             if report is not None and report.bridge.startswith(self._prefix):
@@ -402,7 +403,8 @@ class Model:
 
     # -- inside -----------------------------------------------------------------------------------
 
-    def _reported(self, bridge: _BridgeRecord, reports: list[Report], stamp: float, now: float,
+    def _reported(self, bridge: _BridgeRecord, reports: list[StatusReport], stamp: float,
+                  now: float,
                   ) -> None:
         """Take all that one bridge says in one message: what it does not name has gone."""
         bridge.heard(stamp, now)

@@ -50,7 +50,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class StatusReport:
     """
     What a bridge says about a bus or a drive.
 
@@ -91,13 +91,13 @@ class Report:
         return 0 if math.isnan(number) else int(number)
 
 
-def read_status(status: Status) -> Report | None:
+def read_status(status: Status) -> StatusReport | None:
     """Return the report in a status; None: it is not from a bridge."""
     match = _SUBJECT.fullmatch(status.name)
     if match is None or _MARKS[match['kind']] not in status.facts:
         return None
     bridge = f'/{match["bridge"]}'
-    report = Report(
+    report = StatusReport(
         bridge=bridge, is_drive=match['kind'] == 'drive', name=printable(match['name']),
         level=Level(status.level) if 0 <= status.level <= 3 else Level.ERROR,
         message=printable(status.message),
@@ -226,7 +226,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ParameterReading:
     """
     What became of reading a parameter.
 
@@ -297,7 +297,7 @@ class DriveSnapshot:
     asked_for: float = 0.0
     place: Place = Place()
     parameters: tuple[ParameterInfo, ...] = ()
-    readings: Mapping[str, Reading] = field(default_factory=dict)
+    readings: Mapping[str, ParameterReading] = field(default_factory=dict)
     silent: bool = False
 
     def bits_of(self, parameter: str) -> list['Bit']:
@@ -381,7 +381,7 @@ class Snapshot:
         return next((drive for drive in self.drives if drive.name == name), None)
 
 
-class Source(Protocol):
+class ModelSource(Protocol):
     """Fills a model; what takes time happens in :meth:`poll`, and is over soon."""
 
     def poll(self, now: float) -> None:
@@ -404,7 +404,7 @@ class Source(Protocol):
         """Leave."""
 
 
-class Stop(Enum):
+class StopAction(Enum):
     """What ends the movement of a drive."""
 
     QUICK_STOP = 'quick_stop'
@@ -412,7 +412,7 @@ class Stop(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class OperationOutcome:
     """
     What became of a request to a drive.
 
@@ -430,7 +430,7 @@ class Operations(Protocol):
     The answer comes in a later :meth:`poll`, in its thread.
     """
 
-    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
+    def poll(self, stops: Mapping[str, Collection[StopAction]], now: float) -> bool:
         """
         Take the answers that have arrived.
 
@@ -439,10 +439,11 @@ class Operations(Protocol):
         :return: somebody still waits for an answer.
         """
 
-    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+    def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],
+             now: float) -> None:
         """Stop a drive."""
 
-    def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
+    def write(self, drive: str, name: str, value: Value, done: Callable[[OperationOutcome], None],
               now: float) -> None:
         """Write a parameter of a drive."""
 

@@ -24,7 +24,7 @@ from urllib.parse import parse_qs
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from drive_can_bridge.monitor.snapshot import Stop
+from drive_can_bridge.monitor.snapshot import StopAction
 
 #: with colours as in panel.css, which who is not let in does not get
 _PAGE = Template((Path(__file__).parent / 'static' / 'refused.html').read_text(encoding='utf-8'))
@@ -43,7 +43,7 @@ _Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 TOKEN = 'token'
 
 
-class Role(Enum):
+class PanelRole(Enum):
     """What somebody may do."""
 
     VIEWER = 'viewer'
@@ -51,7 +51,7 @@ class Role(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class AccessRefusal:
     """
     Nobody comes in.
 
@@ -71,7 +71,7 @@ class Entry:
     :param cookie: to be set: the token came with the address.
     """
 
-    role: Role
+    role: PanelRole
     cookie: str | None = None
 
 
@@ -84,7 +84,7 @@ class PanelAccess:
     """
 
     def __init__(self, *, port: int, host: str = '127.0.0.1') -> None:
-        self.tokens = {role: secrets.token_urlsafe(24) for role in Role}
+        self.tokens = {role: secrets.token_urlsafe(24) for role in PanelRole}
         self.cookie_name = f'drive_can_panel_{port}'
         self._anywhere = not is_loopback(host)
         self._own = _address(host.strip('[]'))
@@ -94,7 +94,7 @@ class PanelAccess:
             self._names |= {name.lower() for name in names}
 
     def judge(self, scope_type: str, method: str, headers: Iterable[tuple[bytes, bytes]],
-              query: bytes) -> Entry | Refusal:
+              query: bytes) -> Entry | AccessRefusal:
         """
         Decide about a request.
 
@@ -107,17 +107,17 @@ class PanelAccess:
         return (self._judge_host(fields) or _judge_origin(fields, scope_type, method)
                 or self._judge_token(fields, scope_type, method, query))
 
-    def _judge_host(self, fields: Mapping[str, list[str]]) -> Refusal | None:
+    def _judge_host(self, fields: Mapping[str, list[str]]) -> AccessRefusal | None:
         hosts = fields.get('host', [])
         name = _host_name(hosts[0]) if len(hosts) == 1 else ''
         address = _host_address(name)
         if name in self._names or address and (self._anywhere or address == self._own):
             return None
-        return Refusal(403, 'this panel does not answer to that name: use the address that '
+        return AccessRefusal(403, 'this panel does not answer to that name: use the address that '
                             'drive_can panel has printed')
 
     def _judge_token(self, fields: Mapping[str, list[str]], scope_type: str, method: str,
-                     query: bytes) -> Entry | Refusal:
+                     query: bytes) -> Entry | AccessRefusal:
         given = parse_qs(query.decode('latin-1'), keep_blank_values=True).get(TOKEN, [])
         if given and scope_type == 'http' and method == 'GET':
             # who shows a token wants to be who it says, whatever cookie there is
@@ -129,10 +129,11 @@ class PanelAccess:
             role = self._role(_cookie(fields.get('cookie', []), self.cookie_name))
             if role is not None:
                 return Entry(role)
-        return Refusal(401, 'no valid token: open the address that drive_can panel has printed '
+        return AccessRefusal(401,
+                             'no valid token: open the address that drive_can panel has printed '
                             'when it started, with its token')
 
-    def _role(self, token: str) -> Role | None:
+    def _role(self, token: str) -> PanelRole | None:
         found = None
         for role, wanted in self.tokens.items():
             if secrets.compare_digest(token.encode(), wanted.encode()):
@@ -141,19 +142,19 @@ class PanelAccess:
 
 
 def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
-                  ) -> Refusal | None:
+                  ) -> AccessRefusal | None:
     origins, host = fields.get('origin', []), fields['host'][0].lower()
     # https: behind somebody who adds TLS
     if len(origins) > 1 or origins and origins[0].lower() not in (
             f'http://{host}', f'https://{host}'):
-        return Refusal(403, 'another page has sent this (Origin): refused')
+        return AccessRefusal(403, 'another page has sent this (Origin): refused')
     site = fields.get('sec-fetch-site', ['none'])[0]
     # a followed link only looks
     follows = (scope_type == 'http' and method == 'GET'
                and fields.get('sec-fetch-mode', [''])[0] == 'navigate'
                and fields.get('sec-fetch-dest', [''])[0] == 'document')
     if site not in ('same-origin', 'none') and not follows:
-        return Refusal(403, 'another page has sent this (Sec-Fetch-Site): refused')
+        return AccessRefusal(403, 'another page has sent this (Sec-Fetch-Site): refused')
     return None
 
 
@@ -202,7 +203,7 @@ ROLE = 'drive_can_role'
 #: where it stands how a connection comes in
 ENTER = 'drive_can_enter'
 #: a stop finds a place when all are taken
-_STOPS = frozenset(f'/do/{stop.value}' for stop in Stop)
+_STOPS = frozenset(f'/do/{stop.value}' for stop in StopAction)
 #: bytes that a request may carry: a backup has some tens of thousands
 BODY_MAX = 1_000_000
 
@@ -219,8 +220,8 @@ _HEADERS = [
     (b'cross-origin-resource-policy', b'same-origin'),
     (b'cross-origin-opener-policy', b'same-origin'),
 ]
-_NO_PLACE = Refusal(503, 'too many connections are open already: try again in a while')
-_TOO_MUCH = Refusal(413, f'too much at once: at most {BODY_MAX} bytes')
+_NO_PLACE = AccessRefusal(503, 'too many connections are open already: try again in a while')
+_TOO_MUCH = AccessRefusal(413, f'too much at once: at most {BODY_MAX} bytes')
 
 
 class Gate:
@@ -260,7 +261,7 @@ def _enters(scope: Scope, entry: Entry) -> bool:
     """Let a connection in; False: all places are taken."""
     enter = scope.get(ENTER)    # a WebSocket has come in before it became one
     return enter is None or enter(
-        entry.role, stop=entry.role is Role.OPERATOR and scope['path'] in _STOPS)
+        entry.role, stop=entry.role is PanelRole.OPERATOR and scope['path'] in _STOPS)
 
 
 def _limited(receive: Receive) -> Receive:
@@ -289,7 +290,7 @@ def _dressed(send: Send, cookie: str | None) -> Send:
     return dressed
 
 
-async def _refuse(refusal: Refusal, scope: Scope, send: Send) -> None:
+async def _refuse(refusal: AccessRefusal, scope: Scope, send: Send) -> None:
     """Say no, in words."""
     websocket = scope['type'] == 'websocket'
     if websocket and 'websocket.http.response' not in scope.get('extensions', {}):

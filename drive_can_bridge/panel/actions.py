@@ -27,8 +27,8 @@ from starlette.routing import Route
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.text import counted, printable
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Outcome, Stop
-from drive_can_bridge.panel.access import ROLE, Role
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, OperationOutcome, StopAction
+from drive_can_bridge.panel.access import PanelRole, ROLE
 from drive_can_bridge.panel.feed import Feed
 
 #: s that one may take: some protocols read ten parameters a second
@@ -42,7 +42,7 @@ _BUSY = 'others are at it already: try again in a moment'
 
 
 @dataclass(frozen=True, slots=True)
-class Done(Outcome):
+class Done(OperationOutcome):
     """What a command has done: ``file`` is what it wrote."""
 
     file: bytes = b''
@@ -114,17 +114,17 @@ class Actions:
     def routes(self) -> list[Route]:
         """Return what the web server offers."""
         found = [Route(f'/do/{stop.value}', self._stopping(stop), methods=['POST'])
-                 for stop in Stop]
+                 for stop in StopAction]
         found += [Route(f'/do/{name}', _answering(action), methods=['POST'])
                   for name, action in (('write', self._write), ('compare', self._compare),
                                        ('restore', self._restore))]
         return [*found, Route('/do/backup', _answering(self._backup), methods=['GET'])]
 
-    def _stopping(self, stop: Stop) -> Callable[[Request], Awaitable[Response]]:
+    def _stopping(self, stop: StopAction) -> Callable[[Request], Awaitable[Response]]:
         async def action(request: Request) -> Response:
             _operator(request, stop.value.replace('_', ' '))
             wanted = (await _fields(request)).get('drive')
-            if wanted != ALL or stop is not Stop.QUICK_STOP:
+            if wanted != ALL or stop is not StopAction.QUICK_STOP:
                 return _said(await self._feed.stop(self._drive(wanted), stop))
             return await self._stop_all()
         return _answering(action)
@@ -146,17 +146,18 @@ class Actions:
         name, text = fields.get('name'), fields.get('value')
         info = next((info for info in drive.parameters if info.name == name), None)
         if not drive.parameters:
-            return _said(Outcome(False, f'{drive.label} has not told of its parameters yet'))
+            return _said(OperationOutcome(False,
+                                          f'{drive.label} has not told of its parameters yet'))
         if info is None:
             raise _Refused(400, f'{drive.label} has no such parameter')
         if info.refusal:
-            return _said(Outcome(False, f'{info.name}: {info.refusal}'))
+            return _said(OperationOutcome(False, f'{info.name}: {info.refusal}'))
         if not isinstance(text, str):
             raise _Refused(400, f'{info.name}: no value, allowed is a string: what a person types')
         try:
             value = info.parse(text)
         except ValueRefused as error:
-            return _said(Outcome(False, str(error)))
+            return _said(OperationOutcome(False, str(error)))
         outcome = await self._feed.write(drive.name, info.name, value)
         # what the drive has now, whatever has become of it
         if info.readable:
@@ -228,7 +229,7 @@ class Actions:
 
 
 def _operator(request: Request, what: str) -> None:
-    if request.scope[ROLE] is not Role.OPERATOR:
+    if request.scope[ROLE] is not PanelRole.OPERATOR:
         raise _Refused(403, f"{what} needs the operator's token; this browser came with the "
                             f"viewer's")
 
@@ -250,7 +251,7 @@ async def _fields(request: Request) -> dict[str, Any]:
     return fields
 
 
-def _said(outcome: Outcome) -> Response:
+def _said(outcome: OperationOutcome) -> Response:
     return JSONResponse({'success': outcome.success, 'text': outcome.text})
 
 

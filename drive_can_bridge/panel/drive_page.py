@@ -19,7 +19,7 @@ from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, Shown, Snapshot, Times
 from drive_can_bridge.monitor.summary import tone_of
 from drive_can_bridge.monitor.values import ParameterInfo
-from drive_can_bridge.panel.access import Role
+from drive_can_bridge.panel.access import PanelRole
 from drive_can_bridge.panel.feed import Feed, stops, View
 from drive_can_bridge.panel.parts import (
     advice, box, button, Changing, class_of, in_script, Look, marked, place_in_words, series_name,
@@ -197,11 +197,11 @@ class ParameterTable:
         return [info for info in self._parameters
                 if all(word in _searchable(info) for word in wanted)]
 
-    def _make_rows(self, seen: tuple[ParameterInfo, ...]) -> list['_Row']:
-        return [_Row(self._drive, info, writes=self._writes) for info in seen]
+    def _make_rows(self, seen: tuple[ParameterInfo, ...]) -> list['_ParameterRow']:
+        return [_ParameterRow(self._drive, info, writes=self._writes) for info in seen]
 
 
-class _Row:
+class _ParameterRow:
     def __init__(self, drive: str, info: ParameterInfo, *, writes: bool) -> None:
         self._info = info
         self._text: str | None = None
@@ -278,11 +278,11 @@ class DrivePage:
     :param allow_writes: parameters may be written by an operator.
     """
 
-    def __init__(self, feed: Feed, name: str, role: Role, *, allow_writes: bool) -> None:
+    def __init__(self, feed: Feed, name: str, role: PanelRole, *, allow_writes: bool) -> None:
         self._feed = feed
         self._name = name
         self._role = role
-        self._writes = allow_writes and role is Role.OPERATOR
+        self._writes = allow_writes and role is PanelRole.OPERATOR
         self.view = View(self.show, [name])
         with box('note') as self._gone:
             words(f'There is no drive {name} now', 'title')
@@ -301,15 +301,15 @@ class DrivePage:
         content = self._content.of(('drive', stops(drive)))
         content.show(drive, snapshot)
 
-    def _make(self, _: Any) -> '_Content':
+    def _make(self, _: Any) -> '_PageContent':
         drive = self._drive
         if drive is None:
             raise RuntimeError('made before there is a drive')
-        return _Content(self._feed, self.view, drive, self._role, writes=self._writes)
+        return _PageContent(self._feed, self.view, drive, self._role, writes=self._writes)
 
 
-class _Content:
-    def __init__(self, feed: Feed, view: View, drive: DriveSnapshot, role: Role, *,
+class _PageContent:
+    def __init__(self, feed: Feed, view: View, drive: DriveSnapshot, role: PanelRole, *,
                  writes: bool) -> None:
         head = box('head')
         self._look = Look(head, 'head')

@@ -14,8 +14,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.monitor.model import CONTROL_STATE, Model
 from drive_can_bridge.monitor.snapshot import (
-    DriveSnapshot, Operations, Outcome, Snapshot, Source, Stop,
-)
+    DriveSnapshot, ModelSource, OperationOutcome, Operations, Snapshot, StopAction)
 
 #: s between two looks, and while somebody waits for an answer
 PERIOD = 0.5
@@ -47,7 +46,7 @@ class Feed:
     :param model: what ``source`` fills.
     """
 
-    def __init__(self, source: Source, operations: Operations, model: Model,
+    def __init__(self, source: ModelSource, operations: Operations, model: Model,
                  clock: Clock) -> None:
         self._clock = clock
         self._source = source
@@ -79,7 +78,7 @@ class Feed:
         closely = frozenset().union(*(view.focus for view in self._views))
         self._source.focus(*closely)
         waiting = self._operations.poll(
-            {**dict.fromkeys(self.snapshot.unheard, (Stop.QUICK_STOP,)),
+            {**dict.fromkeys(self.snapshot.unheard, (StopAction.QUICK_STOP,)),
              **{drive.name: stops(drive) for drive in self.snapshot.drives}}, now)
         if now >= self._due:
             self._due = now + PERIOD
@@ -118,23 +117,24 @@ class Feed:
         """Return a drive by its full name."""
         return self.snapshot.drive(name)
 
-    async def stop(self, drive: DriveSnapshot, stop: Stop) -> Outcome:
+    async def stop(self, drive: DriveSnapshot, stop: StopAction) -> OperationOutcome:
         """Stop a drive; return what became of it."""
         if stop not in stops(drive):
-            return Outcome(False, 'no control word: only quick stop stops it')
+            return OperationOutcome(False, 'no control word: only quick stop stops it')
         return await self._stop(drive.name, stop)
 
-    async def stop_all(self) -> list[tuple[str, Outcome]]:
+    async def stop_all(self) -> list[tuple[str, OperationOutcome]]:
         """Stop all drives at once, whether their bridges tell of them or not; by full name."""
         names = [*(drive.name for drive in self.snapshot.drives), *self.snapshot.unheard]
-        outcomes = await asyncio.gather(*(self._stop(name, Stop.QUICK_STOP) for name in names))
+        outcomes = await asyncio.gather(*(self._stop(name,
+                                                     StopAction.QUICK_STOP) for name in names))
         return list(zip(names, outcomes))
 
-    async def _stop(self, drive: str, stop: Stop) -> Outcome:
+    async def _stop(self, drive: str, stop: StopAction) -> OperationOutcome:
         return await self._told(lambda done: self._operations.stop(
             drive, stop, done, self._clock.now()))
 
-    async def write(self, drive: str, name: str, value: Value) -> Outcome:
+    async def write(self, drive: str, name: str, value: Value) -> OperationOutcome:
         """Write a parameter; return what became of it."""
         return await self._told(lambda done: self._operations.write(
             drive, name, value, done, self._clock.now()))
@@ -158,6 +158,6 @@ class Feed:
         return await future
 
 
-def stops(drive: DriveSnapshot) -> tuple[Stop, ...]:
+def stops(drive: DriveSnapshot) -> tuple[StopAction, ...]:
     """Return what stops a drive: quick stop each of them, disable one with a control word."""
-    return tuple(Stop) if CONTROL_STATE in drive.facts else (Stop.QUICK_STOP,)
+    return tuple(StopAction) if CONTROL_STATE in drive.facts else (StopAction.QUICK_STOP,)

@@ -32,7 +32,7 @@ from drive_can_bridge.monitor.snapshot import (
 from drive_can_bridge.monitor.summary import (
     counts, FEW, in_order, principal, Tone, tone_of, Trouble, troubles,
 )
-from drive_can_bridge.panel.access import Gate, PanelAccess, plain_page, ROLE, Role
+from drive_can_bridge.panel.access import Gate, PanelAccess, PanelRole, plain_page, ROLE
 from drive_can_bridge.panel.actions import Actions, ALL
 from drive_can_bridge.panel.drive_page import DrivePage
 from drive_can_bridge.panel.feed import Feed, stops, View
@@ -51,7 +51,7 @@ class Overview:
     :param place: where bridges are looked for, in words.
     """
 
-    def __init__(self, role: Role, place: str) -> None:
+    def __init__(self, role: PanelRole, place: str) -> None:
         self._role = role
         self._snapshot = Snapshot()
         self._nothing = words(f'No bridge yet. Looking for one in {place}.', 'note')
@@ -63,7 +63,7 @@ class Overview:
             self._filter.props('dense outlined clearable debounce=200')
             self._filter.on_value_change(lambda: self.show(self._snapshot))
         self._troubles = Changing(box('troubles'), _make_troubles)
-        self._buses = Changing(box('cards'), lambda names: [_Bus() for _ in names])
+        self._buses = Changing(box('cards'), lambda names: [_BusCard() for _ in names])
         self._drives = Changing(box('drives'), self._make_drives)
         with box('legend dim') as self._legend:
             for tone in reversed(Tone):
@@ -112,7 +112,7 @@ class Overview:
     def _make_drives(self, key: tuple[Any, ...]) -> list[Any]:
         many = key[0]
         with box('section rows' if many else 'cards'):
-            return [(_Row if many else _Card)(drive, self._role)
+            return [(_DriveRow if many else _Card)(drive, self._role)
                     for drive in self._snapshot.drives]
 
 
@@ -128,7 +128,7 @@ def _make_troubles(found: tuple[Trouble, ...]) -> None:
                     words(f'{trouble.who}{trouble.text}')
 
 
-class _Bus:
+class _BusCard:
     def __init__(self) -> None:
         element = box('bus')
         self._look = Look(element, 'bus')
@@ -153,7 +153,7 @@ class _Bus:
 class _Card:
     """One drive among a few."""
 
-    def __init__(self, drive: DriveSnapshot, role: Role) -> None:
+    def __init__(self, drive: DriveSnapshot, role: PanelRole) -> None:
         element = marked(box('card'), drive=drive.name)
         self._look = Look(element, 'card')
         with element:
@@ -176,10 +176,10 @@ class _Card:
         self._place.set_text(place_in_words(drive))
 
 
-class _Row:
+class _DriveRow:
     """One drive among many."""
 
-    def __init__(self, drive: DriveSnapshot, role: Role) -> None:
+    def __init__(self, drive: DriveSnapshot, role: PanelRole) -> None:
         self._element = marked(box('drive-row'), drive=drive.name)
         self._look = Look(self._element, 'drive-row')
         self._order = -1
@@ -309,7 +309,7 @@ PAGES_MAX = 20
 
 
 @dataclass(frozen=True)
-class Setting:
+class PanelSetting:
     """
     What holds for the whole panel.
 
@@ -323,7 +323,7 @@ class Setting:
     allow_writes: bool = False
 
 
-def application(feed: Feed, access: PanelAccess, setting: Setting) -> ASGIApp:
+def application(feed: Feed, access: PanelAccess, setting: PanelSetting) -> ASGIApp:
     """Make the web application; it runs the feed."""
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -342,8 +342,8 @@ def application(feed: Feed, access: PanelAccess, setting: Setting) -> ASGIApp:
     return Gate(web, access)
 
 
-def _add_pages(feed: Feed, setting: Setting) -> None:
-    def shown(request: Request, here: str, make: Callable[[Role], View]) -> Response | None:
+def _add_pages(feed: Feed, setting: PanelSetting) -> None:
+    def shown(request: Request, here: str, make: Callable[[PanelRole], View]) -> Response | None:
         role = request.scope[ROLE]
         if _full(role):
             return _said(request, 503, f'{PAGES_MAX} pages are open already with this token: '
@@ -369,7 +369,7 @@ def _add_pages(feed: Feed, setting: Setting) -> None:
         return shown(request, '/log', lambda role: View(LogPage().show))
 
 
-def _full(role: Role) -> bool:
+def _full(role: PanelRole) -> bool:
     pages = sum(client.request.scope[ROLE] is role for client in Client.instances.values())
     return pages > PAGES_MAX  # the one that is being made is among them
 
@@ -386,7 +386,7 @@ def _said(request: Request, status: int, reason: str) -> Response:
     return PlainTextResponse(f'{reason}\n', status)
 
 
-def _frame(here: str, role: Role, setting: Setting) -> tuple[Element, Banner]:
+def _frame(here: str, role: PanelRole, setting: PanelSetting) -> tuple[Element, Banner]:
     """Make what all pages have; return where the page goes, and what stands above it."""
     ui.add_head_html(_HEAD)
     with box('bar'):
@@ -396,7 +396,7 @@ def _frame(here: str, role: Role, setting: Setting) -> tuple[Element, Banner]:
         words(setting.robot, 'robot')
         words(role.value, 'role')
         box('space')
-        if role is Role.OPERATOR:
+        if role is PanelRole.OPERATOR:
             button('Quick stop all', 'stop',
                    f"panel.stop('quick_stop', {in_script(ALL)}, 'all drives')"
                    ).props(f'title="{_STOP_ALL}"')

@@ -15,12 +15,12 @@ from nicegui import ui
 from nicegui.element import Element
 
 from drive_can_bridge.core import sentences
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, Stop
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Shown, Snapshot, StopAction
 from drive_can_bridge.monitor.summary import silence, Tone
-from drive_can_bridge.panel.access import Role
+from drive_can_bridge.panel.access import PanelRole
 from drive_can_bridge.panel.feed import stops
 
-_STOPS = {Stop.QUICK_STOP: 'Quick stop', Stop.DISABLE: 'Disable'}
+_STOPS = {StopAction.QUICK_STOP: 'Quick stop', StopAction.DISABLE: 'Disable'}
 
 
 def box(classes: str = '', tag: str = 'div') -> Element:
@@ -101,13 +101,13 @@ def in_script(value: Any) -> str:
     return json.dumps(value).replace('<', '\\u003c')
 
 
-def stop_buttons(drive: DriveSnapshot, role: Role) -> None:
+def stop_buttons(drive: DriveSnapshot, role: PanelRole) -> None:
     """
     Make the buttons that stop a drive, those that it has, for an operator.
 
     They are never off: its bridge may only seem to be silent, and what does not arrive is said.
     """
-    if role is Role.OPERATOR:
+    if role is PanelRole.OPERATOR:
         with box('stops'):
             for stop in stops(drive):
                 button(_STOPS[stop], 'danger', f'panel.stop({in_script(stop.value)}, '

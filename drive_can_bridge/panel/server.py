@@ -19,7 +19,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
-from drive_can_bridge.panel.access import ENTER, Entry, PanelAccess, Role
+from drive_can_bridge.panel.access import ENTER, Entry, PanelAccess, PanelRole
 
 #: what is the matter with a port, not with the address
 _OF_THE_PORT = (errno.EADDRINUSE, errno.EACCES, errno.EPERM)
@@ -95,13 +95,13 @@ class Connection(H11Protocol):
     def handle_websocket_upgrade(self, event: Any) -> None:
         # a WebSocket is no connection of this kind any more when the gate hears of it
         entry = self._access.judge('websocket', 'GET', self.headers, b'')
-        role = entry.role if isinstance(entry, Entry) else Role.VIEWER
+        role = entry.role if isinstance(entry, Entry) else PanelRole.VIEWER
         if not self.enter(role, stop=False):
             self.show_out()
             return
         super().handle_websocket_upgrade(event)
 
-    def enter(self, role: Role, *, stop: bool) -> bool:
+    def enter(self, role: PanelRole, *, stop: bool) -> bool:
         """
         Come in.
 
@@ -109,7 +109,7 @@ class Connection(H11Protocol):
         :return: False: all places are taken.
         """
         inside = len(self.connections) - len(self._outside)
-        places = CONNECTIONS_MAX - (0 if role is Role.OPERATOR else KEPT_FOR_OPERATORS)
+        places = CONNECTIONS_MAX - (0 if role is PanelRole.OPERATOR else KEPT_FOR_OPERATORS)
         if self in self._outside and inside >= places and not stop:
             return False
         self._outside.pop(self, None)

@@ -139,7 +139,7 @@ def access_of(text: str) -> str:
 # -- rows and columns -----------------------------------------------------------------------------
 
 
-class Row(NamedTuple):
+class CsvRow(NamedTuple):
     """
     A row: the line it begins in, and its cells without space around them.
 
@@ -155,7 +155,7 @@ class Row(NamedTuple):
         return self.cells[place] if place is not None and place < len(self.cells) else ''
 
 
-def _read_rows(text: str) -> list[Row]:
+def _read_rows(text: str) -> list[CsvRow]:
     """
     Split a text into rows, with what separates its cells.
 
@@ -172,9 +172,9 @@ def _read_rows(text: str) -> list[Row]:
     rows, line = [], 1
     try:
         for cells in reader:
-            rows.append(Row(line, tuple(' '.join(cell.split()) for cell in cells),
-                            max((cell.count(delimiter) for cell in cells if '\n' in cell),
-                                default=0)))
+            rows.append(CsvRow(line, tuple(' '.join(cell.split()) for cell in cells),
+                               max((cell.count(delimiter) for cell in cells if '\n' in cell),
+                                   default=0)))
             line = reader.line_num + 1
     except csv.Error as error:
         raise ImportFailed(f'line {line}: cannot be split into cells: {error}') from None
@@ -202,12 +202,12 @@ def _columns_of(heading: str) -> list[str]:
     return ['number', 'name'] if _AMBIGUOUS & set(words) else []
 
 
-def _recognised(row: Row) -> int:
+def _recognised(row: CsvRow) -> int:
     """Return how much a row looks like headings: how many of its cells are known ones."""
     return len({tuple(_columns_of(cell)) for cell in row.cells} - {()})
 
 
-class Table:
+class CsvTable:
     """
     A table with what its columns hold.
 
@@ -216,7 +216,7 @@ class Table:
     :raises WrongColumns: something given is not there.
     """
 
-    def __init__(self, rows: Sequence[Row], given: Mapping[str, str]) -> None:
+    def __init__(self, rows: Sequence[CsvRow], given: Mapping[str, str]) -> None:
         head = _head(rows, [word for word in given.values() if word and not word.isdecimal()])
         self.headings = head.cells if head is not None else ()
         below = rows[rows.index(head) + 1:] if head is not None else rows
@@ -233,7 +233,7 @@ class Table:
         # beside a number an "Index" is that of an array
         place = self.columns.get('index', 0)
         if 'number' in self.columns and 'index' not in given and _plain_heading(
-                Row(0, self.headings).cell(place)) in ('index', 'idx', 'indice'):
+                CsvRow(0, self.headings).cell(place)) in ('index', 'idx', 'indice'):
             del self.columns['index']
             self.columns.setdefault('subindex', place)
         if not {'number', 'index'} & set(self.columns):
@@ -250,14 +250,14 @@ class Table:
                 self.cell(row, 'subindex') for row in self.rows))):
             self.hexadecimal.add('subindex')
 
-    def cell(self, row: Row, column: str) -> str:
+    def cell(self, row: CsvRow, column: str) -> str:
         """Return a cell of a row; '' where there is none, or it says nothing."""
         text = row.cell(self.columns.get(column))
         return '' if text.casefold() in _NOTHING else text
 
     def heading(self, column: str) -> str:
         """Return the heading of a column; '' where there is none."""
-        return Row(0, self.headings).cell(self.columns.get(column))
+        return CsvRow(0, self.headings).cell(self.columns.get(column))
 
     def notes(self) -> list[str]:
         """Say what the columns were taken for."""
@@ -282,7 +282,7 @@ class Table:
                    for cell in cells) > len(cells) / 2
 
 
-def _head(rows: Sequence[Row], given: Sequence[str]) -> Row | None:
+def _head(rows: Sequence[CsvRow], given: Sequence[str]) -> CsvRow | None:
     """
     Return the row of headings, None without one.
 
@@ -290,7 +290,7 @@ def _head(rows: Sequence[Row], given: Sequence[str]) -> Row | None:
     """
     candidates = rows[:_HEAD_ROWS]
     wanted = {word.casefold() for word in given}
-    best = max(candidates, key=_recognised, default=Row(0, ()))
+    best = max(candidates, key=_recognised, default=CsvRow(0, ()))
     if not wanted:
         return best if _recognised(best) >= 2 else None
     for row in candidates:
@@ -310,13 +310,13 @@ def read_table(text: str, given: Mapping[str, str], sign: str = '',
     """
     Read what a table offers.
 
-    :param given: columns by heading or place, as for :class:`Table`.
+    :param given: columns by heading or place, as for :class:`CsvTable`.
     :param sign: the decimal sign, where somebody says it.
     :param protocols: that the drive speaks; 8-bit types exist for cia402 only.
     :raises ImportFailed: it is no table of parameters.
     :raises WrongColumns: a given column is not there.
     """
-    table = Table(_read_rows(text), given)
+    table = CsvTable(_read_rows(text), given)
     reader = _RowReader(table, sign or decimal_sign(
         table.cell(row, column) for row in table.rows for column in _NUMERIC),
         bytes_stay=tuple(protocols) == ('cia402',))
@@ -346,12 +346,12 @@ Cells = Mapping[str, str]
 class _RowReader:
     """Makes a draft of a row."""
 
-    def __init__(self, table: Table, sign: str, *, bytes_stay: bool) -> None:
+    def __init__(self, table: CsvTable, sign: str, *, bytes_stay: bool) -> None:
         self._table = table
         self._sign = sign
         self._bytes_stay = bytes_stay
 
-    def draft(self, row: Row) -> Draft:
+    def draft(self, row: CsvRow) -> Draft:
         """
         Read a row.
 

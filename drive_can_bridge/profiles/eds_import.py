@@ -97,7 +97,7 @@ def canopen_library() -> ModuleType:
 
 
 @dataclass(slots=True)
-class Section:
+class EdsSection:
     """
     A section with its values as written; keys are compared without case.
 
@@ -118,12 +118,12 @@ class Section:
         return LeftOut(self.line, f'[{self.name}]', one_line(self.get('ParameterName')), reason)
 
 
-_NONE = Section('', 0)
+_NONE = EdsSection('', 0)
 
 
-def _take_apart(text: str, found: FileContent) -> dict[str, Section]:
+def _take_apart(text: str, found: FileContent) -> dict[str, EdsSection]:
     """Return the sections of a file by name in lower case, and note what is odd."""
-    sections: dict[str, Section] = {}
+    sections: dict[str, EdsSection] = {}
     section = _NONE
     for line, row in enumerate(text.split('\n'), start=1):
         row = row.strip()
@@ -135,7 +135,7 @@ def _take_apart(text: str, found: FileContent) -> dict[str, Section]:
             continue
         heading = _HEADING.fullmatch(row) if row[0] == '[' else None
         if heading is not None:
-            section = Section(heading[1].strip(), line)
+            section = EdsSection(heading[1].strip(), line)
             first = sections.setdefault(section.name.lower(), section)
             twice = f'stands twice, the first in line {first.line} counts'
             if first is not section and _OBJECT.fullmatch(section.name.lower()):
@@ -196,7 +196,7 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     return found
 
 
-def _choose_axis(sections: Mapping[str, Section], found: FileContent,
+def _choose_axis(sections: Mapping[str, EdsSection], found: FileContent,
                  wanted: int | None) -> int | None:
     """
     Leave out the objects of other axes, and return how far those of this one are from the first.
@@ -227,7 +227,7 @@ def _choose_axis(sections: Mapping[str, Section], found: FileContent,
     return len(_AXIS) * (axis - 1)
 
 
-def _refuse_others(sections: Mapping[str, Section]) -> None:
+def _refuse_others(sections: Mapping[str, EdsSection]) -> None:
     """
     Look what the file says that the device is.
 
@@ -254,7 +254,7 @@ class _Place:
 
     index: int
     subindex: int
-    section: Section
+    section: EdsSection
     title: str
     parent: str = ''
     element: bool = False
@@ -263,7 +263,7 @@ class _Place:
 class _ObjectReader:
     """Reads all objects."""
 
-    def __init__(self, library: ModuleType, sections: dict[str, Section], found: FileContent, *,
+    def __init__(self, library: ModuleType, sections: dict[str, EdsSection], found: FileContent, *,
                  bytes_stay: bool) -> None:
         self._library = library
         self._sections = sections
@@ -299,9 +299,9 @@ class _ObjectReader:
             self._found.notes.append(f'{counts} sub-indices 0 left out: they hold the number of '
                                      'entries')
 
-    def _grouped(self) -> dict[int, dict[int, list[Section]]]:
+    def _grouped(self) -> dict[int, dict[int, list[EdsSection]]]:
         """Return the sections by index and sub-index; -1: the head."""
-        grouped: dict[int, dict[int, list[Section]]] = {}
+        grouped: dict[int, dict[int, list[EdsSection]]] = {}
         others = 0
         for name, section in self._sections.items():
             match = _OBJECT.fullmatch(name)
@@ -319,7 +319,7 @@ class _ObjectReader:
             self._found.notes.append(f'{others} sections of other axes left out')
         return grouped
 
-    def _places(self, index: int, subs: dict[int, list[Section]]) -> Iterator[_Place]:
+    def _places(self, index: int, subs: dict[int, list[EdsSection]]) -> Iterator[_Place]:
         """Yield the entries of an object: a record wherever it has sub-indices."""
         [head] = subs.pop(-1, [_NONE])
         if index < _COMMUNICATION.start:
@@ -358,7 +358,7 @@ class _ObjectReader:
         if not subs and not count:
             yield _Place(index, 0, head, parent)
 
-    def _type_of(self, section: Section) -> int:
+    def _type_of(self, section: EdsSection) -> int:
         """
         Return the number of the type.
 
@@ -479,7 +479,7 @@ def _integer_or(text: str, otherwise: int) -> int:
         return otherwise
 
 
-def _access(section: Section, remarks: list[str]) -> str:
+def _access(section: EdsSection, remarks: list[str]) -> str:
     """Return the access; where the file does not say it, what does no harm."""
     text = _REMARK.split(section.get('AccessType'), maxsplit=1)[0].strip()
     try:
@@ -491,7 +491,7 @@ def _access(section: Section, remarks: list[str]) -> str:
     return 'ro'
 
 
-def _limits(section: Section, kind: ParameterType, remarks: list[str]) -> dict[str, int]:
+def _limits(section: EdsSection, kind: ParameterType, remarks: list[str]) -> dict[str, int]:
     """
     Return the limits as raw integers.
 
@@ -537,7 +537,7 @@ def _ordered(limits: Mapping[str, int]) -> bool:
 # -- units ----------------------------------------------------------------------------------------
 
 
-def _take_unit(draft: Draft, section: Section, unit_text: str) -> None:
+def _take_unit(draft: Draft, section: EdsSection, unit_text: str) -> None:
     """Take scale and unit where keys of the file, or comments of Sevcon's, have them."""
     remarks = draft.remarks
     keys = 'Factor', 'Unit'
@@ -603,7 +603,7 @@ def _take_step(draft: Draft) -> bool:
     return bool(name)
 
 
-def _take_sevcon(draft: Draft, section: Section, kind: ParameterType) -> None:
+def _take_sevcon(draft: Draft, section: EdsSection, kind: ParameterType) -> None:
     """Take names of values and the access level of Sevcon's comments."""
     if not section.comments:
         return
@@ -628,7 +628,7 @@ def _take_sevcon(draft: Draft, section: Section, kind: ParameterType) -> None:
 # -- CiA 402 --------------------------------------------------------------------------------------
 
 
-def _value(section: Section) -> int | None:
+def _value(section: EdsSection) -> int | None:
     """Return what the file says that an object holds; None: it does not."""
     try:
         return _integer(section.get('ParameterValue') or section.get('DefaultValue'))
@@ -636,7 +636,7 @@ def _value(section: Section) -> int | None:
         return None
 
 
-def _turning(sections: Mapping[str, Section], shift: int) -> str:
+def _turning(sections: Mapping[str, EdsSection], shift: int) -> str:
     """Say what makes the revolutions that positions are counted in: CiA 402 has a gear, 6091h."""
     motor, shaft = (_value(sections.get(f'{0x6091 + shift:04x}sub{number}', _NONE))
                     for number in (1, 2))
@@ -647,7 +647,7 @@ def _turning(sections: Mapping[str, Section], shift: int) -> str:
             '(joint: gear_ratio)')
 
 
-def _si_unit(section: Section) -> tuple[str, float] | None:
+def _si_unit(section: EdsSection) -> tuple[str, float] | None:
     """Return the unit that 60A8h or 60A9h names in the file, and how many of it a step is."""
     value = _value(section)
     if value is None:
@@ -657,7 +657,7 @@ def _si_unit(section: Section) -> tuple[str, float] | None:
     return (name, count * 10.0 ** exponent) if name and exponent in _EXPONENTS else None
 
 
-def _standardise(found: FileContent, sections: Mapping[str, Section], shift: int) -> None:
+def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: int) -> None:
     """
     Call standard objects by their names, and say what is known of them.
 

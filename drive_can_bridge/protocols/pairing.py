@@ -3,8 +3,8 @@
 Which answer belongs to which request, for observers of all families.
 
 Answered, late, unasked or missed: :class:`CyclicWatch` says it of a cyclic service,
-:class:`Requests` of single reads and writes, the rounds of :class:`RoundWatch` among them. What a
-request is about is a *span* of parameters, as the family addresses them.
+:class:`PendingRequests` of single reads and writes, the rounds of :class:`RoundWatch` among them.
+What a request is about is a *span* of parameters, as the family addresses them.
 """
 
 from collections.abc import Callable, Container, Hashable, Sequence
@@ -155,7 +155,7 @@ class RequestContent(NamedTuple):
     title: str = ''
 
 
-class Requests(Generic[Key]):
+class PendingRequests(Generic[Key]):
     """
     The requests of one drive, and their answers.
 

@@ -19,7 +19,7 @@ from rclpy.service import Service
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.core import sentences
 from drive_can_bridge.ros.rcl.extension import GONE
-from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
+from drive_can_bridge.ros.rcl.services import RclServices, ReadyResponse, Unreachable
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
 #: clients that are remembered as out of reach
@@ -84,7 +84,7 @@ class ServiceAnswers:
         self._late.put(None)
         self._thread.join(5.0)
 
-    def _defer(self, rcl: RclServices, response: Response) -> None:
+    def _defer(self, rcl: RclServices, response: ReadyResponse) -> None:
         """Leave an answer to the thread that may wait; enough wait there: it is lost."""
         caller = response.caller
         with self._lock:
@@ -97,7 +97,7 @@ class ServiceAnswers:
         else:
             self._tell(response.service)
 
-    def _deliver(self, rcl: RclServices, response: Response) -> None:
+    def _deliver(self, rcl: RclServices, response: ReadyResponse) -> None:
         caller = response.caller
         try:
             rcl.send(response)
@@ -133,7 +133,7 @@ class ServiceAnswers:
         job()
         return True
 
-    def _deliver_late(self, rcl: RclServices, response: Response) -> None:
+    def _deliver_late(self, rcl: RclServices, response: ReadyResponse) -> None:
         with self._lock:
             if response.caller in self._waiting:
                 self._waiting[response.caller] -= 1

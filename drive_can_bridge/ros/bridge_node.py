@@ -62,7 +62,7 @@ from drive_can_bridge.ros.rcl.services import RclServices
 from drive_can_bridge.ros.rcl.unfit import Unfit
 from drive_can_bridge.ros.recognition import (
     BRIDGES, bridges_among, drives_among, Entries)
-from drive_can_bridge.ros.requests import Requests
+from drive_can_bridge.ros.requests import ServiceRequests
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorServices, ExecutorThread, ServiceThread
 from drive_can_bridge.transport import adapters
@@ -231,7 +231,7 @@ class BridgeNode(LifecycleNode):
             spinner.part()
         self._relayed = bool(why_relayed)
         self._answers = ServiceAnswers(rcl, voice.warn, clock)
-        self._requests = Requests(rcl, voice.warning, voice.error, self.context, clock)
+        self._requests = ServiceRequests(rcl, voice.warning, voice.error, self.context, clock)
         self._open_bus = open_bus
         self._spinner = spinner
         self._fatal = fatal

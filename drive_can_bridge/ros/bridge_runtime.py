@@ -32,15 +32,14 @@ from drive_can_bridge.memory import data_limit, MEGABYTE, reserve
 from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
-from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, Report
+from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, StatusEntry
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import Joints
-from drive_can_bridge.ros.local_way import LocalWay
+from drive_can_bridge.ros.local_way import LocalWayServer
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.passing import Passing
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import (
-    ExecutorThread, PeriodicThread, Question, ServiceThread)
+from drive_can_bridge.ros.threads import Awaited, ExecutorThread, PeriodicThread, ServiceThread
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.failures import with_outlook
@@ -98,7 +97,7 @@ class Occasions:
         """Record that a bus is gone."""
         self._trigger(bus, 'bus_lost', rank=_BUS_LOST_RANK)
 
-    def reported(self, report: Report, bus: str) -> None:
+    def reported(self, report: StatusEntry, bus: str) -> None:
         """Take a diagnostic status."""
         if report.level != DiagnosticStatus.ERROR:
             self._bad.discard(report.name)
@@ -183,7 +182,7 @@ class FlightWatch:
         if not buses:
             response.success, response.message = False, sentences.nothing_recorded()
             return response
-        told = await Question[list[tuple[str, str]]](partial(self._ask, buses))
+        told = await Awaited[list[tuple[str, str]]](partial(self._ask, buses))
         paths = [path for path, _ in told if path]
         refusals = [refusal for path, refusal in told if not path]
         response.success = bool(paths) and not refusals
@@ -283,7 +282,7 @@ class BridgeRuntime:
             closing.callback(self._attendance.end)
             self._passing = Passing(node, clock, log.warning)
             closing.callback(self._passing.end)
-            self.local_way = LocalWay(
+            self.local_way = LocalWayServer(
                 presence, domain, name, self.drives, list(configuration.drives), seen=seen,
                 get=get, spinner=spinner, pass_on=self._passing.begin, warn=log.warning,
                 clock=clock)

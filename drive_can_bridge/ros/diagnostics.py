@@ -115,7 +115,7 @@ def _never_seen(drive: DriveNode) -> bool:
 
 
 @dataclass
-class Report:
+class StatusEntry:
     """One diagnostic status before it becomes a message."""
 
     name: str
@@ -139,7 +139,7 @@ class BusReporter:
         self._reported_at = math.nan
         self._load = 0.0
 
-    def report(self, now: float) -> Report:
+    def report(self, now: float) -> StatusEntry:
         """Return the report for the time since the last one."""
         exchange, link = self._exchange, self._exchange.link
         bits = exchange.received_bits + exchange.sent_bits
@@ -188,7 +188,7 @@ class BusReporter:
             level = DiagnosticStatus.WARN
             message = sentences.adapter_keeps(
                 traits.title, traits.latency, self._period, traits.remedy)
-        return Report(f'bus {exchange.bus.name}', level, message, {
+        return StatusEntry(f'bus {exchange.bus.name}', level, message, {
             'state': state,
             'code': message.code,
             'load_percent': f'{self._load:.1f}',
@@ -220,7 +220,7 @@ class DriveReporter:
         self._requests = 0
         self.inactive = sentences.activate_bridge()
 
-    def report(self, now: float) -> Report:
+    def report(self, now: float) -> StatusEntry:
         """Return the report of this moment."""
         drive, session = self._drive, self._drive.session
         statistics = session.statistics
@@ -259,7 +259,7 @@ class DriveReporter:
             'last_parameter_error': statistics.last_request_error,
             **more,
         }
-        return Report(f'drive {drive.name}', level, message, facts)
+        return StatusEntry(f'drive {drive.name}', level, message, facts)
 
     def _judge(self, state: DriveState, rejected: int, now: float) -> tuple[bytes, Sentence]:
         drive, session = self._drive, self._drive.session
@@ -369,7 +369,7 @@ class StatusMessage:
         self.status = DiagnosticStatus(name=name, hardware_id=hardware_id)
         self._entries: dict[str, KeyValue] = {}
 
-    def fill(self, report: Report) -> DiagnosticStatus:
+    def fill(self, report: StatusEntry) -> DiagnosticStatus:
         """Return the message with what the report says."""
         status, entries = self.status, self._entries
         status.level, status.message = report.level, printable(report.message, None)
@@ -389,7 +389,8 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
-                 stamps: Stamps, reported: Callable[[Report, str], None], clock: Clock) -> None:
+                 stamps: Stamps, reported: Callable[[StatusEntry, str], None],
+                 clock: Clock) -> None:
         self._now = clock.now
         self._node = node
         self._stamps = stamps
@@ -420,7 +421,7 @@ class Diagnostics:
             message.status = [self._status(report) for report in self.reports(self._now())]
             self._publisher.publish(message)
 
-    def _status(self, report: Report) -> DiagnosticStatus:
+    def _status(self, report: StatusEntry) -> DiagnosticStatus:
         self._reported(report, self._bus_of[report.name])
         found = self._statuses.get(report.name)
         if found is None:
@@ -434,7 +435,7 @@ class Diagnostics:
             drive.inactive = sentences.bridge_ended()
         self.publish()
 
-    def reports(self, now: float) -> list[Report]:
+    def reports(self, now: float) -> list[StatusEntry]:
         """Return all reports, buses first."""
         for bus, lateness in self._lateness.items():
             lateness.look({drive.name: _answers(drive) for drive in self._drives_of[bus]})

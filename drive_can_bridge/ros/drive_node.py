@@ -42,7 +42,7 @@ from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import (
-    control_services, CoroutineServices, ExecutorThread, Question, ServiceThread)
+    Awaited, control_services, CoroutineServices, ExecutorThread, ServiceThread)
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]
@@ -133,8 +133,8 @@ class DriveNode(DriveListener):
         directory = ParameterDirectory(drive.profile.parameters,
                                        lambda name: family.raw_parameter(drive, name))
 
-        def submit(request: Any) -> Question[Any]:
-            return Question(partial(self._submit, request))
+        def submit(request: Any) -> Awaited[Any]:
+            return Awaited(partial(self._submit, request))
         self._parameters = ParameterServices(
             self.node, parameter_thread, directory, stamps, submit=submit,
             write_refusal=session.services.write_refusal, role=session.roles.role,

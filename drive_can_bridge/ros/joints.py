@@ -186,9 +186,9 @@ class Joints:
             if not joints:
                 continue
             if self._taken:     # the others hear the same, and need not tell it again
-                taker = _Taker(joints, known, _nothing, _nothing)
+                taker = _JointTaker(joints, known, _nothing, _nothing)
             else:
-                taker = _Taker(joints, known, warn, log.info)
+                taker = _JointTaker(joints, known, warn, log.info)
             taken = PolledTopics(node, clock, warn, taker.refuse)
             self._taken.append(taken)
             taken.subscribe(JointState, COMMANDS, taker, taker.take_old, taker.disarm,
@@ -223,7 +223,7 @@ def _nothing(*_: object, **__: object) -> None:
     """Leave it to somebody else to tell."""
 
 
-class _Taker:
+class _JointTaker:
     """
     Takes messages for the joints of one bus.
 

@@ -46,7 +46,7 @@ def security_enforced() -> bool:
             and os.environ.get('ROS_SECURITY_STRATEGY') == 'Enforce')
 
 
-class LocalWay:
+class LocalWayServer:
     """
     Answers on the socket of a presence, from now on until it is closed.
 

@@ -56,7 +56,7 @@ PATIENCE = 10.0
 LINES_MAX = 1000
 
 
-class Level(Enum):
+class LogLevel(Enum):
     """How much a line matters."""
 
     INFO = 'info'
@@ -66,7 +66,7 @@ class Level(Enum):
 
 
 #: in the queue: the thread has to look what there is to be summed up, or to end
-_LOOK, _END = (Level.INFO, 'look'), (Level.INFO, 'end')
+_LOOK, _END = (LogLevel.INFO, 'look'), (LogLevel.INFO, 'end')
 
 
 class _Allowance:
@@ -97,7 +97,7 @@ class _Topic:
     :ivar held: how often it came since it was written; ``since`` when for the first time.
     """
 
-    level: Level
+    level: LogLevel
     text: str
     urgent: bool
     exact: bool
@@ -142,7 +142,7 @@ class Speaker:
 
     def info(self, text: str) -> None:
         """Log what is as it should be."""
-        self._say(Level.INFO, text)
+        self._say(LogLevel.INFO, text)
 
     def warning(self, text: str, *, urgent: bool = False) -> None:
         """
@@ -150,11 +150,11 @@ class Speaker:
 
         :param urgent: it tells of a danger.
         """
-        self._say(Level.WARNING, text, urgent=urgent)
+        self._say(LogLevel.WARNING, text, urgent=urgent)
 
     def error(self, text: str) -> None:
         """Log what does not work."""
-        self._say(Level.ERROR, text, urgent=True)
+        self._say(LogLevel.ERROR, text, urgent=True)
 
     def warn(self, topic: str, text: str, *, once: bool = False, few: int = 1) -> None:
         """
@@ -163,7 +163,7 @@ class Speaker:
         :param once: repetitions are not logged at all, until :meth:`reset`.
         :param few: times that it is written at once, at most :data:`FEW`.
         """
-        self._say(Level.WARNING, text, topic=topic, once=once, few=few)
+        self._say(LogLevel.WARNING, text, topic=topic, once=once, few=few)
 
     def reset(self) -> None:
         """Begin anew: the next warning of each topic is news."""
@@ -187,14 +187,14 @@ class Speaker:
                 self._sum_up(newest, now)
                 summed_up = newest
         if self._left_out:
-            self._emit(Level.WARNING, sentences.lines_left_out(lines=self._left_out))
+            self._emit(LogLevel.WARNING, sentences.lines_left_out(lines=self._left_out))
             self._left_out = 0
         if summed_up is not None and newest is not None and summed_up is not newest:
             # written before all this, which was over by then: how it is now stands last
             ago = now - newest.seen_at
             self._emit(newest.level, f'{newest.text} (this came last, {ago:.0f} s ago)')
 
-    def _say(self, level: Level, text: str, *, topic: str = '', once: bool = False,
+    def _say(self, level: LogLevel, text: str, *, topic: str = '', once: bool = False,
              urgent: bool = False, few: int = FEW) -> None:
         limit = self._limit
         with limit.lock:
@@ -258,7 +258,7 @@ class Speaker:
         topic.written = max(topic.written, 1)
         topic.held = 0
 
-    def _emit(self, level: Level, text: str) -> None:
+    def _emit(self, level: LogLevel, text: str) -> None:
         self._limit.emit(level, f'{self._prefix}{text}')
 
 
@@ -271,7 +271,7 @@ class LogLimit:
     :param clock: steady, in s.
     """
 
-    def __init__(self, emit: Callable[[Level, str], None], wake: Callable[[], None],
+    def __init__(self, emit: Callable[[LogLevel, str], None], wake: Callable[[], None],
                  clock: Callable[[], float]) -> None:
         self.emit, self.wake, self.clock = emit, wake, clock
         self.lock = threading.RLock()
@@ -316,7 +316,7 @@ class Log:
     def __init__(self, logger: Any, clock: Clock) -> None:
         self._logger = logger
         self._now = clock.now
-        self._lines: Mailbox[tuple[Level, str]] = Mailbox(clock, LINES_MAX)
+        self._lines: Mailbox[tuple[LogLevel, str]] = Mailbox(clock, LINES_MAX)
         self._limit = LogLimit(self._put, self._wake, clock.now)
         self._dropped = 0
         self._closed = False
@@ -330,19 +330,19 @@ class Log:
 
     def info(self, text: str) -> None:
         """Log what is as it should be."""
-        self._put(Level.INFO, text)
+        self._put(LogLevel.INFO, text)
 
     def warning(self, text: str) -> None:
         """Log what somebody should look at."""
-        self._put(Level.WARNING, text)
+        self._put(LogLevel.WARNING, text)
 
     def error(self, text: str) -> None:
         """Log what does not work."""
-        self._put(Level.ERROR, text)
+        self._put(LogLevel.ERROR, text)
 
     def fatal(self, text: str) -> None:
         """Log why the bridge ends."""
-        self._put(Level.FATAL, text)
+        self._put(LogLevel.FATAL, text)
 
     def close(self) -> None:
         """Write what waits, unless nobody takes it; what comes later is written at once."""
@@ -355,7 +355,7 @@ class Log:
         while self._thread.is_alive() and not nobody():
             self._thread.join(MOMENT)
 
-    def _put(self, level: Level, text: str) -> None:
+    def _put(self, level: LogLevel, text: str) -> None:
         if self._closed:
             self._write(level, text)
             return
@@ -378,20 +378,20 @@ class Log:
             self._limit.sum_up()
             if self._dropped and (not self._lines or line is _END):
                 dropped, self._dropped = self._dropped, 0
-                self._write(Level.WARNING, sentences.log_too_fast(dropped))
+                self._write(LogLevel.WARNING, sentences.log_too_fast(dropped))
             if line is _END:
                 return
 
-    def _write(self, level: Level, text: str) -> None:
+    def _write(self, level: LogLevel, text: str) -> None:
         text = printable(text, None)
         logger = self._logger
         try:
             # a line each: rclpy wants the level of a place in the source not to change
-            if level is Level.INFO:
+            if level is LogLevel.INFO:
                 logger.info(text)
-            elif level is Level.WARNING:
+            elif level is LogLevel.WARNING:
                 logger.warning(text)
-            elif level is Level.ERROR:
+            elif level is LogLevel.ERROR:
                 logger.error(text)
             else:
                 logger.fatal(text)

@@ -34,7 +34,7 @@ from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import CoroutineServices, Question, ServiceThread
+from drive_can_bridge.ros.threads import Awaited, CoroutineServices, ServiceThread
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
 #: names in one call
@@ -64,7 +64,7 @@ class ParameterServices:
     """
 
     def __init__(self, node: Node, thread: ServiceThread, directory: ParameterDirectory,
-                 stamps: Stamps, *, submit: Callable[[Request], Question[tuple[Outcome, ...]]],
+                 stamps: Stamps, *, submit: Callable[[Request], Awaited[tuple[Outcome, ...]]],
                  write_refusal: Callable[[Parameter], str],
                  role: Callable[[Parameter], Role | None],
                  active: Callable[[], bool], restore: RestoreTable,

@@ -19,9 +19,9 @@ from drive_can_bridge.core import sentences
 from drive_can_bridge.process.local_server import LocalRequest
 from drive_can_bridge.process.local_stop import Answer
 from drive_can_bridge.process.local_way import PASSING_PERIOD
-from drive_can_bridge.ros.client.control import Stop
+from drive_can_bridge.ros.client.control import StopRequests
 from drive_can_bridge.ros.client.search import LOOK_PERIOD
-from drive_can_bridge.ros.rcl.end import End
+from drive_can_bridge.ros.rcl.end import TopicEnd
 from drive_can_bridge.ros.rcl.extension import GONE
 
 #: s that the bridges may take to say which drives they have, and the drives to stop
@@ -41,8 +41,8 @@ class NodeEnd:
     """
 
     def __init__(self, node: Node, warn: Callable[[str], object]) -> None:
-        self.end = End(node.context, f'_{node.get_name()}_passing_on',
-                       lambda reason: warn(sentences.client_by_rclpy(reason)), node)
+        self.end = TopicEnd(node.context, f'_{node.get_name()}_passing_on',
+                            lambda reason: warn(sentences.client_by_rclpy(reason)), node)
         self.services, self.topics = self.end.services, self.end.topics
 
 
@@ -87,11 +87,11 @@ class _Way:
         self.asked = asked
         self.began = now
         self.is_strangers = not any(each.trusted for each in asked)
-        self._stop: Stop | None = None
+        self._stop: StopRequests | None = None
         self._failure = ''
         with self._told():
-            self._stop = Stop(find_end(), None, wanted.words, wanted.bridges,
-                              only=wanted.bridges, patience=PATIENCE)
+            self._stop = StopRequests(find_end(), None, wanted.words, wanted.bridges,
+                                      only=wanted.bridges, patience=PATIENCE)
             self._stop.leave(wanted.handled)
 
     def look(self, now: float) -> bool:

@@ -37,7 +37,7 @@ Number = tuple[str, Callable[[Any], object]]
 NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 
 
-class Layout(NamedTuple):
+class ConstantBytes(NamedTuple):
     """
     The bytes of a message: what is constant, in turn with numbers.
 
@@ -50,7 +50,7 @@ class Layout(NamedTuple):
     codes: tuple[str, ...]
 
 
-def find_layout(message: Any, numbers: Sequence[Number]) -> Layout | None:
+def find_layout(message: Any, numbers: Sequence[Number]) -> ConstantBytes | None:
     """
     Find where the ``numbers`` of a message stand; None: they are not found in its bytes.
 
@@ -68,7 +68,7 @@ def find_layout(message: Any, numbers: Sequence[Number]) -> Layout | None:
     for order in '<>':
         constants = _constants(data, order, codes, markers)
         if constants:
-            return Layout(order, constants, codes)
+            return ConstantBytes(order, constants, codes)
     return None
 
 
@@ -103,7 +103,7 @@ class PreparedMessage:
 
     __slots__ = ('_pack', '_parts', '_publish')
 
-    def __init__(self, publisher: Publisher, layout: Layout) -> None:
+    def __init__(self, publisher: Publisher, layout: ConstantBytes) -> None:
         self._publish = publish_bytes(publisher)
         codes, parts = layout.order, []
         for constant, code in zip(layout.constants, layout.codes):

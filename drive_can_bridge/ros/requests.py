@@ -58,7 +58,7 @@ class _Taking:
     told: bool = False
 
 
-class Requests:
+class ServiceRequests:
     """
     Takes requests. In any thread.
 

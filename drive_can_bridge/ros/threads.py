@@ -219,7 +219,7 @@ class CpuThrottle:
             self._clock.wait(now - self._left / self._share)
 
 
-class _Taker:
+class _RequestTaker:
     """
     One of the threads that take requests: but for the last, all are still taking one.
 
@@ -273,7 +273,7 @@ class ServiceThread:
         self._begun: deque[Callable[[], None]] = deque()
         self._relay = relay
         self._taker = self._new_taker()
-        self._superseded: set[_Taker] = set()
+        self._superseded: set[_RequestTaker] = set()
         self._ending = False
         self._threads: list[Worker] = []
 
@@ -322,9 +322,9 @@ class ServiceThread:
         self._threads.clear()
         self._taker.waiting.close()
 
-    def _new_taker(self) -> _Taker:
-        return _Taker(Waiting(self._context) if self._relay is None
-                      else Sleeping(self._clock.wake_event()))
+    def _new_taker(self) -> _RequestTaker:
+        return _RequestTaker(Waiting(self._context) if self._relay is None
+                             else Sleeping(self._clock.wake_event()))
 
     def _relayed(self, service: Service, callback: Callback, request: Any,
                  answer: Callable[[Any], None]) -> None:
@@ -335,7 +335,7 @@ class ServiceThread:
 
     # -- the thread that takes --------------------------------------------------------------------
 
-    def _take_all(self, taker: _Taker) -> None:
+    def _take_all(self, taker: _RequestTaker) -> None:
         self._prepare_thread()
         throttle = CpuThrottle(self._share, self._clock)
         while self._goes_on(taker):
@@ -352,10 +352,10 @@ class ServiceThread:
             self._superseded.discard(taker)
             self._taker.change()
 
-    def _goes_on(self, taker: _Taker) -> bool:
+    def _goes_on(self, taker: _RequestTaker) -> bool:
         return not self._ending and not taker.superseded and bool(self._context.ok())
 
-    def _take_while_unchanged(self, taker: _Taker, throttle: CpuThrottle) -> None:
+    def _take_while_unchanged(self, taker: _RequestTaker, throttle: CpuThrottle) -> None:
         """Take what comes until something else is to be served."""
         taker.changed = False
         without = {other.without for other in self._superseded.copy()}
@@ -369,7 +369,7 @@ class ServiceThread:
                     self._take(taker, service)
                 throttle.keep()
 
-    def _take(self, taker: _Taker, service: Service) -> None:
+    def _take(self, taker: _RequestTaker, service: Service) -> None:
         for _ in range(TAKE_MAX):
             served = self._served.get(service)
             if served is None or taker.superseded:
@@ -381,7 +381,7 @@ class ServiceThread:
             callback, answered = served
             callback(request, partial(self._answer, service, request, header, answered))
 
-    def _supersede(self, taker: _Taker, service: Service, for_ever: bool) -> None:
+    def _supersede(self, taker: _RequestTaker, service: Service, for_ever: bool) -> None:
         """
         Have another thread take the requests of all other services.
 
@@ -498,7 +498,7 @@ class ExecutorServices:
             answer(response)
 
 
-class Question(Generic[AnswerT]):
+class Awaited(Generic[AnswerT]):
     """
     What such a coroutine awaits: something that is asked when it is awaited.
 
@@ -530,7 +530,7 @@ def go_on(coroutine: Coroutine[Any, Any, Any], later: Callable[[Callable[[], Non
     """
     try:
         with alone:
-            question: Question[Any] = coroutine.send(found)
+            question: Awaited[Any] = coroutine.send(found)
         question.ask(lambda what: later(
             partial(go_on, coroutine, later, answer, what, alone=alone)))
     except StopIteration as end:
@@ -602,7 +602,7 @@ def _never(_: Any, response: Any) -> Any:
 
 
 #: hands a request to the session; answered by its outcome
-Submit = Callable[[ControlRequest], Question[ControlCompleted]]
+Submit = Callable[[ControlRequest], Awaited[ControlCompleted]]
 
 
 def control_services(node: Node, thread: ServiceThread, submit: Submit, *,

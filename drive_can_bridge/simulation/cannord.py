@@ -19,8 +19,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, Response, Task,
-)
+    LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
 )
@@ -28,13 +27,13 @@ from drive_can_bridge.protocols.cannord.states import (
     ENABLE_OPERATION, FAULT_RESET, NO_DISABLE_VOLTAGE, NO_QUICK_STOP, STATUS_BITS, SWITCH_ON,
 )
 from drive_can_bridge.simulation import quantities
-from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, Rule, RUNNING, State
+from drive_can_bridge.simulation.control import (
+    FAULTS, Machine, MachineState, OperatingState, RUNNING, Transition)
 from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw, Quantity
 from drive_can_bridge.simulation.registers import (
-    Mechanics, PlantFactory, Refusal, Refused, Registers,
-)
+    AccessRefused, Mechanics, PlantFactory, Registers, WriteRefusal)
 
 (INVALID_NUMBER, CANNOT_BE_CHANGED, LIMIT_EXCEEDED, WRONG_SUBINDEX, NOT_AN_ARRAY, INVALID_TYPE,
  ) = range(6)
@@ -49,13 +48,13 @@ IDENTITY = {742: 1}
 
 #: status bits of a state: those of OFF2 and OFF3 come from the control word in two states
 _STATUS = {
-    State.SWITCH_ON_DISABLED: 0x40,
-    State.READY_TO_SWITCH_ON: 0x31,
-    State.SWITCHED_ON: 0x33,
-    State.OPERATION_ENABLED: 0x37,
-    State.SHUTDOWN: 0x37,
-    State.QUICK_STOP: 0x17,
-    State.FAULT: 0x08,
+    MachineState.SWITCH_ON_DISABLED: 0x40,
+    MachineState.READY_TO_SWITCH_ON: 0x31,
+    MachineState.SWITCHED_ON: 0x33,
+    MachineState.OPERATION_ENABLED: 0x37,
+    MachineState.SHUTDOWN: 0x37,
+    MachineState.QUICK_STOP: 0x17,
+    MachineState.FAULT: 0x08,
 }
 #: OFF2 and OFF3 in the control word, and how far on they stand in the status word
 _OFF = NO_DISABLE_VOLTAGE | NO_QUICK_STOP
@@ -64,17 +63,17 @@ _OFF_SHIFT = 3
 _SET = states.PARAMETER_SETS - 1 << states.PARAMETER_SET_SHIFT
 
 _MACHINE = Machine((
-    Rule(FAULTS, 0, 0, None),
-    Rule(None, NO_DISABLE_VOLTAGE, 0, State.SWITCH_ON_DISABLED),
-    Rule((State.QUICK_STOP,), 0, 0, None),              # ends at standstill only
-    Rule(RUNNING, NO_QUICK_STOP, 0, State.QUICK_STOP),
-    Rule(None, NO_QUICK_STOP, 0, State.SWITCH_ON_DISABLED),
-    Rule(RUNNING, SWITCH_ON, 0, State.SHUTDOWN),
-    Rule(None, SWITCH_ON, 0, State.READY_TO_SWITCH_ON),
-    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),      # left with bit 0 = 0 only
-    Rule(None, ENABLE_OPERATION, ENABLE_OPERATION, State.OPERATION_ENABLED),
-    Rule(None, 0, 0, State.SWITCHED_ON),
-), reset=(FAULT_RESET, FAULT_RESET), power_on=(State.SWITCH_ON_DISABLED, _OFF),
+    Transition(FAULTS, 0, 0, None),
+    Transition(None, NO_DISABLE_VOLTAGE, 0, MachineState.SWITCH_ON_DISABLED),
+    Transition((MachineState.QUICK_STOP,), 0, 0, None),              # ends at standstill only
+    Transition(RUNNING, NO_QUICK_STOP, 0, MachineState.QUICK_STOP),
+    Transition(None, NO_QUICK_STOP, 0, MachineState.SWITCH_ON_DISABLED),
+    Transition(RUNNING, SWITCH_ON, 0, MachineState.SHUTDOWN),
+    Transition(None, SWITCH_ON, 0, MachineState.READY_TO_SWITCH_ON),
+    Transition((MachineState.SWITCH_ON_DISABLED,), 0, 0, None),      # left with bit 0 = 0 only
+    Transition(None, ENABLE_OPERATION, ENABLE_OPERATION, MachineState.OPERATION_ENABLED),
+    Transition(None, 0, 0, MachineState.SWITCHED_ON),
+), reset=(FAULT_RESET, FAULT_RESET), power_on=(MachineState.SWITCH_ON_DISABLED, _OFF),
     # b4 = 0 uses the quick stop ramp, too, but leaves the inverter enabled
     ramp=states.ENABLE_RAMP)
 #: P513, s that may pass between two telegrams; 0 or less: any
@@ -140,35 +139,35 @@ class CannordTable:
         self._groups = groups_of(registers.parameters)
         self._active = 1
 
-    def answer(self, task: ParameterFrame) -> tuple[Response, int]:
+    def answer(self, task: ParameterFrame) -> tuple[ResponseId, int]:
         """
         Carry out a task.
 
         :return: response identifier, and the value, negative where it is.
-        :raises Refused: with the error number of the manual.
+        :raises AccessRefused: with the error number of the manual.
         """
         if task.identifier not in list(Task):
-            raise Refused(INVALID_TASK)
+            raise AccessRefused(INVALID_TASK)
         what = Task(task.identifier)
         if what == Task.NONE:
-            return Response.NONE, 0
+            return ResponseId.NONE, 0
         group = self._groups.get(task.number)
         if group is None:
-            raise Refused(INVALID_NUMBER)
+            raise AccessRefused(INVALID_NUMBER)
         if (what.array or what is Task.READ_ELEMENTS) and not group.array:
-            raise Refused(NOT_AN_ARRAY)
+            raise AccessRefused(NOT_AN_ARRAY)
         if what == Task.READ_ELEMENTS:
-            return Response.ELEMENTS, max(group.members) + 1
+            return ResponseId.ELEMENTS, max(group.members) + 1
         # The manuals contradict each other on a sub-index in plain tasks: where there is something
         # to choose, it counts here, as in their examples; a simple parameter has no use for it.
         parameter = group.members.get(task.index if group.array else 0)
         if parameter is None:
-            raise Refused(WRONG_SUBINDEX)
+            raise AccessRefused(WRONG_SUBINDEX)
         if what.writes:
             self._write(parameter, task.value, double=what.double,
                         eeprom=bool(what.persistent))
         elif not parameter.readable:
-            raise Refused(CANNOT_BE_REPRESENTED)
+            raise AccessRefused(CANNOT_BE_REPRESENTED)
         response = next(each for each in what.responses
                         if each.double is (parameter.type.bits == 32))
         return response, self._registers.raw(parameter.name)
@@ -195,15 +194,16 @@ class CannordTable:
 
     def _write(self, parameter: Parameter, value: int, *, double: bool, eeprom: bool) -> None:
         if (parameter.type.bits == 32) is not double:
-            raise Refused(INVALID_TYPE)
+            raise AccessRefused(INVALID_TYPE)
         high, low = value >> 16, value & 0xFFFF
         if not double and high not in (0, _NEGATIVE):
-            raise Refused(LIMIT_EXCEEDED)
+            raise AccessRefused(LIMIT_EXCEEDED)
         # a negative word says so in the upper half, or comes without anything there
         raw = low - 0x10000 if high and not double else parameter.raw_from_word(value)
         refusal = self._registers.refusal({parameter.name: raw})
         if refusal is not None:
-            raise Refused(LIMIT_EXCEEDED if refusal is Refusal.OUT_OF_RANGE else CANNOT_BE_CHANGED)
+            raise AccessRefused(LIMIT_EXCEEDED if refusal is WriteRefusal.OUT_OF_RANGE else
+                                CANNOT_BE_CHANGED)
         self._registers.write(parameter.name, raw, keep=eeprom, wear=int(eeprom))
 
 
@@ -223,16 +223,16 @@ class InverterPlant(MotorPlant):
                  mechanics: Mechanics) -> None:
         # the motor knows set 1 and what stands in for it
         plain = {name: each for name, each in registers.parameters.items() if not each.subindex}
-        super().__init__(registers, configuration, mechanics, operation=Operation(_MACHINE),
+        super().__init__(registers, configuration, mechanics, operation=OperatingState(_MACHINE),
                          movable=plain)
         self._first = {each.number: each for each in plain.values() if each.number is not None}
 
     def command(self, value: float) -> float:
         """Return what the last control word makes of the frequency setpoint."""
         operation, word = self.operation, self.operation.word
-        if operation.state is State.SHUTDOWN:
+        if operation.state is MachineState.SHUTDOWN:
             return 0.0
-        if operation.state is State.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
+        if operation.state is MachineState.OPERATION_ENABLED and not word & states.RELEASE_RAMP:
             return self.motor.shaft.speed
         if not word & states.ENABLE_SETPOINT:
             return 0.0
@@ -248,7 +248,7 @@ class InverterPlant(MotorPlant):
         motor, operation = self.motor, self.operation
         target = self.target if operation.enabled and not operation.stopping else 0.0
         word = _STATUS[operation.state] | operation.word & _SET | BUS_CONTROL
-        if operation.state in (State.SWITCH_ON_DISABLED, State.FAULT):
+        if operation.state in (MachineState.SWITCH_ON_DISABLED, MachineState.FAULT):
             word |= (operation.word & _OFF) << _OFF_SHIFT
         if motor.temperature > WARNING_TEMPERATURE:
             word |= WARNING
@@ -386,11 +386,11 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._look_at_clock(now)
         try:
             response, value = self.table.answer(task)
-        except Refused as refusal:
-            response, value = Response.REFUSED, refusal.code
+        except AccessRefused as refusal:
+            response, value = ResponseId.REFUSED, refusal.code
         self.answer(self._parameter_response(response, task.number, task.index, value), now)
 
-    def _parameter_response(self, response: Response, number: int, index: int, value: int,
+    def _parameter_response(self, response: ResponseId, number: int, index: int, value: int,
                             ) -> Frame:
         return Frame(self._response, self._layout.encode(response, number, index, value),
                      self._options.extended_identifiers)
@@ -439,4 +439,4 @@ class SimulatedCannordInverter(SimulatedDrive):
              for other in others),
             (Frame(twin, junk, not answer.extended),),
             # nobody asked for P2047 = 5A5Ah
-            (self._parameter_response(Response.WORD, 0x7FF, 0, 0x5A5A),))
+            (self._parameter_response(ResponseId.WORD, 0x7FF, 0, 0x5A5A),))

@@ -28,12 +28,12 @@ from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
 from drive_can_bridge.simulation.control import (
-    FAULTS, Machine, Operation, Report, Rule, State, StatusWord)
+    FAULTS, Machine, MachineState, MachineStatus, OperatingState, StatusWord, Transition)
 from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.quantities import clamp, plausible
 from drive_can_bridge.simulation.registers import (
-    Mechanics, Plant, PlantFactory, Refusal, Refused, Registers)
+    AccessRefused, Mechanics, Plant, PlantFactory, Registers, WriteRefusal)
 
 #: bits of control register 1
 RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
@@ -59,14 +59,14 @@ THERMAL_OVERLOAD, TEST_TRIP = 4, 10
 
 #: after a trip the run bits have to go before they count again
 MACHINE = Machine((
-    Rule((State.FAULT,), RUN, 0, State.FAULT_RELEASED),
-    Rule(FAULTS, 0, 0, None),
-    Rule((State.SWITCH_ON_DISABLED,), RUN, 0, State.READY_TO_SWITCH_ON),
-    Rule((State.SWITCH_ON_DISABLED,), 0, 0, None),
-    Rule(None, RUN, RUN_FORWARD, State.OPERATION_ENABLED),
-    Rule(None, RUN, RUN_REVERSE, State.OPERATION_ENABLED),
-    Rule(None, 0, 0, State.READY_TO_SWITCH_ON),
-), reset=(RESET, RESET), power_on=(State.READY_TO_SWITCH_ON, 0))
+    Transition((MachineState.FAULT,), RUN, 0, MachineState.FAULT_RELEASED),
+    Transition(FAULTS, 0, 0, None),
+    Transition((MachineState.SWITCH_ON_DISABLED,), RUN, 0, MachineState.READY_TO_SWITCH_ON),
+    Transition((MachineState.SWITCH_ON_DISABLED,), 0, 0, None),
+    Transition(None, RUN, RUN_FORWARD, MachineState.OPERATION_ENABLED),
+    Transition(None, RUN, RUN_REVERSE, MachineState.OPERATION_ENABLED),
+    Transition(None, 0, 0, MachineState.READY_TO_SWITCH_ON),
+), reset=(RESET, RESET), power_on=(MachineState.READY_TO_SWITCH_ON, 0))
 GENERAL_CONFIGURATION = 601
 TRIP_CLASS = 606
 FULL_LOAD_RATIO = 652
@@ -207,19 +207,19 @@ class RegisterTable:
         """
         Read one register or two adjacent ones.
 
-        :raises Refused: there is none, or it cannot be read.
+        :raises AccessRefused: there is none, or it cannot be read.
         """
         cells = self._find(address, count)
         for cell in cells:
             if not cell.parameter.readable:
-                raise Refused(sdo.READ_OF_WRITE_ONLY)
+                raise AccessRefused(sdo.READ_OF_WRITE_ONLY)
         return tuple([self._value(cell.parameter) >> cell.shift & WORD_MAX for cell in cells])
 
     def write(self, address: Address, words: tuple[int, ...]) -> None:
         """
         Write one register or two adjacent ones, or none of them.
 
-        :raises Refused: there is none, it is read-only, or it does not take the value.
+        :raises AccessRefused: there is none, it is read-only, or it does not take the value.
         """
         values: dict[str, int] = {}
         wear: Counter[str] = Counter()
@@ -232,7 +232,7 @@ class RegisterTable:
                 for name, value in values.items()}
         refusal = self._registers.refusal(raws)
         if refusal is not None:
-            raise Refused(CODES[refusal])
+            raise AccessRefused(CODES[refusal])
         for name, raw in raws.items():
             self._registers.write(name, raw, wear=wear[name])
 
@@ -267,8 +267,8 @@ class RegisterTable:
                 # no such number or index, or no such sub-index
                 known = (any(block.index == each.word for block in BLOCKS)
                          or self.highest_subindex(each.word) is not None)
-                raise Refused(sdo.NO_SUCH_SUBINDEX if each.by_object and known
-                              else sdo.NO_SUCH_OBJECT)
+                raise AccessRefused(sdo.NO_SUCH_SUBINDEX if each.by_object and known
+                                    else sdo.NO_SUCH_OBJECT)
         return [self._cells[each] for each in addresses]
 
     def _value(self, parameter: Parameter) -> int:
@@ -302,7 +302,7 @@ class StarterPlant(Plant):
                  mechanics: Mechanics) -> None:
         self.registers = registers
         self.control = configuration.profile.control
-        self.operation = Operation(MACHINE)
+        self.operation = OperatingState(MACHINE)
         self.starter = Starter()
         self._node = configuration.station
         # of several names for a register the first counts, as everywhere
@@ -314,14 +314,14 @@ class StarterPlant(Plant):
         known: dict[int, int] = {**DEFAULTS, **IDENTITY, SERIAL_RANK: self._node}
         return known.get(register_number(parameter) or 0, plausible(parameter))
 
-    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+    def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
         """Take settings with the motor off and in configuration mode only; no word otherwise."""
         register = register_number(parameter) or 0
         if raw % STEPS.get(register, 1):
-            return Refusal.OUT_OF_RANGE
+            return WriteRefusal.OUT_OF_RANGE
         configuring = self._content(GENERAL_CONFIGURATION) & CONFIGURATION_MODE
         if register in SETTINGS and (self.operation.enabled or not configuring):
-            return Refusal.UNTOLD
+            return WriteRefusal.UNTOLD
         return None
 
     def written(self, name: str, before: int, raw: int) -> None:
@@ -343,7 +343,7 @@ class StarterPlant(Plant):
         if register == STATUS_1:
             # the profile's own conditions are met in addition, whatever its bits are called
             word = StatusWord(replace(parameter, bits=()), self.control)
-            return lambda: word.compose(Report(self.operation), self._status())
+            return lambda: word.compose(MachineStatus(self.operation), self._status())
         figure = self._figures.get(register)
         if figure is None:
             return None
@@ -393,7 +393,7 @@ class SimulatedPkwDrive(SimulatedDrive):
 
     def set_up(self) -> None:
         options = self._options = self.configuration.options
-        self._layout = pkw.Layout(options.layout)
+        self._layout = pkw.PkwLayout(options.layout)
         self.table = RegisterTable(self.configuration, self.registers)
         self._abort_code_order: str = options.abort_code_order
         self.node = self.companion = CanopenNode(
@@ -440,13 +440,13 @@ class SimulatedPkwDrive(SimulatedDrive):
             return pkw.response(request)
         try:
             if meaning is None:
-                raise Refused(sdo.UNKNOWN_COMMAND)
+                raise AccessRefused(sdo.UNKNOWN_COMMAND)
             if meaning.writes:
                 self.table.write(request.address, request.words[:meaning.count])
                 return pkw.response(request)
             first, second = (*self.table.read(request.address, meaning.count), 0)[:2]
             return pkw.response(request, (first, second))
-        except Refused as error:
+        except AccessRefused as error:
             return pkw.error_response(request, pkw.words_from_code(
                 error.code, self._abort_code_order))
 

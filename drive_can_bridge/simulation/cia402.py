@@ -19,12 +19,12 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 from drive_can_bridge.protocols.cia402 import pdo as pdo_codec, states
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
-from drive_can_bridge.simulation.canopen.pdos import Pdo, Pdos
+from drive_can_bridge.simulation.canopen.pdos import Pdos, SimulatedPdo
 from drive_can_bridge.simulation.canopen.sdo import bytes_of, checked_length, ObjectDictionary
 from drive_can_bridge.simulation.cia402_plant import (
     Habits, LOST_MASTER, own_parameters, ServoPlant)
 from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
-from drive_can_bridge.simulation.registers import PlantFactory, Refused
+from drive_can_bridge.simulation.registers import AccessRefused, PlantFactory
 
 CONSUMER_HEARTBEATS = 0x1016
 DEVICE_NAME = b'simulated CiA 402 servo drive'
@@ -51,7 +51,7 @@ class HeartbeatConsumer:
 
     def read(self, subindex: int) -> bytes:
         if subindex > CONSUMERS:
-            raise Refused(sdo.NO_SUCH_SUBINDEX)
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX)
         if subindex == 0:
             return bytes((CONSUMERS,))
         return self.watched[subindex - 1].to_bytes(4, 'little')
@@ -59,7 +59,7 @@ class HeartbeatConsumer:
     def write(self, subindex: int, data: bytes) -> None:
         self.read(subindex)     # it exists
         if subindex == 0:
-            raise Refused(sdo.WRITE_OF_READ_ONLY)
+            raise AccessRefused(sdo.WRITE_OF_READ_ONLY)
         self.watched[subindex - 1] = int.from_bytes(checked_length(data, 4), 'little')
         self._heard[subindex - 1] = math.inf
 
@@ -133,7 +133,7 @@ class SimulatedServoDrive(SimulatedDrive):
         """Tell whether there is an object; None: anything of the index."""
         try:
             self.node.read_object(index, subindex or 0)
-        except Refused as error:
+        except AccessRefused as error:
             return error.code != sdo.NO_SUCH_OBJECT and (
                 subindex is None or error.code != sdo.NO_SUCH_SUBINDEX)
         return True
@@ -196,7 +196,7 @@ class SimulatedServoDrive(SimulatedDrive):
         # PDOs that are not valid belong to the node nevertheless
         return identifier - self.node.number in (0x200, 0x300, 0x400, 0x500)
 
-    def _take(self, pdo: Pdo, data: bytes, now: float) -> None:
+    def _take(self, pdo: SimulatedPdo, data: bytes, now: float) -> None:
         if self.node.state is not NmtState.OPERATIONAL:
             raise IgnoredFrame('PDO while the node is not operational')
         if len(data) < pdo.length:
@@ -207,7 +207,7 @@ class SimulatedServoDrive(SimulatedDrive):
         else:
             self._apply(pdo, data, now)
 
-    def _apply(self, pdo: Pdo, data: bytes, now: float) -> None:
+    def _apply(self, pdo: SimulatedPdo, data: bytes, now: float) -> None:
         word: int | None = None
         for cell, raw in self.pdos.cells(pdo, data):
             if cell.index == states.CONTROL_WORD:
@@ -296,13 +296,13 @@ class SimulatedServoDrive(SimulatedDrive):
             self._consumer.write(subindex, data)
         elif index == STORE and subindex == 1:
             if checked_length(data, 4) != SAVE:
-                raise Refused(NOT_STORED)
+                raise AccessRefused(NOT_STORED)
             self.registers.store_all()
             self.pdos.store()
             self._consumer.stored = tuple(self._consumer.watched)
         elif index == STORE:
-            raise Refused(sdo.NO_SUCH_SUBINDEX if subindex else
-                          sdo.WRITE_OF_READ_ONLY)
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX if subindex else
+                                sdo.WRITE_OF_READ_ONLY)
         else:
             self.table.write_object(index, subindex, data)
 

@@ -23,12 +23,12 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.canopen.pdos import Checks, PdoHabits
 from drive_can_bridge.simulation.canopen.sdo import Place
-from drive_can_bridge.simulation.control import FAULTS, Machine, Operation, State
+from drive_can_bridge.simulation.control import FAULTS, Machine, MachineState, OperatingState
 from drive_can_bridge.simulation.motor import (
     COAST_TIME, FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, SINKING_SPEED, Travel,
     WARNING_TEMPERATURE,
 )
-from drive_can_bridge.simulation.registers import Mechanics, Refusal, Registers
+from drive_can_bridge.simulation.registers import Mechanics, Registers, WriteRefusal
 
 _TYPES = {'u8': ParameterType.UINT8, 'i8': ParameterType.INT8, 'u16': ParameterType.UINT16,
           'i16': ParameterType.INT16, 'u32': ParameterType.UINT32, 'i32': ParameterType.INT32}
@@ -46,9 +46,10 @@ _METHODS = (*range(1, 15), *range(17, 31), 33, 34, *_ON_THE_SPOT)
 _HALT, _BIT_4 = states.HALT, 0x10
 _MOVING = (PP, PV, TQ, VL, HM)
 
-_STATUS = {State.SWITCH_ON_DISABLED: 0x40, State.READY_TO_SWITCH_ON: 0x21,
-           State.SWITCHED_ON: 0x23, State.OPERATION_ENABLED: 0x27, State.QUICK_STOP: 0x07,
-           State.FAULT: 0x08}
+_STATUS = {MachineState.SWITCH_ON_DISABLED: 0x40, MachineState.READY_TO_SWITCH_ON: 0x21,
+           MachineState.SWITCHED_ON: 0x23, MachineState.OPERATION_ENABLED: 0x27,
+           MachineState.QUICK_STOP: 0x07,
+           MachineState.FAULT: 0x08}
 _FAULT_REACTION = 0x0F
 _POSITIONS = (0x6062, 0x6064, 0x6065, 0x607A, 0x607C, 0x60C1, 0x60F4)
 _SPEEDS = (0x606B, 0x606C, 0x607F, 0x6081, 0x6099, 0x60FF)
@@ -176,7 +177,7 @@ _HABITS: Mapping[str, tuple[str, Callable[[str], Any]]] = {
 }
 
 
-class DriveOperation(Operation):
+class DriveOperation(OperatingState):
     """
     The state machine of CiA 402, one state at a time; with the option codes 605Ah to 605Eh.
 
@@ -190,50 +191,50 @@ class DriveOperation(Operation):
         self.safe = True
         super().__init__(Machine())
 
-    def _enter(self, state: State, leads_to: State | None = None) -> None:
+    def _enter(self, state: MachineState, leads_to: MachineState | None = None) -> None:
         self.state, self.leads_to = state, leads_to
         self.faulted = state in FAULTS
-        self.stopping = state is State.QUICK_STOP or leads_to is not None
-        self.enabled = self.stopping or state is State.OPERATION_ENABLED
+        self.stopping = state is MachineState.QUICK_STOP or leads_to is not None
+        self.enabled = self.stopping or state is MachineState.OPERATION_ENABLED
 
-    def _brake(self, option: int, to: State) -> None:
+    def _brake(self, option: int, to: MachineState) -> None:
         """Leave operation enabled: by ramp, or with power off at once."""
         if self._option(option) == 0:
             self._enter(to)
         elif self.leads_to is not to:
-            self._enter(State.OPERATION_ENABLED, to)
+            self._enter(MachineState.OPERATION_ENABLED, to)
 
     def word_written(self, word: int) -> None:
         before, self.word = self.word, word
-        state, running = self.state, self.state is State.OPERATION_ENABLED
+        state, running = self.state, self.state is MachineState.OPERATION_ENABLED
         if self.faulted:
             if word & ~before & states.FAULT_RESET and not self.leads_to and self.reset_allowed:
-                self._enter(State.SWITCH_ON_DISABLED)
+                self._enter(MachineState.SWITCH_ON_DISABLED)
         elif not self.safe:
-            self._enter(State.SWITCH_ON_DISABLED)
+            self._enter(MachineState.SWITCH_ON_DISABLED)
         elif not word & 0x02:
-            self._enter(State.SWITCH_ON_DISABLED)
+            self._enter(MachineState.SWITCH_ON_DISABLED)
         elif not word & 0x04:
             if running and self._option(states.QUICK_STOP_OPTION):
-                self._enter(State.QUICK_STOP)
-            elif state is not State.QUICK_STOP:
-                self._enter(State.SWITCH_ON_DISABLED)
-        elif state is State.QUICK_STOP:
+                self._enter(MachineState.QUICK_STOP)
+            elif state is not MachineState.QUICK_STOP:
+                self._enter(MachineState.SWITCH_ON_DISABLED)
+        elif state is MachineState.QUICK_STOP:
             if word & 0x0F == 0x0F and self.stays and self.habits.leaves_quick_stop:
-                self._enter(State.OPERATION_ENABLED)
+                self._enter(MachineState.OPERATION_ENABLED)
         elif not word & 0x01:
             if running:
-                self._brake(states.SHUTDOWN_OPTION, State.READY_TO_SWITCH_ON)
+                self._brake(states.SHUTDOWN_OPTION, MachineState.READY_TO_SWITCH_ON)
             else:
-                self._enter(State.READY_TO_SWITCH_ON)
-        elif state is State.SWITCH_ON_DISABLED:
+                self._enter(MachineState.READY_TO_SWITCH_ON)
+        elif state is MachineState.SWITCH_ON_DISABLED:
             pass
-        elif state is State.READY_TO_SWITCH_ON:
-            self._enter(State.SWITCHED_ON)
+        elif state is MachineState.READY_TO_SWITCH_ON:
+            self._enter(MachineState.SWITCHED_ON)
         elif word & 0x08:
-            self._enter(State.OPERATION_ENABLED)
+            self._enter(MachineState.OPERATION_ENABLED)
         elif running:
-            self._brake(states.DISABLE_OPTION, State.SWITCHED_ON)
+            self._brake(states.DISABLE_OPTION, MachineState.SWITCHED_ON)
 
     @property
     def stays(self) -> bool:
@@ -244,18 +245,18 @@ class DriveOperation(Operation):
         """See that the axis stands: the end of a ramp."""
         if self.leads_to is not None:
             self._enter(self.leads_to)
-        elif self.state is State.QUICK_STOP and not self.stays:
-            self._enter(State.SWITCH_ON_DISABLED)
+        elif self.state is MachineState.QUICK_STOP and not self.stays:
+            self._enter(MachineState.SWITCH_ON_DISABLED)
 
     def trip(self, duration: float = 0.0, code: float | None = None) -> None:
         ramp = self.enabled and self._option(0x605E) != 0
         super().trip(duration, code)
         if ramp:
-            self._enter(State.FAULT, State.FAULT)
+            self._enter(MachineState.FAULT, MachineState.FAULT)
 
     def repair(self) -> None:
         if self.faulted:
-            self._enter(State.SWITCH_ON_DISABLED)
+            self._enter(MachineState.SWITCH_ON_DISABLED)
 
     def connection_lost(self) -> None:
         """Do what 6007h says."""
@@ -263,7 +264,7 @@ class DriveOperation(Operation):
         if option == 1:
             self.trip(code=LOST_MASTER)
         elif option == 2 and not self.faulted:
-            self._enter(State.SWITCH_ON_DISABLED)
+            self._enter(MachineState.SWITCH_ON_DISABLED)
         elif option == 3 and not self.faulted:
             self.word_written(states.QUICK_STOP)
 
@@ -271,7 +272,7 @@ class DriveOperation(Operation):
         """Have the input for safe torque off high or low. Low: power is off at once."""
         self.safe = safe
         if not safe:
-            self._enter(State.FAULT if self.faulted else State.SWITCH_ON_DISABLED)
+            self._enter(MachineState.FAULT if self.faulted else MachineState.SWITCH_ON_DISABLED)
 
 
 class ServoPlant:
@@ -299,7 +300,7 @@ class ServoPlant:
         self.trip_code = (quantities.likely_fault(fault.codes) if fault and fault.codes
                           else OVERCURRENT)
         self.machine = DriveOperation(self.raw)
-        self.operation: Operation = self.machine
+        self.operation: OperatingState = self.machine
         self.habits = Habits()
         self.shaft = Travel(BEGINNING)
         self.motor = Motor(RATED_SPEED, mechanics.load, self.shaft)
@@ -379,10 +380,10 @@ class ServoPlant:
         return (switch is not None and self.shaft.position <= switch) << 2 | (
             self.machine.safe << 3)
 
-    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+    def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
         if self._places.get(parameter.name) == (states.MODE, 0) and not (
                 raw == 0 or 1 <= raw <= 32 and self.raw(states.MODES_OFFERED) >> raw - 1 & 1):
-            return Refusal.OUT_OF_RANGE
+            return WriteRefusal.OUT_OF_RANGE
         return None
 
     def written(self, name: str, before: int, raw: int) -> None:
@@ -404,9 +405,9 @@ class ServoPlant:
     def control(self, word: int) -> None:
         """Take a control word."""
         operation, before = self.machine, self.machine.word
-        was_enabled = operation.state is State.OPERATION_ENABLED
+        was_enabled = operation.state is MachineState.OPERATION_ENABLED
         operation.word_written(word)
-        if operation.state is not State.OPERATION_ENABLED:
+        if operation.state is not MachineState.OPERATION_ENABLED:
             self._show_mode()
             return
         if not was_enabled:
@@ -433,7 +434,7 @@ class ServoPlant:
             self._interpolate(self._position(0x607A))
 
     def _show_mode(self) -> None:
-        if self.habits.mode_shown_early or self.operation.state is State.OPERATION_ENABLED:
+        if self.habits.mode_shown_early or self.operation.state is MachineState.OPERATION_ENABLED:
             self._shown_mode = self._mode
 
     def _interpolate(self, goal: float) -> None:
@@ -477,7 +478,7 @@ class ServoPlant:
             return
         rate = self._rate(0x6084)
         if operation.stopping:
-            option = self.raw(0x605A) if operation.state is State.QUICK_STOP else 2 if (
+            option = self.raw(0x605A) if operation.state is MachineState.QUICK_STOP else 2 if (
                 operation.faulted) else 1
             rate = {1: rate, 5: rate, 2: self._rate(0x6085), 6: self._rate(0x6085)}.get(
                 option, FASTEST)
@@ -581,9 +582,9 @@ class ServoPlant:
         word |= _FAULT_REACTION if operation.faulted and operation.leads_to else _STATUS[state]
         if self.motor.temperature > WARNING_TEMPERATURE:
             word |= 0x80
-        if state is State.QUICK_STOP:
+        if state is MachineState.QUICK_STOP:
             return word | states.TARGET_REACHED * (stands and self.habits.stand_bit)
-        if state is not State.OPERATION_ENABLED:
+        if state is not MachineState.OPERATION_ENABLED:
             return word
         reached = stands if operation.stopping or operation.word & _HALT else self._reached
         bit_12 = {PP: self._acknowledged, HM: self._attained, PV: stands,

@@ -26,7 +26,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import ControlTable
 
 
-class State(Enum):
+class MachineState(Enum):
     """
     The states of all machines; none uses all of them.
 
@@ -43,13 +43,14 @@ class State(Enum):
     FAULT_RELEASED = auto()
 
 
-FAULTS = (State.FAULT, State.FAULT_RELEASED)
-RUNNING = (State.OPERATION_ENABLED, State.SHUTDOWN)
+FAULTS = (MachineState.FAULT, MachineState.FAULT_RELEASED)
+RUNNING = (MachineState.OPERATION_ENABLED, MachineState.SHUTDOWN)
 #: where standstill leads
-ENDS = {State.QUICK_STOP: State.SWITCH_ON_DISABLED, State.SHUTDOWN: State.READY_TO_SWITCH_ON}
+ENDS = {MachineState.QUICK_STOP: MachineState.SWITCH_ON_DISABLED,
+        MachineState.SHUTDOWN: MachineState.READY_TO_SWITCH_ON}
 
 
-class Rule(NamedTuple):
+class Transition(NamedTuple):
     """
     Where control words with ``word & mask == value`` lead.
 
@@ -57,10 +58,10 @@ class Rule(NamedTuple):
     :param to: None: nowhere.
     """
 
-    states: Collection[State] | None
+    states: Collection[MachineState] | None
     mask: int
     value: int
-    to: State | None
+    to: MachineState | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +76,14 @@ class Machine:
     :param ramp: bits of a word without which the ramp of the quick stop holds.
     """
 
-    rules: tuple[Rule, ...] = ()
+    rules: tuple[Transition, ...] = ()
     reset: tuple[int, int] | None = None
-    power_on: tuple[State, int] = (State.SWITCH_ON_DISABLED, 0)
-    after_fault: State = State.SWITCH_ON_DISABLED
+    power_on: tuple[MachineState, int] = (MachineState.SWITCH_ON_DISABLED, 0)
+    after_fault: MachineState = MachineState.SWITCH_ON_DISABLED
     ramp: int = 0
 
 
-class Operation:
+class OperatingState:
     """
     The operating state of one simulated drive.
 
@@ -137,7 +138,7 @@ class Operation:
         """
         self._cause_ends = self.now + duration
         self._code = code
-        self._enter(State.FAULT)
+        self._enter(MachineState.FAULT)
 
     def fault_code(self, default: float) -> float:
         """Return the code of the fault, the default where it has none; 0 without a fault."""
@@ -157,49 +158,53 @@ class Operation:
     def repair(self) -> None:
         """Clear a fault, as a reset or somebody at the drive does."""
         if self.faulted:
-            self._enter(State.READY_TO_SWITCH_ON if self.state is State.FAULT_RELEASED
-                        else self._machine.after_fault)
+            self._enter(
+                MachineState.READY_TO_SWITCH_ON if self.state is MachineState.FAULT_RELEASED
+                else self._machine.after_fault)
 
     def standstill(self) -> None:
         """Record that the motor stands: the end of a quick stop, or of a shutdown."""
         self._enter(ENDS.get(self.state, self.state))
 
-    def _enter(self, state: State) -> None:
+    def _enter(self, state: MachineState) -> None:
         self.state = state
         self.faulted = state in FAULTS
         running, ramp = state in RUNNING, self._machine.ramp
-        self.stopping = state is State.QUICK_STOP or running and self.word & ramp != ramp
+        self.stopping = state is MachineState.QUICK_STOP or running and self.word & ramp != ramp
         self.enabled = self.stopping or running
 
 
 def machine_of(table: ControlTable | None) -> Machine:
     """Return what the control section of a profile says; without one a drive just runs."""
     if table is None:
-        return Machine(power_on=(State.OPERATION_ENABLED, 0), after_fault=State.OPERATION_ENABLED)
+        return Machine(power_on=(MachineState.OPERATION_ENABLED, 0),
+                       after_fault=MachineState.OPERATION_ENABLED)
     exact = -1
     rules = [
-        Rule((State.SWITCH_ON_DISABLED, State.QUICK_STOP, *FAULTS), exact, table.enable, None),
-        Rule(None, exact, table.enable, State.OPERATION_ENABLED)]
+        Transition((MachineState.SWITCH_ON_DISABLED, MachineState.QUICK_STOP, *FAULTS), exact,
+                   table.enable, None),
+        Transition(None, exact, table.enable, MachineState.OPERATION_ENABLED)]
     if table.quick_stop is not None:
-        rules += [Rule((State.OPERATION_ENABLED,), exact, table.quick_stop, State.QUICK_STOP),
-                  Rule(None, exact, table.quick_stop, None)]
-    rules += [Rule(FAULTS, 0, 0, State.FAULT_RELEASED),
-              Rule(None, 0, 0, State.READY_TO_SWITCH_ON)]
+        rules += [Transition((MachineState.OPERATION_ENABLED,), exact, table.quick_stop,
+                             MachineState.QUICK_STOP),
+                  Transition(None, exact, table.quick_stop, None)]
+    rules += [Transition(FAULTS, 0, 0, MachineState.FAULT_RELEASED),
+              Transition(None, 0, 0, MachineState.READY_TO_SWITCH_ON)]
     # no word was written yet that any other one might equal
     return Machine(tuple(rules), None if table.reset_fault is None else (exact, table.reset_fault),
-                   (State.READY_TO_SWITCH_ON, exact))
+                   (MachineState.READY_TO_SWITCH_ON, exact))
 
 
-class Report(NamedTuple):
+class MachineStatus(NamedTuple):
     """What status bits can tell."""
 
-    operation: Operation
+    operation: OperatingState
     warning: bool = False
     speed: float = 0.0
     setpoint_reached: bool = False
 
 
-_RULES: tuple[tuple[tuple[str, ...], Callable[[Report], bool]], ...] = (
+_RULES: tuple[tuple[tuple[str, ...], Callable[[MachineStatus], bool]], ...] = (
     (('ready', 'ready_to_switch_on', 'ready_to_run', 'no_fault', 'ok'),
      lambda r: not r.operation.faulted),
     (('enabled', 'running', 'operation_enabled', 'on', 'active', 'operating'),
@@ -239,7 +244,7 @@ class StatusWord:
         """Tell whether anything of the word is known; if not, it is a plain register."""
         return bool(self._bits or self._patterns)
 
-    def compose(self, report: Report, word: int) -> int:
+    def compose(self, report: MachineStatus, word: int) -> int:
         """
         Return the status word.
 

@@ -28,7 +28,7 @@ JUNK = bytes([0xA5]) * 8
 #: what frames hold that nobody should send
 FOREIGN = bytes([0x5A]) * 8
 
-Request = extended.CyclicRequest | extended.Write | extended.ReadRequest
+Request = extended.CyclicRequest | extended.WriteTelegram | extended.ReadTelegram
 
 
 class DataModelTable:
@@ -168,7 +168,7 @@ class ExtendedWire:
         request = extended.decode(frame, strict=True)
         if len(frame.data) != extended.PAYLOAD or not isinstance(request, Request):
             raise IgnoredFrame('read request without eight data bytes')
-        odd = isinstance(request, extended.ReadRequest) and any(frame.data)
+        odd = isinstance(request, extended.ReadTelegram) and any(frame.data)
         return request, 'read request with data other than 00h' if odd else ''
 
     def answer(self, request: Frame, words: Sequence[int]) -> Frame:
@@ -199,7 +199,8 @@ class StandardWire:
         if frame.extended or frame.identifier != self._own[0]:
             return None
         request = standard.decode_request(frame)
-        what, unused = ('write', frame.data[5:]) if isinstance(request, extended.Write) else (
+        what, unused = ('write', frame.data[5:]) if isinstance(request,
+                                                               extended.WriteTelegram) else (
             'read request', frame.data[4:])
         return request, f'{what} with unused bytes other than 00h' if any(unused) else ''
 
@@ -255,7 +256,7 @@ class SimulatedDataModelDrive(SimulatedDrive):
         words: Sequence[int] | None = None
         if isinstance(request, extended.CyclicRequest):
             words = self.table.exchange(request.words)
-        elif isinstance(request, extended.Write):
+        elif isinstance(request, extended.WriteTelegram):
             self.table.write(request.number, request.words, now)
         else:
             words = self.table.read(request.number, request.count, now)

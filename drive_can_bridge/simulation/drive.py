@@ -25,7 +25,7 @@ from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.simulation.faults import Fault, FaultKind, Outbox, parse_fault
+from drive_can_bridge.simulation.faults import Fault, FaultKind, FaultyOutbox, parse_fault
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.registers import Mechanics, PlantFactory, Registers
 
@@ -102,7 +102,7 @@ class SimulatedDrive(ABC):
         self.requests = self.answers = 0
         self.violations: Counter[str] = Counter()
         self._notices: list[str] = []
-        self._outbox = Outbox(self._foreign_frames)
+        self._outbox = FaultyOutbox(self._foreign_frames)
         self._deaf_until = -math.inf
         self._foreign_turn = -1
         self._cut_at = math.inf
@@ -185,7 +185,7 @@ class SimulatedDrive(ABC):
             fault = parse_fault(fault)
         self._advance(now)
         kind = fault.kind
-        if kind in Outbox.FAULTS:
+        if kind in FaultyOutbox.FAULTS:
             self._outbox.add(fault)
         elif kind in (FaultKind.STUCK, FaultKind.REFUSE):
             self.registers.faults[kind, self._known(fault.argument), ''] = fault

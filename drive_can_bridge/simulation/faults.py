@@ -117,7 +117,7 @@ def parse_fault(text: str) -> Fault:
                            f'{kind.meaning}') from None
 
 
-class Outbox:
+class FaultyOutbox:
     """
     What a drive sends, and the scripted faults of its answers.
 

@@ -27,9 +27,10 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import quantities
-from drive_can_bridge.simulation.control import ENDS, machine_of, Operation, Report, StatusWord
+from drive_can_bridge.simulation.control import (
+    ENDS, machine_of, MachineStatus, OperatingState, StatusWord)
 from drive_can_bridge.simulation.quantities import Quantity, RampParameter, RampUse
-from drive_can_bridge.simulation.registers import Mechanics, Refusal, Registers
+from drive_can_bridge.simulation.registers import Mechanics, Registers, WriteRefusal
 
 #: shares of the rated torque: at rated speed, at any speed, at one rated speed per second
 LOAD_TORQUE = 0.30
@@ -176,12 +177,12 @@ class MotorPlant:
     """
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
-                 mechanics: Mechanics, *, operation: Operation | None = None,
+                 mechanics: Mechanics, *, operation: OperatingState | None = None,
                  movable: Mapping[str, Parameter] | None = None) -> None:
         self.registers = registers
         self.control = control = configuration.profile.control
         self._joint = configuration.joint
-        self.operation = operation or Operation(machine_of(control))
+        self.operation = operation or OperatingState(machine_of(control))
         self._mechanics = mechanics
         self._noise = random.Random(configuration.name)
         self._jitter = 0    # raw steps by which measured positions are off at the moment
@@ -310,7 +311,7 @@ class MotorPlant:
             share = lambda: 0.7 * abs(motor.share)  # noqa: E731
         return lambda: full * share()
 
-    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+    def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
         return None
 
     def written(self, name: str, before: int, raw: int) -> None:
@@ -389,9 +390,9 @@ class MotorPlant:
         if self._mover is not None and self.speed_setpoint is None:
             self.registers.put(self._mover.name, self.motor.shaft.position)
 
-    def _report(self) -> Report:
+    def _report(self) -> MachineStatus:
         motor, operation = self.motor, self.operation
-        return Report(operation, warning=motor.temperature > WARNING_TEMPERATURE,
+        return MachineStatus(operation, warning=motor.temperature > WARNING_TEMPERATURE,
                       speed=motor.shaft.speed,
                       setpoint_reached=operation.enabled and motor.shaft.speed == self.target)
 

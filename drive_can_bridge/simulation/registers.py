@@ -16,12 +16,12 @@ from typing import Protocol
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.simulation.control import Operation
+from drive_can_bridge.simulation.control import OperatingState
 from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw
 
 
-class Refusal(Enum):
+class WriteRefusal(Enum):
     """Why a write is refused, where a protocol can say so; one kind is acknowledged instead."""
 
     READ_ONLY = 'read-only'
@@ -42,7 +42,7 @@ class Plant(Protocol):
     :ivar volatile: names of further parameters that a loss of power resets.
     """
 
-    operation: Operation
+    operation: OperatingState
     volatile: Collection[str] = ()
 
     def initial(self, parameter: Parameter) -> int:
@@ -51,7 +51,7 @@ class Plant(Protocol):
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
         """Return what computes a read-only register; None: it is plain memory."""
 
-    def refusal(self, parameter: Parameter, raw: int) -> Refusal | None:
+    def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
         """Say why a register does not take a value within its limits now; None: it does."""
 
     def written(self, name: str, before: int, raw: int) -> None:
@@ -105,7 +105,7 @@ class Mechanics:
         return cls(**given)  # type: ignore[arg-type]  # each has the type of its range
 
 
-class Refused(DriveCanError):
+class AccessRefused(DriveCanError):
     """
     An access that a drive does not carry out.
 
@@ -170,20 +170,20 @@ class Registers:
         """Return the allowed raw integer nearest to another one."""
         return clamp(raw, self.parameters[name].raw_limits)
 
-    def refusal(self, raws: Mapping[str, int]) -> Refusal | None:
+    def refusal(self, raws: Mapping[str, int]) -> WriteRefusal | None:
         """Say why registers that are written together refuse it; None: they do not."""
         for name, raw in raws.items():
             parameter = self.parameters[name]
             if not parameter.writable:
-                return Refusal.READ_ONLY
+                return WriteRefusal.READ_ONLY
             for kind, one, other in self.faults:
                 if one == name and (kind is FaultKind.REFUSE or (
                         kind is FaultKind.NEEDS and other not in self._written)):
-                    return Refusal.FORBIDDEN
+                    return WriteRefusal.FORBIDDEN
             if raw != self.clamped(name, raw):
-                return Refusal.OUT_OF_RANGE
+                return WriteRefusal.OUT_OF_RANGE
             refusal = self._plant.refusal(parameter, raw)
-            if refusal not in (None, Refusal.UNTOLD):
+            if refusal not in (None, WriteRefusal.UNTOLD):
                 return refusal
         return None
 

@@ -52,7 +52,7 @@ _CUT = 'the rest cannot be read: it is damaged, or cut'
 Complain = Callable[[str], None]
 
 
-class _Content(NamedTuple):
+class _PacketContent(NamedTuple):
     """
     What a packet holds.
 
@@ -283,16 +283,17 @@ def _record(data: bytes, reader: Any, about: Any, interfaces: _Interfaces,
                   True if content.outgoing else None)
 
 
-def _content(link: int, data: bytes, order: str) -> _Content | None:
+def _content(link: int, data: bytes, order: str) -> _PacketContent | None:
     """Return where in a packet a frame is; None: there is none."""
     if link == _SOCKETCAN:
-        return _Content(data, '>')
+        return _PacketContent(data, '>')
     if link == _COOKED:
         direction, protocol = unpack_from('>H12xH', data)
-        return _Content(data[16:], order, direction == _OUTGOING) if _is_can(protocol) else None
+        return _PacketContent(data[16:], order,
+                              direction == _OUTGOING) if _is_can(protocol) else None
     if link == _COOKED_2:
         protocol, index, direction = unpack_from('>HxxLxxB', data)
-        return (_Content(data[20:], order, direction == _OUTGOING, f'#{index}')
+        return (_PacketContent(data[20:], order, direction == _OUTGOING, f'#{index}')
                 if _is_can(protocol) else None)
     if link == _NAMED:
         name, place = b'', 0
@@ -304,7 +305,7 @@ def _content(link: int, data: bytes, order: str) -> _Content | None:
             if tag == _DISSECTOR:
                 name = data[place - length:place].rstrip(b'\0')
         if name in (b'can-hostendian', b'can-bigendian'):
-            return _Content(data[place:], order if name == b'can-hostendian' else '>')
+            return _PacketContent(data[place:], order if name == b'can-hostendian' else '>')
     return None
 
 

@@ -155,7 +155,7 @@ class _Wanted:
 
 
 @dataclass
-class _Bus:
+class _RecordedBus:
     """One recorded bus."""
 
     configuration: BusConfiguration
@@ -186,10 +186,10 @@ class FlightRecorder:
         buses = list(buses)
         channels = labels(buses)
         self._buses = {
-            bus.name: _Bus(bus, channels[bus.name],
-                           Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
-                           Path(bus.trace_directory).expanduser() if bus.trace_directory
-                           else default_folder)
+            bus.name: _RecordedBus(bus, channels[bus.name],
+                                   Ring(bus.trace_seconds + AFTERMATH + SPACING + _SLACK),
+                                   Path(bus.trace_directory).expanduser() if bus.trace_directory
+                                   else default_folder)
             for bus in buses if bus.trace_seconds > 0.0}
         self._first: dict[str, list[Path]] = {name: [] for name in self._buses}
         self._lock = threading.Lock()
@@ -265,7 +265,7 @@ class FlightRecorder:
         self._changed.ring()
         self._thread.join(_END_TIMEOUT)
 
-    def _want(self, bus: _Bus, wanted: _Wanted) -> None:
+    def _want(self, bus: _RecordedBus, wanted: _Wanted) -> None:
         bus.wanted = wanted
         bus.last = wanted.at
         self._changed.ring()
@@ -286,7 +286,7 @@ class FlightRecorder:
             else:
                 self._write(*due)
 
-    def _due(self, *, asked: bool = True) -> tuple[_Bus, _Wanted] | None:
+    def _due(self, *, asked: bool = True) -> tuple[_RecordedBus, _Wanted] | None:
         """
         Return the bus whose trace is to be written now, failures first. The lock must be held.
 
@@ -302,7 +302,7 @@ class FlightRecorder:
         found[0].wanted = None
         return found
 
-    def _write(self, bus: _Bus, wanted: _Wanted) -> None:
+    def _write(self, bus: _RecordedBus, wanted: _Wanted) -> None:
         name = bus.configuration.name
         path = bus.folder
         answer, text = '', f'bus {name}: no trace of {wanted.reason}: '
@@ -335,7 +335,7 @@ class FlightRecorder:
         for done in wanted.done:
             done(answer, '' if answer else text)
 
-    def _fill(self, path: Path, bus: _Bus, wanted: _Wanted, offset: float) -> int:
+    def _fill(self, path: Path, bus: _RecordedBus, wanted: _Wanted, offset: float) -> int:
         """Write a file that has its name only when it is complete."""
         unfinished = path.with_suffix('.part')
         since = wanted.since - bus.configuration.trace_seconds
@@ -372,7 +372,7 @@ class FlightRecorder:
                 return
             self._write(*due)
 
-    def _remove_old(self, bus: _Bus, path: Path) -> None:
+    def _remove_old(self, bus: _RecordedBus, path: Path) -> None:
         """Keep the first traces of this run, and of the others the newest."""
         limit = bus.configuration.trace_files
         first = self._first[bus.configuration.name]

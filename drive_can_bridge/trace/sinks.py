@@ -152,7 +152,7 @@ class Selection:
         return True
 
 
-class _Row:
+class _TitleRow:
     """What all telegrams of one title of a drive have in common."""
 
     __slots__ = ('formats', 'head', 'last', 'parameters')
@@ -179,7 +179,7 @@ class LineWriter:
         # by identity: the hash of a parameter takes longer than the rest; the reference keeps it
         self._formats: dict[int, tuple[Parameter, Format]] = {}
         self._start = math.nan
-        self._rows: dict[tuple[str, str, str, bool], _Row] = {}
+        self._rows: dict[tuple[str, str, str, bool], _TitleRow] = {}
         self._line = self._document if as_json else self._text
 
     def __call__(self, bus: str, telegram: Telegram) -> None:
@@ -227,7 +227,7 @@ class LineWriter:
             self._formats[id(parameter)] = parameter, chosen
         return chosen
 
-    def _new_row(self, key: tuple[str, str, str, bool], telegram: Telegram) -> _Row:
+    def _new_row(self, key: tuple[str, str, str, bool], telegram: Telegram) -> _TitleRow:
         bus, drive, _, _ = key
         arrow = '' if telegram.direction is _NEITHER else f' {telegram.direction.value}'
         head = f'{bus}{" " if drive else ""}{drive}{arrow} '
@@ -235,7 +235,7 @@ class LineWriter:
             head += f'{telegram.title}: '
         if len(self._rows) >= _KINDS_MAX:
             self._rows.clear()
-        row = self._rows[key] = _Row(head, telegram.time)
+        row = self._rows[key] = _TitleRow(head, telegram.time)
         return row
 
     def _document(self, bus: str, telegram: Telegram) -> str:

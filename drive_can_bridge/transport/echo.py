@@ -21,7 +21,7 @@ IN_A_ROW, UNDECIDED_MAX = 20, 100
 _PATIENCE = 1.0
 
 
-class Verdict(Enum):
+class EchoVerdict(Enum):
     """What is known."""
 
     OPEN = 'open'
@@ -46,7 +46,7 @@ class Echo:
     """
 
     def __init__(self, clock: Clock) -> None:
-        self.verdict = Verdict.OPEN
+        self.verdict = EchoVerdict.OPEN
         self._lock = clock.lock()
         self._now = clock.now
         self._sent: deque[_Sent] = deque()
@@ -68,17 +68,17 @@ class Echo:
         """Tell whether a frame that has arrived is nobody's, because it is one of ours."""
         with self._lock:
             self._look(self._now())
-            if self.verdict is Verdict.SILENT:
+            if self.verdict is EchoVerdict.SILENT:
                 return False
             place = next((place for place, entry in enumerate(self._sent)
                           if entry.frame == frame and not entry.came), None)
             if place is None:
                 # once more what came back already
-                again = self.verdict is Verdict.OPEN and any(
+                again = self.verdict is EchoVerdict.OPEN and any(
                     entry.frame == frame for entry in self._sent)
                 self._back = 0 if again else self._back
                 return again
-            if self.verdict is Verdict.ECHOES:      # those before it were not sent after all
+            if self.verdict is EchoVerdict.ECHOES:      # those before it were not sent after all
                 for _ in range(place + 1):
                     self._sent.popleft()
                 return True
@@ -89,10 +89,10 @@ class Echo:
 
     def _look(self, now: float) -> None:
         """Judge what does not come back any more."""
-        patience = WITHIN if self.verdict is Verdict.OPEN else _PATIENCE
+        patience = WITHIN if self.verdict is EchoVerdict.OPEN else _PATIENCE
         while self._sent and now - self._sent[0].at > patience:
             came = self._sent.popleft().came
-            if not came and self.verdict is Verdict.OPEN:
+            if not came and self.verdict is EchoVerdict.OPEN:
                 self._judge(came=False, in_order=False)
 
     def _judge(self, *, came: bool, in_order: bool) -> None:
@@ -100,8 +100,8 @@ class Echo:
         self._back = self._back + 1 if in_order else 0
         self._missing = 0 if came else self._missing + 1
         if self._back >= IN_A_ROW:
-            self.verdict = Verdict.ECHOES
+            self.verdict = EchoVerdict.ECHOES
             self._sent = deque(entry for entry in self._sent if not entry.came)
         elif self._missing >= IN_A_ROW or self._judged >= UNDECIDED_MAX:
-            self.verdict = Verdict.SILENT
+            self.verdict = EchoVerdict.SILENT
             self._sent.clear()

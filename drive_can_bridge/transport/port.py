@@ -27,7 +27,7 @@ from drive_can_bridge.transport.adapters import check_channel
 from drive_can_bridge.transport.bus_identity import (
     adapter_of, device_of, DeviceLock, is_absent, SERIAL_INTERFACES,
 )
-from drive_can_bridge.transport.echo import Echo, Verdict
+from drive_can_bridge.transport.echo import Echo, EchoVerdict
 from drive_can_bridge.transport.end_point import Counts, EndPoint
 from drive_can_bridge.transport.error_frames import (
     ADVICE_ALONE, ADVICE_DISTURBED, BUS_OFF, BusError, decode_error_frame,
@@ -200,7 +200,7 @@ class Port(EndPoint):
         before = echo.verdict
         if not echo.is_echo(frame):
             return True
-        if echo.verdict is not Verdict.ECHOES:      # perhaps: nobody's
+        if echo.verdict is not EchoVerdict.ECHOES:      # perhaps: nobody's
             self.rejected_frames += 1
         elif before is not echo.verdict and self.tell is not None:
             self.tell(bus_sentences.adapter_echoes())

@@ -32,7 +32,7 @@ from rich.text import Text
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core.text import counted
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Snapshot, Source, Times
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, ModelSource, Snapshot, Times
 from drive_can_bridge.monitor.summary import in_order, silence, Tone, tone_of
 from drive_can_bridge.view.parts import (
     advice_lines, bus_lines, clock, DIM, drives_table, flow, lamps, Lines, log_lines, milliseconds,
@@ -218,7 +218,7 @@ _LOG_MIN = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ViewSetting:
     """
     What surrounds a page.
 
@@ -279,7 +279,7 @@ class _Frame:
             self.add(title, body(lines), lines)
 
 
-def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, height: int,
+def page(snapshot: Snapshot, choice: Choice, setting: ViewSetting, *, width: int, height: int,
          notice: str = '') -> RenderableType:
     """
     Compose the page that was chosen, so many columns wide and lines high.
@@ -310,7 +310,7 @@ def page(snapshot: Snapshot, choice: Choice, setting: Setting, *, width: int, he
     return root
 
 
-def help_lines(drive: DriveSnapshot | None, setting: Setting, width: int) -> Lines:
+def help_lines(drive: DriveSnapshot | None, setting: ViewSetting, width: int) -> Lines:
     """Say what can be typed elsewhere, of the drive that is marked, and what the colours mean."""
     name = drive.name if drive is not None else 'DRIVE'
     lines: Lines = [Text('in another terminal', style=DIM)]
@@ -338,7 +338,7 @@ def closely(choice: Choice) -> str | None:
     return choice.drive if choice.page is Page.DRIVE else None
 
 
-def _header(snapshot: Snapshot, setting: Setting, width: int) -> Text:
+def _header(snapshot: Snapshot, setting: ViewSetting, width: int) -> Text:
     header = Text(setting.title, style='bold', no_wrap=True)
     bridges, drives = len(snapshot.bridges), len(snapshot.drives)
     right = clock(snapshot.at)
@@ -363,7 +363,7 @@ def _keys(shown: Page, width: int) -> Text:
     return line
 
 
-def _nobody(frame: _Frame, snapshot: Snapshot, setting: Setting) -> None:
+def _nobody(frame: _Frame, snapshot: Snapshot, setting: ViewSetting) -> None:
     """Say what is looked for, and how to make it appear."""
     where = f' below {setting.namespace}' if setting.namespace else ''
     if snapshot.bridges:
@@ -573,7 +573,7 @@ _FRAME_PERIOD_MAX = 1.0
 _LOOK_PERIOD = 0.1
 
 
-def show(source: Source, model: Model, setting: Setting, steady: Clock, *,
+def show(source: ModelSource, model: Model, setting: ViewSetting, steady: Clock, *,
          ended: Callable[[], bool], quit_code: int, notice: Callable[[], str] = str) -> int:
     """
     Draw until the end, or until the user has enough.

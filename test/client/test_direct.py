@@ -16,7 +16,7 @@ from saying import says
 from waiting import wait_for
 
 from drive_can_bridge.client import find_source, open_drives
-from drive_can_bridge.client.direct import AnotherMaster, LISTEN
+from drive_can_bridge.client.direct import LISTEN
 from drive_can_bridge.client.drive import Drives, Enabled
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
 from drive_can_bridge.core.roles import Role

@@ -12,7 +12,7 @@ from test_control import (
 
 from drive_can_bridge.core import control_machine
 from drive_can_bridge.core.control import (
-    ControlAction, ControlRequest, Meeting, MEETINGS, Step, STEPS, Then)
+    ControlAction, ControlRequest, ControlStep, Meeting, MEETINGS, STEPS, Then)
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.profile import ControlTable
 
@@ -64,7 +64,7 @@ def _expected() -> dict[Story, list[object]]:
 
 
 @pytest.mark.parametrize('step', STEPS)
-def test_each_step_is_needed(step: Step, expected: dict[Story, list[object]],
+def test_each_step_is_needed(step: ControlStep, expected: dict[Story, list[object]],
                              monkeypatch: pytest.MonkeyPatch) -> None:
     """Missing, with anything else that follows, or with one condition less."""
     place = STEPS.index(step)

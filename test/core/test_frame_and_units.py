@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from drive_can_bridge.core.configuration import convertible_units, Quantity, si_factor
+from drive_can_bridge.core.configuration import convertible_units, JointQuantity, si_factor
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, LocalProtocolError, RemoteProtocolError)
 from drive_can_bridge.core.frame import Frame, Route
@@ -26,25 +26,28 @@ def test_routes_look_at_the_format() -> None:
 
 
 @pytest.mark.parametrize('quantity, unit, options, factor', [
-    (Quantity.VELOCITY, 'rpm', {}, 2 * math.pi / 60), (Quantity.VELOCITY, 'rad/s', {}, 1.0),
-    (Quantity.VELOCITY, 'deg/s', {}, math.pi / 180), (Quantity.VELOCITY, 'Hz', {}, 2 * math.pi),
-    (Quantity.VELOCITY, 'Hz', {'pole_pairs': 2}, math.pi),
-    (Quantity.VELOCITY, 'rpm', {'pole_pairs': 2}, 2 * math.pi / 60),
-    (Quantity.VELOCITY, 'rpm', {'gear_ratio': -2.0}, -math.pi / 60),
-    (Quantity.POSITION, 'rev', {'gear_ratio': 2.0}, math.pi), (Quantity.POSITION, 'rad', {}, 1.0),
-    (Quantity.POSITION, 'deg', {}, math.pi / 180), (Quantity.POSITION, 'rpm', {}, None),
-    (Quantity.VELOCITY, 'furlong', {}, None), (Quantity.EFFORT, 'anything', {}, 1.0),
-    (Quantity.EFFORT, 'A', {'gear_ratio': 5.0}, 1.0),
+    (JointQuantity.VELOCITY, 'rpm', {}, 2 * math.pi / 60),
+    (JointQuantity.VELOCITY, 'rad/s', {}, 1.0),
+    (JointQuantity.VELOCITY, 'deg/s', {}, math.pi / 180),
+    (JointQuantity.VELOCITY, 'Hz', {}, 2 * math.pi),
+    (JointQuantity.VELOCITY, 'Hz', {'pole_pairs': 2}, math.pi),
+    (JointQuantity.VELOCITY, 'rpm', {'pole_pairs': 2}, 2 * math.pi / 60),
+    (JointQuantity.VELOCITY, 'rpm', {'gear_ratio': -2.0}, -math.pi / 60),
+    (JointQuantity.POSITION, 'rev', {'gear_ratio': 2.0}, math.pi),
+    (JointQuantity.POSITION, 'rad', {}, 1.0),
+    (JointQuantity.POSITION, 'deg', {}, math.pi / 180), (JointQuantity.POSITION, 'rpm', {}, None),
+    (JointQuantity.VELOCITY, 'furlong', {}, None), (JointQuantity.EFFORT, 'anything', {}, 1.0),
+    (JointQuantity.EFFORT, 'A', {'gear_ratio': 5.0}, 1.0),
 ])
-def test_factors(quantity: Quantity, unit: str, options: dict[str, float],
+def test_factors(quantity: JointQuantity, unit: str, options: dict[str, float],
                  factor: float | None) -> None:
     found = si_factor(quantity, unit, **options)
     assert found == (factor if factor is None else pytest.approx(factor))
 
 
 def test_units_that_convert() -> None:
-    assert convertible_units(Quantity.POSITION) == ('rad', 'deg', 'rev')
-    assert convertible_units(Quantity.EFFORT) == ()
+    assert convertible_units(JointQuantity.POSITION) == ('rad', 'deg', 'rev')
+    assert convertible_units(JointQuantity.EFFORT) == ()
 
 
 def test_errors() -> None:

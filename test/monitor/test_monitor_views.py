@@ -10,7 +10,7 @@ import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.view.live import Choice, closely, HINTS, Key, keys_in, Page, Setting
+from drive_can_bridge.view.live import Choice, closely, HINTS, Key, keys_in, Page, ViewSetting
 
 
 @pytest.mark.parametrize(('width', 'height'), SIZES)
@@ -38,7 +38,7 @@ def test_it_fits_everywhere(width: int, page: Page) -> None:
 def test_nobody_starts_a_bridge_that_is_being_started() -> None:
     for bridge in ('', 'drive_can_bridge'):
         snapshot = seen(Model())
-        told = plain(snapshot, Choice(), 100, 30, Setting(bridge=bridge))
+        told = plain(snapshot, Choice(), 100, 30, ViewSetting(bridge=bridge))
         assert ('To start one' in told) == bool(bridge)
         assert ('drive_can_bridge --ros-args --params-file FILE' in told) == bool(bridge)
         assert 'ros2 run' not in told

@@ -16,12 +16,12 @@ from rich.console import Console
 
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import Snapshot
-from drive_can_bridge.view.live import Choice, Page, page, Setting
+from drive_can_bridge.view.live import Choice, Page, page, ViewSetting
 
 GOLDEN = Path(__file__).with_name('golden')
 SIZES = ((80, 24), (140, 50), (60, 20))
-SETTING = Setting(place='ROS domain 7, on this machine only',
-                  environment=('export ROS_DOMAIN_ID=7',))
+SETTING = ViewSetting(place='ROS domain 7, on this machine only',
+                      environment=('export ROS_DOMAIN_ID=7',))
 #: name -> (what there is, what was chosen)
 VIEWS: dict[str, tuple[Snapshot, Choice]] = {
     'drives': (seen(three_drives()), Choice(drive='/lift')),
@@ -35,7 +35,7 @@ VIEWS: dict[str, tuple[Snapshot, Choice]] = {
 
 
 def shown(snapshot: Snapshot, choice: Choice, width: int, height: int,
-          setting: Setting = SETTING, *, colours: bool = False) -> str:
+          setting: ViewSetting = SETTING, *, colours: bool = False) -> str:
     """Print a page as a terminal of that size would get it."""
     os.environ['TZ'] = 'UTC'
     time.tzset()
@@ -47,7 +47,7 @@ def shown(snapshot: Snapshot, choice: Choice, width: int, height: int,
 
 
 def plain(snapshot: Snapshot, choice: Choice, width: int, height: int,
-          setting: Setting = SETTING) -> str:
+          setting: ViewSetting = SETTING) -> str:
     """Print a page without any colours and attributes."""
     console = Console(file=io.StringIO(), width=width, height=height)
     text = shown(snapshot, choice, width, height, setting)

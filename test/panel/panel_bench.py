@@ -30,11 +30,11 @@ from world import World, world
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.panel import actions
-from drive_can_bridge.panel.access import PanelAccess, Role
+from drive_can_bridge.panel.access import PanelAccess, PanelRole
 from drive_can_bridge.panel.feed import Feed
-from drive_can_bridge.panel.pages import application, Setting
+from drive_can_bridge.panel.pages import application, PanelSetting
 from drive_can_bridge.panel.server import log_to_standard_error, LOGGERS
-from drive_can_bridge.ros.monitor.client import MonitorClient, Operations
+from drive_can_bridge.ros.monitor.client import MonitorClient, ServiceOperations
 
 PORT = 8080
 #: s by which an event loop is late: it calls what is due within its resolution too early
@@ -141,11 +141,12 @@ class House(Visitors):
         self.bridge.begin()
         KEPT.update(self.bridge.node.drives.values())
         access = PanelAccess(port=PORT)
-        self.tokens = {role.value: access.tokens[role] for role in Role}
+        self.tokens = {role.value: access.tokens[role] for role in PanelRole}
         model = Model('')
         self._source = MonitorClient(model)
-        self.feed = Feed(self._source, Operations(self._source.node), model, bench.clock)
-        self.app = application(self.feed, access, Setting('ROS domain 7', 'robot', allow_writes))
+        self.feed = Feed(self._source, ServiceOperations(self._source.node), model, bench.clock)
+        self.app = application(self.feed, access,
+                               PanelSetting('ROS domain 7', 'robot', allow_writes))
         self._said = io.StringIO()
         with redirect_stderr(self._said):
             log_to_standard_error(bench.clock)

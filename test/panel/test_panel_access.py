@@ -6,32 +6,32 @@ from urllib.parse import urlsplit
 import pytest
 
 from drive_can_bridge.core.errors import DriveCanError
-from drive_can_bridge.panel.access import Entry, is_loopback, PanelAccess, Refusal, Role
+from drive_can_bridge.panel.access import AccessRefusal, Entry, is_loopback, PanelAccess, PanelRole
 
 PORT = 8080
 
 
 def judge(access: PanelAccess, *, host: str = '127.0.0.1:8080', method: str = 'GET',
           query: str = '',
-          kind: str = 'http', cookie: str | None = None, **fields: str) -> Entry | Refusal:
+          kind: str = 'http', cookie: str | None = None, **fields: str) -> Entry | AccessRefusal:
     """Judge a request with the cookie of a viewer."""
     if cookie is None:
-        cookie = f'drive_can_panel_8080={access.tokens[Role.VIEWER]}'
+        cookie = f'drive_can_panel_8080={access.tokens[PanelRole.VIEWER]}'
     headers = {'host': host, 'cookie': cookie,
                **{name.replace('_', '-'): value for name, value in fields.items()}}
     return access.judge(kind, method, [(name.encode(), value.encode('latin-1'))
                                        for name, value in headers.items()], query.encode())
 
 
-def refused(judgement: Entry | Refusal) -> int:
+def refused(judgement: Entry | AccessRefusal) -> int:
     """Return the status of a refusal."""
-    assert isinstance(judgement, Refusal)
+    assert isinstance(judgement, AccessRefusal)
     return judgement.status
 
 
 def test_the_token_of_each_role_opens_and_becomes_a_cookie() -> None:
     access = PanelAccess(port=PORT)
-    for role in Role:
+    for role in PanelRole:
         entry = judge(access, query=f'token={access.tokens[role]}', cookie='')
         cookie = f'drive_can_panel_8080={access.tokens[role]}; HttpOnly; SameSite=Strict; Path=/'
         assert entry == Entry(role, cookie)
@@ -44,9 +44,9 @@ def test_the_token_of_each_role_opens_and_becomes_a_cookie() -> None:
 def test_cookies_of_other_programs_are_in_nobody_s_way(other: str) -> None:
     # they have one jar for all ports of a host
     access = PanelAccess(port=PORT)
-    own = f'drive_can_panel_8080={access.tokens[Role.OPERATOR]}'
+    own = f'drive_can_panel_8080={access.tokens[PanelRole.OPERATOR]}'
     for cookie in (f'{other}; {own}', f'{own}; {other}', f'{other};{own};{other}'):
-        assert judge(access, cookie=cookie) == Entry(Role.OPERATOR)
+        assert judge(access, cookie=cookie) == Entry(PanelRole.OPERATOR)
 
 
 @pytest.mark.parametrize('cookie', [
@@ -54,7 +54,8 @@ def test_cookies_of_other_programs_are_in_nobody_s_way(other: str) -> None:
     'drive_can_panel_8080={token}x', 'token={token}', '\xff\x00;=;;', 'drive_can_panel_8080=\xfc'])
 def test_other_cookies_open_nothing(cookie: str) -> None:
     access = PanelAccess(port=PORT)
-    assert refused(judge(access, cookie=cookie.format(token=access.tokens[Role.VIEWER]))) == 401
+    assert refused(judge(access,
+                         cookie=cookie.format(token=access.tokens[PanelRole.VIEWER]))) == 401
 
 
 def test_a_wrong_token_is_one_whatever_the_cookie() -> None:
@@ -64,7 +65,7 @@ def test_a_wrong_token_is_one_whatever_the_cookie() -> None:
 
 def test_a_token_in_the_address_opens_pages_only() -> None:
     access = PanelAccess(port=PORT)
-    query = f'token={access.tokens[Role.OPERATOR]}'
+    query = f'token={access.tokens[PanelRole.OPERATOR]}'
     assert refused(judge(access, query=query, method='POST', cookie='')) == 401
     assert refused(judge(access, query=query, kind='websocket', cookie='')) == 401
 
@@ -116,7 +117,7 @@ def test_the_address_that_is_printed_opens_it(host: str) -> None:
     from drive_can_bridge.panel.server import address, listen
     with listen(host, 0) as listener:
         access = PanelAccess(port=listener.getsockname()[1], host=host)
-        printed = urlsplit(address(listener, access.tokens[Role.VIEWER]))
+        printed = urlsplit(address(listener, access.tokens[PanelRole.VIEWER]))
     assert isinstance(judge(access, host=printed.netloc, query=printed.query, cookie=''), Entry)
 
 

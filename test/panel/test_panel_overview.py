@@ -10,7 +10,7 @@ from drive_can_bridge.monitor.snapshot import (
 )
 from drive_can_bridge.monitor.summary import silence
 from drive_can_bridge.monitor.values import ParameterInfo
-from drive_can_bridge.panel.access import Role
+from drive_can_bridge.panel.access import PanelRole
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
@@ -45,7 +45,7 @@ def texts(page: Any, kind: str) -> list[str]:
             for found in shown(page, kind)]
 
 
-def overview(snapshot: Snapshot, role: Role = Role.OPERATOR) -> Any:
+def overview(snapshot: Snapshot, role: PanelRole = PanelRole.OPERATOR) -> Any:
     from drive_can_bridge.panel.pages import Overview
     made = Overview(role, 'ROS domain 7')
     made.show(snapshot)

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 
-from drive_can_bridge.panel.access import PanelAccess, Role
+from drive_can_bridge.panel.access import PanelAccess, PanelRole
 from drive_can_bridge.panel.server import (
     Connection, CONNECTIONS_MAX, FIRST_BYTE, KEPT_FOR_OPERATORS, OUTSIDE_MAX,
 )
@@ -89,10 +89,10 @@ def test_who_came_first_leaves_first() -> None:
 
 def test_inside_there_is_a_limit_but_not_for_stops() -> None:
     house = House()
-    inside = [house.comes()[0].enter(Role.OPERATOR, stop=False)
+    inside = [house.comes()[0].enter(PanelRole.OPERATOR, stop=False)
               for _ in range(CONNECTIONS_MAX + 1)]
     assert inside == [True] * CONNECTIONS_MAX + [False]
-    assert house.comes()[0].enter(Role.OPERATOR, stop=True)
+    assert house.comes()[0].enter(PanelRole.OPERATOR, stop=True)
     # who is inside stays there, whoever stands outside
     silent = [house.comes() for _ in range(2 * OUTSIDE_MAX)]
     assert sum(wire.closed for _, wire in silent) >= OUTSIDE_MAX
@@ -102,6 +102,6 @@ def test_inside_there_is_a_limit_but_not_for_stops() -> None:
 def test_viewers_leave_room_for_operators() -> None:
     house = House()
     viewers = CONNECTIONS_MAX - KEPT_FOR_OPERATORS
-    inside = [house.comes()[0].enter(Role.VIEWER, stop=False) for _ in range(viewers + 1)]
+    inside = [house.comes()[0].enter(PanelRole.VIEWER, stop=False) for _ in range(viewers + 1)]
     assert inside == [True] * viewers + [False]
-    assert house.comes()[0].enter(Role.OPERATOR, stop=False)
+    assert house.comes()[0].enter(PanelRole.OPERATOR, stop=False)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from drive_can_bridge.core.parameters import ValueKind
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Reading
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, ParameterReading
 from drive_can_bridge.monitor.values import ParameterInfo
 
 if TYPE_CHECKING:
@@ -21,14 +21,14 @@ RAMP = ParameterInfo('ramp_time', ValueKind.DOUBLE, facts={'unit': 's', 'scale':
 def drive(text: str, name: str = RAMP.name) -> DriveSnapshot:
     """Return a drive of which one parameter was read."""
     return DriveSnapshot('/lift', 'lift', '/drive_can_bridge', 'online', Level.OK, True, '',
-                         readings={name: Reading(text, 0.0)})
+                         readings={name: ParameterReading(text, 0.0)})
 
 
 @pytest.mark.parametrize('name', [
     'x onclick="alert(1)"', "x :title='alert(1)'", 'x\n@click=alert(1)', '"', 'x innerHTML=<b>'])
 def test_a_name_stays_one_attribute(page: object, name: str) -> None:
-    from drive_can_bridge.panel.drive_page import _Row
-    _Row('/lift', replace(RAMP, name=name), writes=True)
+    from drive_can_bridge.panel.drive_page import _ParameterRow
+    _ParameterRow('/lift', replace(RAMP, name=name), writes=True)
     marks = [element.props for element in page.elements.values()  # type: ignore[attr-defined]
              if 'data-parameter' in element.props]
     assert [dict(props) for props in marks] == [{'data-parameter': name}]
@@ -40,8 +40,8 @@ def test_a_name_stays_one_attribute(page: object, name: str) -> None:
     ('setpoint_2', False), ('speed_setpoint_10', False), ('control_word2', False),
     ('setpoint_source', True), ('targets', True), ('retarget_time', True)])
 def test_what_moves_a_drive_has_no_field(page: object, name: str, edited: bool) -> None:
-    from drive_can_bridge.panel.drive_page import _Row
-    row = _Row('/lift', replace(RAMP, name=name), writes=True)
+    from drive_can_bridge.panel.drive_page import _ParameterRow
+    row = _ParameterRow('/lift', replace(RAMP, name=name), writes=True)
     assert (row._field is not None) == edited
 
 
@@ -51,8 +51,8 @@ def test_what_says_the_meaning_of_a_setpoint_has_one() -> None:
 
 
 def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: object) -> None:
-    from drive_can_bridge.panel.drive_page import _Row
-    row = _Row('/lift', RAMP, writes=True)
+    from drive_can_bridge.panel.drive_page import _ParameterRow
+    row = _ParameterRow('/lift', RAMP, writes=True)
     row.show(drive('2.50'))
     assert (row._field.value, row._now.text) == ('2.50', '')
     row.show(drive('3.00'))
@@ -72,9 +72,9 @@ def test_what_is_typed_is_left_alone_and_what_was_read_stands_beside_it(page: ob
 
 
 def test_what_cannot_be_read_is_said(page: object) -> None:
-    from drive_can_bridge.panel.drive_page import _Row
+    from drive_can_bridge.panel.drive_page import _ParameterRow
     for writes in (False, True):
-        row = _Row('/lift', RAMP, writes=writes)
+        row = _ParameterRow('/lift', RAMP, writes=writes)
         row.show(drive(''))
         assert (row._now if writes else row._label).text == 'could not be read'
 

@@ -18,7 +18,8 @@ from waiting import wait_for
 
 from drive_can_bridge.core.sentences import may_still_be_running
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Level, Outcome, Snapshot, Stop
+from drive_can_bridge.monitor.snapshot import (
+    DriveSnapshot, Level, OperationOutcome, Snapshot, StopAction)
 
 if TYPE_CHECKING:
     from panel_bench import House
@@ -30,7 +31,7 @@ pytest.importorskip('nicegui', reason="needs the extra 'panel'")
 def offered(house: 'House', page: str, drive: str) -> set[str]:
     """Return the stops that a page of an operator has a button for."""
     text = html.unescape(house.get(page, 'operator').text).replace('\\"', '"')
-    return {stop.value for stop in Stop if f'panel.stop("{stop.value}", "{drive}"' in text}
+    return {stop.value for stop in StopAction if f'panel.stop("{stop.value}", "{drive}"' in text}
 
 
 @pytest.mark.parametrize(('drive', 'stops'), [
@@ -79,28 +80,31 @@ class Asked:
     :param answers: to each stop.
     """
 
-    def __init__(self, **answers: Outcome) -> None:
+    def __init__(self, **answers: OperationOutcome) -> None:
         self._answers = answers
-        self.stops: list[Stop] = []
+        self.stops: list[StopAction] = []
 
-    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+    def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],
+             now: float) -> None:
         """Answer at once."""
         self.stops.append(stop)
         done(self._answers[stop.value])
 
 
 def test_a_drive_that_is_braking_is_not_let_go() -> None:
-    refused = Outcome(False, 'no confirmation in 2 s')
-    operations = Asked(quick_stop=refused, disable=Outcome(True, 'ready'))
-    assert asyncio.run(feed_of(operations).stop(seen('lift'), Stop.QUICK_STOP)) == refused
-    assert operations.stops == [Stop.QUICK_STOP]
+    refused = OperationOutcome(False, 'no confirmation in 2 s')
+    operations = Asked(quick_stop=refused, disable=OperationOutcome(True, 'ready'))
+    assert asyncio.run(feed_of(operations).stop(seen('lift'), StopAction.QUICK_STOP)) == refused
+    assert operations.stops == [StopAction.QUICK_STOP]
 
 
 class Some(Asked):
     """Stops those drives whose names are not among its answers."""
 
-    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
-        done(self._answers.get(drive[1:], Outcome(True, 'neutral; it has no control word')))
+    def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],
+             now: float) -> None:
+        done(self._answers.get(drive[1:],
+                               OperationOutcome(True, 'neutral; it has no control word')))
 
 
 @pytest.mark.parametrize(('names', 'failing', 'text'), [
@@ -111,7 +115,7 @@ class Some(Asked):
 def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
         names: str, failing: dict[str, str], text: str) -> None:
     from drive_can_bridge.panel.actions import Actions
-    feed = feed_of(Some(**{name: Outcome(False, each) for name, each in failing.items()}))
+    feed = feed_of(Some(**{name: OperationOutcome(False, each) for name, each in failing.items()}))
     feed.snapshot = Snapshot(drives=tuple(map(seen, names)))
     actions = Actions(feed, allow_writes=False)
     said = json.loads(asyncio.run(actions._stop_all()).body)
@@ -121,7 +125,7 @@ def test_the_number_of_those_that_stand_comes_behind_those_that_do_not(
 
 def test_drives_that_no_bridge_tells_of_are_stopped_too() -> None:
     from drive_can_bridge.panel.actions import Actions
-    feed = feed_of(Some(**{'cell/c': Outcome(False, 'nobody answered')}))
+    feed = feed_of(Some(**{'cell/c': OperationOutcome(False, 'nobody answered')}))
     feed.snapshot = Snapshot(drives=(seen('a'),), unheard={'/cell/b': 0.0, '/cell/c': 9.0})
     said = json.loads(asyncio.run(Actions(feed, allow_writes=False)._stop_all()).body)
     assert said == {'success': False, 'failed': ['cell/c: nobody answered'],

@@ -17,7 +17,7 @@ from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import ReadRequest, RetryPolicy, WriteRequest
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402.channel import SdoTransactor, Transfer
-from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Read
+from drive_can_bridge.protocols.datamodel.channel import ParameterRead, ParameterTransactor
 from drive_can_bridge.protocols.families import FAMILIES
 
 STATUS = parameter('system_status_1', 455, access=RO)
@@ -226,7 +226,7 @@ class Station:
         self.channel: Channel[Any, Any] = Channel(ParameterTransactor(
             Numbers(), send=lambda frame, left: self.found.append(frame),
             retry=RetryPolicy(TIMEOUT, attempts=1), eeprom_gap=0.02))
-        self.lost, self.step = Read(50), Read(50, attempts=1, late_will_do=True)
+        self.lost, self.step = ParameterRead(50), ParameterRead(50, attempts=1, late_will_do=True)
         self.told = '321'
         self.answers: dict[str, Any] = {self.told: (0,), '7A1': (50,)}
 

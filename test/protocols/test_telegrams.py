@@ -335,10 +335,10 @@ def check_standard(module: Any) -> None:
                     made, fields['expected_count'], strict=strict) == words
             again = module.encode_read_response(made.identifier, words)
         elif row['kind'] == 'std_write':
-            assert module.decode_request(made) == extended.Write(fields['pnu'], words)
+            assert module.decode_request(made) == extended.WriteTelegram(fields['pnu'], words)
             again = module.encode_write(made.identifier, fields['pnu'], *words)
         else:
-            assert module.decode_request(made) == extended.ReadRequest(
+            assert module.decode_request(made) == extended.ReadTelegram(
                 fields['pnu'], fields['count'])
             again = module.encode_read_request(made.identifier, fields['pnu'], fields['count'])
         assert again == made or row['use'] == 'decode'
@@ -348,7 +348,7 @@ def check_standard(module: Any) -> None:
 
 #: modules, the statements in them that say something of telegrams, and what looks at these
 TABLES: list[tuple[ModuleType, set[str], Callable[[Any], None]]] = [
-    (sdo, {'Kind', 'REQUEST_BASE', 'RESPONSE_BASE', 'LENGTH', 'EXPEDITED_MAX', 'SEGMENT_MAX',
+    (sdo, {'SdoCommand', 'REQUEST_BASE', 'RESPONSE_BASE', 'LENGTH', 'EXPEDITED_MAX', 'SEGMENT_MAX',
            'TOGGLE'}, check_sdo),
     (network, {'NMT_IDENTIFIER', 'SYNC_IDENTIFIER', 'EMERGENCY_BASE', 'HEARTBEAT_BASE',
                'NmtCommand', 'NmtState', 'EMERGENCY_LENGTH'}, check_network),
@@ -359,7 +359,7 @@ TABLES: list[tuple[ModuleType, set[str], Callable[[Any], None]]] = [
     (process_data, {'MAIN_VALUES', 'EXTRA_VALUES', 'SHORT_LENGTH', 'LONG_LENGTH', 'EXTRA_LENGTH',
                     '_SHORT', '_LONG', '_EXTRA'}, check_process_data),
     (parameter_frame, {'NUMBER_MAX', 'INDEX_MAX', 'LENGTH', '_FIELDS', '_SPONTANEOUS',
-                       '_IDENTIFIER_SHIFT', 'Task', 'Response'}, check_parameter_frames),
+                       '_IDENTIFIER_SHIFT', 'Task', 'ResponseId'}, check_parameter_frames),
     (extended, {'DIR', 'STATION_MASK', 'STATION_SHIFT', 'W', 'PARAMETER_MASK', 'PARAMETER_SHIFT',
                 'COUNT_MASK', 'CYCLIC', 'CYCLIC_PARAMETER', 'STATION_MAX', 'SLOTS', 'PAYLOAD',
                 'WORDS', 'PADDING'}, check_extended),

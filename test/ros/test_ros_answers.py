@@ -22,9 +22,9 @@ from drive_can_bridge.ros import bridge_node
 from drive_can_bridge.ros.answers import ServiceAnswers, WAITING_MAX
 from drive_can_bridge.ros.rcl import services as rcl_module
 from drive_can_bridge.ros.rcl.incoming import PolledGroup
-from drive_can_bridge.ros.rcl.services import RclServices, Response, Unreachable
+from drive_can_bridge.ros.rcl.services import RclServices, ReadyResponse, Unreachable
 from drive_can_bridge.ros.rcl.unfit import Unfit
-from drive_can_bridge.ros.requests import Requests
+from drive_can_bridge.ros.requests import ServiceRequests
 from drive_can_bridge.ros.threads import ServiceThread
 
 #: what DDS does (test/real.py)
@@ -114,7 +114,7 @@ def test_no_answer_of_the_process_holds_the_interpreter_for_a_caller_out_of_reac
     missed: dict[str, int] = {}
     send = RclServices.send
 
-    def watched(self: RclServices, response: Response) -> None:
+    def watched(self: RclServices, response: ReadyResponse) -> None:
         before = ticks.count
         try:
             send(self, response)
@@ -176,8 +176,8 @@ class Caller:
         self.service = client.node.create_service(
             Trigger, name, lambda *_: None, callback_group=PolledGroup(),
             qos_profile=qos_profile_parameters)
-        self.requests = Requests(answers._rcl, self.errors.append, self.errors.append,
-                                 context.context, REAL)
+        self.requests = ServiceRequests(answers._rcl, self.errors.append, self.errors.append,
+                                        context.context, REAL)
         self.thread = ServiceThread('control', context.context, self.errors.append, REAL,
                                     send=answers.send, take=self.requests.take)
         self.thread.serve(self.service, lambda _, answer: answer(
@@ -286,7 +286,7 @@ def test_a_service_may_be_destroyed_while_its_answer_is_sent(
     over: list[bool] = []
     send = RclServices.send
 
-    def watched(self: RclServices, response: Response) -> None:
+    def watched(self: RclServices, response: ReadyResponse) -> None:
         def destroy() -> None:
             before = ticks.count
             while ticks.count < before + TICKS:
@@ -320,9 +320,9 @@ class FakeRcl:
 
     def prepare(self, service: Any, message: Any, header: bytes) -> Any:
         """Return something with a caller."""
-        return Response(service, message, None, None, header)    # type: ignore[arg-type]
+        return ReadyResponse(service, message, None, None, header)    # type: ignore[arg-type]
 
-    def send(self, response: Response) -> None:
+    def send(self, response: ReadyResponse) -> None:
         """Wait for callers out of reach, but for the first time."""
         late = threading.current_thread().name == 'late answers'
         if late:
@@ -340,7 +340,7 @@ class FakeService:
     class srv_type:  # noqa: N801  as in rclpy
         """Its answers are numbers."""
 
-        Response = int
+        ReadyResponse = int
 
 
 @pytest.fixture(name='rcl')

@@ -18,7 +18,7 @@ from drive_can_bridge.core.events import (
 from drive_can_bridge.protocols.observer import Telegram, TelegramKind, Verdict
 from drive_can_bridge.protocols.telegrams import Direction
 from drive_can_bridge.ros.bridge_runtime import Occasions
-from drive_can_bridge.ros.diagnostics import Report
+from drive_can_bridge.ros.diagnostics import StatusEntry
 from drive_can_bridge.trace.files import read_records
 from drive_can_bridge.trace.tracer import Tracer
 
@@ -40,7 +40,7 @@ class Wanted(list[tuple[str, str, int]]):
 
     def reports(self, *levels: bytes, about: str = 'drive lift') -> None:
         for level in levels:
-            self.occasions.reported(Report(about, level, '', {}), 'main')
+            self.occasions.reported(StatusEntry(about, level, '', {}), 'main')
 
 
 def test_each_error_that_begins_is_an_occasion_and_one_that_lasts_is_not() -> None:

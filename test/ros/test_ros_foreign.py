@@ -15,10 +15,10 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from waiting import clock
 
 from drive_can_bridge.core.errors import SilentBridge
-from drive_can_bridge.monitor.snapshot import Outcome, Stop as StopKind
-from drive_can_bridge.ros.client.control import Stop
+from drive_can_bridge.monitor.snapshot import OperationOutcome, StopAction as StopKind
+from drive_can_bridge.ros.client.control import StopRequests
 from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph
-from drive_can_bridge.ros.monitor.client import Operations
+from drive_can_bridge.ros.monitor.client import ServiceOperations
 
 CYCLONE = bytes.fromhex('0110a1b2c3d4e5f60718293a00001304')
 FAST = bytes.fromhex('010f78fdf93be12b0000000000001304')
@@ -74,7 +74,7 @@ def test_it_is_named_at_once_and_sent_nothing(seen: Seen, here: Graph) -> None:
 
 
 def test_a_stop_says_that_it_may_still_be_running(seen: Seen, here: Graph) -> None:
-    stop = Stop(here.client_node, None, [], ())
+    stop = StopRequests(here.client_node, None, [], ())
     assert here.wait(stop.look, 1.0)
     answers = {answer.name: answer.text for answer in stop.answers()}
     stop.close()
@@ -84,8 +84,8 @@ def test_a_stop_says_that_it_may_still_be_running(seen: Seen, here: Graph) -> No
 
 
 def test_views_say_it_of_stops_and_values(seen: Seen, here: Graph) -> None:
-    operations = Operations(here.client_node)
-    said: list[Outcome] = []
+    operations = ServiceOperations(here.client_node)
+    said: list[OperationOutcome] = []
     operations.stop('/lift', StopKind.QUICK_STOP, said.append, clock().now())
     operations.write('/lift', 'ramp_time', 1.0, said.append, clock().now())
 

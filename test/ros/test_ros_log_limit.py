@@ -10,8 +10,7 @@ from transcripts import replayed, stories
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.ros.log import (
-    BURST, BURST_OF_ALL, FEW, Level, LogLimit, QUIET, RATE_OF_ALL, SUM_UP, TOPICS_MAX,
-)
+    BURST, BURST_OF_ALL, FEW, LogLevel, LogLimit, QUIET, RATE_OF_ALL, SUM_UP, TOPICS_MAX)
 
 FAULT, GONE = 'fault', 'gone'
 DANGER = sentences.may_still_be_running(sentences.stop_not_answered())
@@ -27,7 +26,7 @@ class Log:
 
     def __init__(self) -> None:
         self.now = 100.0
-        self.told: list[tuple[Level, str]] = []
+        self.told: list[tuple[LogLevel, str]] = []
         self.woken = 0
         self.limit = LogLimit(lambda *line: self.told.append(line), self._wake, lambda: self.now)
         self.lift = self.limit.speaker('lift')

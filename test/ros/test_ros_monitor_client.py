@@ -11,10 +11,10 @@ from rcl_interfaces.srv import ListParameters
 from waiting import clock
 
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Snapshot, Status, Stop
+from drive_can_bridge.monitor.snapshot import DriveSnapshot, Place, Snapshot, Status, StopAction
 from drive_can_bridge.ros.client import calls
 from drive_can_bridge.ros.monitor import client as monitor_client
-from drive_can_bridge.ros.monitor.client import MonitorClient, Operations
+from drive_can_bridge.ros.monitor.client import MonitorClient, ServiceOperations
 
 
 class Looking:
@@ -77,8 +77,8 @@ def test_hundreds_of_drives_are_got_to_know_a_few_at_a_time(
     facts = {'state': 'online', 'exchanges': '1', 'missed_exchanges': '0'}
     looking.model.diagnosed([Status(f'many: drive {drive}', 0, '', facts) for drive in drives],
                             0.0, clock().now())
-    stops = {f'/{drive}': (Stop.QUICK_STOP,) for drive in drives}
-    operations = Operations(looking.source.node)
+    stops = {f'/{drive}': (StopAction.QUICK_STOP,) for drive in drives}
+    operations = ServiceOperations(looking.source.node)
     looks = 0
     # each of these takes DDS a while, during which nobody sees or stops anything
     while not all(f'/{drive}/{name}' in made for drive in drives

@@ -17,19 +17,19 @@ from waiting import clock
 from drive_can_bridge.core.messages import together
 from drive_can_bridge.core.sentences import (
     may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, write_not_confirmed)
-from drive_can_bridge.monitor.snapshot import Outcome, Stop
+from drive_can_bridge.monitor.snapshot import OperationOutcome, StopAction
 from drive_can_bridge.ros.client.calls import OFFER_TIMEOUT
-from drive_can_bridge.ros.monitor.client import Operations, PARAMETER_TIMEOUT
+from drive_can_bridge.ros.monitor.client import PARAMETER_TIMEOUT, ServiceOperations
 from drive_can_bridge.ros.passing import NodeEnd
 
 
 @contextmanager
-def asking(client: Client) -> Iterator[Operations]:
+def asking(client: Client) -> Iterator[ServiceOperations]:
     """Return operations of a node of their own."""
     node = rclpy.create_node('asking', context=client.node.context, enable_rosout=False,
                              start_parameter_services=False)
     try:
-        yield Operations(NodeEnd(node, str))
+        yield ServiceOperations(NodeEnd(node, str))
     finally:
         node.destroy_node()
 
@@ -70,23 +70,23 @@ class Shy:
 
 def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> None:
     """An answer to somebody unknown is given up; what it was about was done all the same."""
-    shy, told, later = Shy(client, known_after=3), list[Outcome](), 0.0
+    shy, told, later = Shy(client, known_after=3), list[OperationOutcome](), 0.0
 
     def now() -> float:
         return clock().now() + later
 
-    def write(value: float) -> Outcome:
+    def write(value: float) -> OperationOutcome:
         operations.write('/lift', 'ramp_time', value, told.append, now())
         wait_until(lambda: not operations.poll({}, now()), what='an answer')
         return told[-1]
     try:
         with asking(client) as operations:
-            assert write(1.5) == Outcome(True, '')
+            assert write(1.5) == OperationOutcome(True, '')
             assert shy.greetings >= 3
-            assert write(2.5) == Outcome(True, '')
+            assert write(2.5) == OperationOutcome(True, '')
             # somebody else by the same name
             shy.known_after, later = shy.greetings + 3, 10.0
-            assert write(3.5) == Outcome(True, '')
+            assert write(3.5) == OperationOutcome(True, '')
             assert shy.greetings >= shy.known_after
             assert shy.writes == 3, 'each of them once'
             # nobody
@@ -95,14 +95,14 @@ def test_what_is_asked_of_a_drive_is_asked_once_it_knows_us(client: Client) -> N
             assert operations.poll({}, now())
             later += PARAMETER_TIMEOUT
             assert not operations.poll({}, now())
-            assert told[3] == Outcome(False, nobody_answered())
+            assert told[3] == OperationOutcome(False, nobody_answered())
             assert shy.writes == 3
     finally:
         shy.close()
 
 
 def test_a_write_that_was_sent_and_not_answered_may_have_been_done(client: Client) -> None:
-    shy, told = Shy(client, known_after=1, ends=True), list[Outcome]()
+    shy, told = Shy(client, known_after=1, ends=True), list[OperationOutcome]()
     try:
         with asking(client) as operations:
             now = clock().now()
@@ -111,7 +111,7 @@ def test_a_write_that_was_sent_and_not_answered_may_have_been_done(client: Clien
             assert not operations.poll({}, now + PARAMETER_TIMEOUT)
     finally:
         shy.close()
-    assert told == [Outcome(False, together([write_not_confirmed(), nobody_answered()]))]
+    assert told == [OperationOutcome(False, together([write_not_confirmed(), nobody_answered()]))]
     assert shy.writes == 1
 
 
@@ -121,20 +121,21 @@ def test_a_stop_waits_a_moment_for_whoever_offers_it(client: Client) -> None:
         response.success, response.message = True, 'stopped'
         return response
 
-    now, told = 100.0, list[Outcome]()
+    now, told = 100.0, list[OperationOutcome]()
     with asking(client) as operations:
-        operations.poll({'/lift': Stop}, now)
-        operations.stop('/lift', Stop.QUICK_STOP, told.append, now)
-        assert operations.poll({'/lift': Stop}, now)
+        operations.poll({'/lift': StopAction}, now)
+        operations.stop('/lift', StopAction.QUICK_STOP, told.append, now)
+        assert operations.poll({'/lift': StopAction}, now)
         assert told == []
         service = client.node.create_service(Trigger, '/lift/quick_stop', answer)
         try:
-            wait_until(lambda: not operations.poll({'/lift': Stop}, now), what='an answer')
-            assert told == [Outcome(True, 'stopped')]
-            operations.stop('/lift', Stop.DISABLE, told.append, now)
-            assert operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT - 0.1)
-            assert not operations.poll({'/lift': Stop}, now + OFFER_TIMEOUT)
-            assert told[1:] == [Outcome(False, may_still_be_running(nobody_takes('enable')))]
+            wait_until(lambda: not operations.poll({'/lift': StopAction}, now), what='an answer')
+            assert told == [OperationOutcome(True, 'stopped')]
+            operations.stop('/lift', StopAction.DISABLE, told.append, now)
+            assert operations.poll({'/lift': StopAction}, now + OFFER_TIMEOUT - 0.1)
+            assert not operations.poll({'/lift': StopAction}, now + OFFER_TIMEOUT)
+            assert told[1:] == [OperationOutcome(False,
+                                                 may_still_be_running(nobody_takes('enable')))]
         finally:
             client.node.destroy_service(service)
 
@@ -164,11 +165,12 @@ class Busy:
 
 
 @pytest.mark.parametrize(('stop', 'kind', 'name', 'patience', 'times'), [
-    (Stop.QUICK_STOP, Trigger, 'quick_stop', 10.0, 2),
-    (Stop.DISABLE, SetBool, 'enable', 120.0, 1)])
+    (StopAction.QUICK_STOP, Trigger, 'quick_stop', 10.0, 2),
+    (StopAction.DISABLE, SetBool, 'enable', 120.0, 1)])
 def test_a_stop_may_take_as_long_as_that_of_a_command(
-        client: Client, stop: Stop, kind: Any, name: str, patience: float, times: int) -> None:
-    now, told, wanted = 100.0, list[Outcome](), {'/lift': [stop]}
+        client: Client, stop: StopAction, kind: Any, name: str, patience: float,
+        times: int) -> None:
+    now, told, wanted = 100.0, list[OperationOutcome](), {'/lift': [stop]}
     busy = Busy(client, kind, f'/lift/{name}')
     try:
         with asking(client) as operations:
@@ -189,22 +191,22 @@ def test_a_stop_may_take_as_long_as_that_of_a_command(
                     assert not operations.poll(wanted, now + patience)
     finally:
         busy.close()
-    assert told == [Outcome(True, 'stopped'),
-                    Outcome(False, may_still_be_running(no_answer_to_stop(patience)))]
+    assert told == [OperationOutcome(True, 'stopped'),
+                    OperationOutcome(False, may_still_be_running(no_answer_to_stop(patience)))]
     assert busy.asked == [kind.Request()] * 2 * times, 'for anything but enable'
 
 
 def test_a_drive_that_has_just_appeared_is_stopped_too(client: Client) -> None:
     """Its button is there before the next poll is told of it."""
-    busy, now, told = Busy(client, Trigger, '/lift/quick_stop'), 100.0, list[Outcome]()
+    busy, now, told = Busy(client, Trigger, '/lift/quick_stop'), 100.0, list[OperationOutcome]()
     try:
         with asking(client) as operations:
             operations.poll({}, now)
-            operations.stop('/lift', Stop.QUICK_STOP, told.append, now)
+            operations.stop('/lift', StopAction.QUICK_STOP, told.append, now)
             wait_until(lambda: operations.poll({}, now) and busy.kept, what='a stop')
             busy.answers()
-            wait_until(lambda: not operations.poll({'/lift': Stop}, now), what='an answer')
+            wait_until(lambda: not operations.poll({'/lift': StopAction}, now), what='an answer')
     finally:
         busy.close()
-    assert told == [Outcome(True, 'stopped')]
+    assert told == [OperationOutcome(True, 'stopped')]
     assert busy.asked == [Trigger.Request()]

@@ -16,7 +16,7 @@ import waiting
 
 from drive_can_bridge.core.sentences import internal_error_in_answer
 from drive_can_bridge.ros import passing
-from drive_can_bridge.ros.local_way import LocalWay
+from drive_can_bridge.ros.local_way import LocalWayServer
 
 
 class Far:
@@ -197,7 +197,7 @@ def test_a_policy_that_forbids_it_is_told(
 
     def refused(*_: Any, **__: Any) -> None:
         raise RuntimeError('create_client: not found in allow rule, at ./src/client.c:9')
-    monkeypatch.setattr(passing, 'Stop', refused)
+    monkeypatch.setattr(passing, 'StopRequests', refused)
     assert answers(ask(here, 'pass', far.name, '', '')) == [
         ['drives'],
         ['passed', '/far/bridge', '0', 'a stop cannot be passed on to this bridge (create_client: '
@@ -210,7 +210,7 @@ def test_where_it_is_not_passed_on_ros_brings_it(
     far = Far(client, '/far/bridge', 'hoist')
     seen(here, far.name)
     locally(here)
-    monkeypatch.setattr(LocalWay, '_pass', lambda _, asked: asked.refuse('what is that?'))
+    monkeypatch.setattr(LocalWayServer, '_pass', lambda _, asked: asked.refuse('what is that?'))
     assert run('stop') == (0, ['lift: ready', 'far/hoist: stopped'], '')
     assert far.stops == {'hoist': 1}
 

@@ -15,7 +15,7 @@ from waiting import clock
 
 from drive_can_bridge.ros.rcl.incoming import PolledGroup
 from drive_can_bridge.ros.threads import (
-    Answer, CoroutineServices, ExecutorThread, Question, ServiceThread)
+    Answer, Awaited, CoroutineServices, ExecutorThread, ServiceThread)
 
 
 @pytest.fixture(name='errors')
@@ -67,7 +67,7 @@ def test_who_asks_for_what_has_a_defect_is_told(client: Client, thread: ServiceT
         raise ZeroDivisionError('a defect')
 
     async def after_a_wait(*_: Any) -> Any:
-        await Question[int](lambda answer: answer(1))
+        await Awaited[int](lambda answer: answer(1))
         raise ZeroDivisionError('a defect')
 
     async def none(*_: Any) -> Any:

@@ -20,7 +20,7 @@ from world import world
 
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import Stop
+from drive_can_bridge.monitor.snapshot import StopAction
 from drive_can_bridge.resources import config_file
 
 FILE = """
@@ -214,12 +214,13 @@ def monitor() -> None:
 def panel() -> None:
     """Do the same, and keep what stops drives at hand, as ``drive_can panel`` does."""
     from drive_can_bridge.ros.monitor.client import MonitorClient
-    from drive_can_bridge.ros.monitor.client import Operations
+    from drive_can_bridge.ros.monitor.client import ServiceOperations
     source = MonitorClient(Model())
-    operations = Operations(source.node)
+    operations = ServiceOperations(source.node)
     for _ in range(20):
         source.poll(waiting.clock().now())
-        operations.poll({'/lift': Stop, '/conveyor': [Stop.QUICK_STOP]}, waiting.clock().now())
+        operations.poll({'/lift': StopAction, '/conveyor': [StopAction.QUICK_STOP]},
+                        waiting.clock().now())
         waiting.pause(0.1)
     source.close()
 

@@ -24,7 +24,7 @@ from drive_can_bridge.core.errors import (
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation.motor import MotorPlant
-from drive_can_bridge.simulation.registers import Refusal
+from drive_can_bridge.simulation.registers import WriteRefusal
 from drive_can_bridge.simulation.simulation import make_drives, Simulation
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.end_point import EndPoint
@@ -255,8 +255,8 @@ def test_any_profile_is_plain_memory_at_least(protocol: str) -> None:
     before = made.value('red')
     made.registers.write('blue', -3)
     assert (made.value('blue'), made.value('red')) == (-3, before)
-    assert made.registers.refusal({'blue': 51}) is Refusal.OUT_OF_RANGE
-    assert made.registers.refusal({'red': 1}) is Refusal.READ_ONLY
+    assert made.registers.refusal({'blue': 51}) is WriteRefusal.OUT_OF_RANGE
+    assert made.registers.refusal({'red': 1}) is WriteRefusal.READ_ONLY
     made.fault('restart=0', 1.0)
     assert made.value('blue') == -3
 

@@ -16,7 +16,7 @@ import pytest
 from transcripts import replayed, stories
 from world import World
 
-from drive_can_bridge.cli.probe import AnotherMaster, Asker
+from drive_can_bridge.cli.probe import Asker
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BusConfiguration, DriveConfiguration
 from drive_can_bridge.core.errors import TransportError

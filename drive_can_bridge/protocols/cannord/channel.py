@@ -23,7 +23,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ParameterFrame, ParameterLayout, Response, Task)
+    ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.transactor import Transactor
 
@@ -95,7 +95,7 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
             raise Unasked(frame_sentences.other_task_answered(
                 response.identifier, response.number, response.index,
                 task.task, task.number, task.index))
-        if task.task.writes and response.identifier != Response.REFUSED and not _echoes(
+        if task.task.writes and response.identifier != ResponseId.REFUSED and not _echoes(
                 response, task):
             self.silent = TaskResult(None, response)
             raise RemoteProtocolError(
@@ -124,7 +124,7 @@ def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:
     """Tell whether a response answers a task, as far as its address is concerned."""
     if response.number != task.number:
         return False
-    if response.identifier == Response.REFUSED:
+    if response.identifier == ResponseId.REFUSED:
         # whether a refusal repeats the sub-index is not documented
         return response.index in (task.index, 0)
     return response.identifier in task.task.responses and response.index == task.index

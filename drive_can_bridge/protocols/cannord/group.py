@@ -39,7 +39,7 @@ _SERVICES = {ControlAction.ENABLE: 'enable', ControlAction.RESET_FAULT: 'reset_f
 
 
 @dataclass(frozen=True)
-class Member:
+class GroupMember:
     """
     An inverter of a group.
 
@@ -81,10 +81,10 @@ class Group:
         self._asked_by: dict[ControlRequest, Session] = {}
         self._turn = 0
         self._turn_begun = 0    # what it was when this cycle began
-        self._members: list[Member] = []
+        self._members: list[GroupMember] = []
         self._sessions: list[Session] = []
 
-    def join(self, member: Member) -> None:
+    def join(self, member: GroupMember) -> None:
         """Take an inverter in."""
         session = member.session
         if not self._members:
@@ -151,7 +151,7 @@ class Group:
         for payload in payloads:
             self.exchange.put(Frame(identifier, payload, self._extended), *to)
 
-    def _expect(self, member: Member, now: float, until: float) -> None:
+    def _expect(self, member: GroupMember, now: float, until: float) -> None:
         """Expect an answer: the inverter was sent its process frames."""
         answers = member.answers
         answers.expect(now, until, runs=self.exchange.runs)

@@ -16,14 +16,15 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord.identifiers import (
     broadcast_identifier, identifier, MessageObject)
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, ParameterLayout, Response, Task)
+    error_text, ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.cannord.process_data import (
     decode_extra, decode_main, EXTRA_LENGTH, MAIN_VALUES)
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, listed_by, raws_of, TelegramKind, Verdict)
-from drive_can_bridge.protocols.pairing import CYCLES_WAITED, CyclicWatch, RequestContent, Requests
+from drive_can_bridge.protocols.pairing import (
+    CYCLES_WAITED, CyclicWatch, PendingRequests, RequestContent)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -33,12 +34,12 @@ _CYCLIC, _PARAMETER = TelegramKind.CYCLIC, TelegramKind.PARAMETER
 _TITLES = {Task.NONE: 'no task', Task.READ_ELEMENTS: 'read number of elements'}
 
 #: what responses are called that are none to reads or writes
-_ANSWER_TITLES = {Response.NONE: 'no task', Response.ELEMENTS: 'number of elements'}
+_ANSWER_TITLES = {ResponseId.NONE: 'no task', ResponseId.ELEMENTS: 'number of elements'}
 
 TaskKey = tuple[int, int]
 #: of a task: its key, itself, and whether a double word travels
 Span = tuple[TaskKey, Task, bool]
-T = TypeVar('T', Task, Response)
+T = TypeVar('T', Task, ResponseId)
 
 
 class CannordObserver(DriveObserver):
@@ -63,7 +64,7 @@ class CannordObserver(DriveObserver):
         self.hear(objects[MessageObject.PARAMETER_TASK], _REQUEST, _PARAMETER, 'parameter task',
                   partial(self._frame, Task), self._take_task)
         self.hear(objects[MessageObject.PARAMETER_RESPONSE], _RESPONSE, _PARAMETER,
-                  'parameter response', partial(self._frame, Response), self._take_task_response)
+                  'parameter response', partial(self._frame, ResponseId), self._take_task_response)
         broadcast = broadcast_identifier(drive)
         self._paced_by_broadcast = leads and broadcast is not None
         if leads and broadcast is not None:
@@ -82,7 +83,7 @@ class CannordObserver(DriveObserver):
         # a member of a group is asked once in a while, and has one period to answer
         self._cycle = CyclicWatch(
             self, drive.period * (CYCLES_WAITED if broadcast is None else 1.0))
-        self._requests: Requests[TaskKey] = Requests(
+        self._requests: PendingRequests[TaskKey] = PendingRequests(
             self, drive.parameter_timeout, self._content, missing='parameter response')
 
     # -- process data -----------------------------------------------------------------------------
@@ -146,13 +147,13 @@ class CannordObserver(DriveObserver):
         words = (frame.value if task.double else frame.word,) if task.writes else None
         self._requests.ask(key, (key, task, task.double), now, words, title=_TITLES.get(task, ''))
 
-    def _take_task_response(self, told: tuple[ParameterFrame, Response], now: float) -> None:
+    def _take_task_response(self, told: tuple[ParameterFrame, ResponseId], now: float) -> None:
         frame, response = told
         key = self._key_of(frame, response)
         asked = self._requests.about.get(key)
         task: Task = Task.READ if asked is None else asked.span[1]
-        refused = response is Response.REFUSED
-        span = None if response is Response.NONE else (key, task, response.double)
+        refused = response is ResponseId.REFUSED
+        span = None if response is ResponseId.NONE else (key, task, response.double)
         fits = asked is None or refused or response in task.responses
         valued = response not in _ANSWER_TITLES
         self._requests.answer(
@@ -160,12 +161,12 @@ class CannordObserver(DriveObserver):
             (frame.answered,) if valued else None,
             refusal=error_text(frame.word) if refused else '',
             wrong='' if fits else frame_sentences.response_to_task(int(response), int(task)),
-            remark=f'{frame.word} elements' if response is Response.ELEMENTS else '')
+            remark=f'{frame.word} elements' if response is ResponseId.ELEMENTS else '')
 
-    def _key_of(self, frame: ParameterFrame, response: Response) -> TaskKey:
+    def _key_of(self, frame: ParameterFrame, response: ResponseId) -> TaskKey:
         """Return the task that a response belongs to; a refusal need not repeat the index."""
         key = frame.number, frame.index
-        if response is Response.REFUSED and frame.index == 0:
+        if response is ResponseId.REFUSED and frame.index == 0:
             asked = self._requests.about
             return key if key in asked else next(
                 (other for other in reversed(asked) if other[0] == frame.number), key)

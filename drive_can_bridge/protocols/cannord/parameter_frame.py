@@ -40,7 +40,7 @@ _SPONTANEOUS = 0x0800
 _IDENTIFIER_SHIFT = 12
 
 
-class Response(IntEnum):
+class ResponseId(IntEnum):
     """
     Response identifiers, inverter to master.
 
@@ -51,7 +51,7 @@ class Response(IntEnum):
     array: bool
     double: bool
 
-    def __new__(cls, code: int, array: bool = False, double: bool = False) -> 'Response':
+    def __new__(cls, code: int, array: bool = False, double: bool = False) -> 'ResponseId':
         row = int.__new__(cls, code)
         row._value_, row.array, row.double = code, array, double
         return row
@@ -73,14 +73,14 @@ class Task(IntEnum):
     :ivar persistent: of a write: to the EEPROM, not to RAM only; None: it is none.
     """
 
-    responses: tuple[Response, ...]
+    responses: tuple[ResponseId, ...]
     persistent: bool | None
 
     def __new__(cls, code: int, responses: str = '',
                 persistent: bool | None = None) -> 'Task':
         row = int.__new__(cls, code)
         row._value_, row.persistent = code, persistent
-        row.responses = tuple(Response[name] for name in responses.split())
+        row.responses = tuple(ResponseId[name] for name in responses.split())
         return row
 
     NONE = 0, 'NONE'
@@ -114,7 +114,7 @@ class Task(IntEnum):
 
 #: (array, double word, EEPROM) -> task
 WRITE_TASKS = {(task.array, task.double, task.persistent): task for task in Task if task.writes}
-_DOUBLE = [response for response in Response if response.double]
+_DOUBLE = [response for response in ResponseId if response.double]
 
 #: what the error numbers of a refused task mean
 ERRORS: dict[int, str] = {

@@ -16,7 +16,7 @@ from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess, read_back
 from drive_can_bridge.protocols.cannord.channel import ParameterTask, TaskChannel, TaskResult
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ParameterFrame, Response, Task, WRITE_TASKS)
+    error_text, ParameterFrame, ResponseId, Task, WRITE_TASKS)
 from drive_can_bridge.protocols.cannord.process_data import Samples
 
 WRONG_INDEX = 3
@@ -121,7 +121,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
         """Have a task done; return the response, or why there is none that does."""
         reply = yield ParameterTask(task, parameter.number or 0, parameter.subindex or 0, value)
         if reply.response is not None:
-            if reply.response.identifier != Response.REFUSED:
+            if reply.response.identifier != ResponseId.REFUSED:
                 return reply.response
             return (yield from _refusal(parameter, reply.response))
         if not reply.sent:
@@ -141,7 +141,7 @@ def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[Parame
     if response.word == WRONG_INDEX and parameter.subindex is not None:
         reply = yield ParameterTask(Task.READ_ELEMENTS, parameter.number or 0)
         answer = reply.response
-        if answer is not None and answer.identifier == Response.ELEMENTS:
+        if answer is not None and answer.identifier == ResponseId.ELEMENTS:
             return Failure(FailureKind.REFUSED, sentences.no_such_element(
                 response.word, text, parameter.number or 0, answer.word))
     return Failure(FailureKind.REFUSED, sentences.refused_by_drive(response.word, text))

@@ -17,16 +17,13 @@ from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.protocols.cannord.identifiers import (
-    ADDRESS_MAX, broadcasts, decode_identifier, identifier, MessageObject, route,
-)
+    ADDRESS_MAX, broadcasts, decode_identifier, identifier, MessageObject, route)
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, Response, Task,
-)
+    error_text, ERRORS, LENGTH, NUMBER_MAX, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.cannord.process_data import decode_main
 from drive_can_bridge.protocols.cannord.states import ACKNOWLEDGE, QUICK_STOP, READY, RUN, state_of
 from drive_can_bridge.protocols.scanner import (
-    conclude, Conversation, Finding, Prober, Question, Scanner, spaced,
-)
+    conclude, Conversation, Finding, Prober, Question, Scanner, spaced)
 
 
 #: the parameter that is read: the fault number. As a DataModel request its first byte, BCh, is no
@@ -92,7 +89,7 @@ def _follows(request: bytes, data: bytes) -> bool:
     """Tell whether a response may follow a task: others use these identifiers, too."""
     task = _TASKS.get(request[1] >> 4)
     return task is not None and _number(request) == _number(data) and (
-        data[1] >> 4 in (*task.responses, Response.REFUSED))
+        data[1] >> 4 in (*task.responses, ResponseId.REFUSED))
 
 
 def _number(data: bytes) -> int:
@@ -122,7 +119,7 @@ class _Answer(NamedTuple):
     def error(self) -> int | None:
         """The error number of a refusal, whatever the order; None: it is none, or unknown."""
         alone = self.alone
-        refused = self.response == Response.REFUSED
+        refused = self.response == ResponseId.REFUSED
         return alone[0] if refused and alone and alone[0] in ERRORS else None
 
 
@@ -145,7 +142,7 @@ class CannordProber(Prober):
     def converse(self) -> Conversation:
         timeout = yield from self._ask(Task.READ, TELEGRAM_TIMEOUT)
         # -0.1 s is none, as 0 is
-        if timeout is not None and timeout.response == Response.WORD and any(
+        if timeout is not None and timeout.response == ResponseId.WORD and any(
                 timeout.words) and max(timeout.words) < _NEGATIVE:
             self.notes.append(frame_sentences.supervises_telegrams())
         findings = [(yield from self._value_order()), (yield from self._index_byte())]
@@ -165,7 +162,7 @@ class CannordProber(Prober):
                     number, error_text(refusal.error),
                     '6, 7' if refusal.alone[1] == 'high_first' else '4, 5', spaced(refusal.data)))
             value = yield from self._ask(Task.READ, number)
-            if value is not None and value.response == Response.WORD and value.alone is not None:
+            if value is not None and value.response == ResponseId.WORD and value.alone is not None:
                 votes.setdefault(value.alone[1], []).append(
                     frame_sentences.parameter_reads(number, value.alone[0], spaced(value.data)))
             if refusal.error == _NOT_AN_ARRAY:
@@ -197,7 +194,7 @@ class CannordProber(Prober):
     def _ask(self, task: Task, number: int, ind: int = 0) -> _Asking:
         data = ParameterLayout().encode(task, number)
         data = data[:2] + ind.to_bytes(2, 'little') + data[4:]
-        expected = {*task.responses, Response.REFUSED}
+        expected = {*task.responses, ResponseId.REFUSED}
 
         def fits(answer: bytes) -> bool:
             return (int.from_bytes(answer[_NUMBER_AND_TASK], 'little') & 0xFFF == number
@@ -213,7 +210,7 @@ class CannordProber(Prober):
         second = yield from self._ask(task, number, ind)
         if first is None or second is None or first.response != second.response:
             return None
-        if first.response == Response.REFUSED and first.words != second.words:
+        if first.response == ResponseId.REFUSED and first.words != second.words:
             return None
         return second
 
@@ -231,7 +228,7 @@ class CannordProber(Prober):
 def _told(answer: _Answer | None) -> str:
     if answer is None:
         return frame_sentences.not_twice()
-    if answer.response == Response.REFUSED:
+    if answer.response == ResponseId.REFUSED:
         error = 'an error' if answer.error is None else error_text(answer.error)
         return f'{error} ({spaced(answer.data)})'
     return f'a value ({spaced(answer.data)})'

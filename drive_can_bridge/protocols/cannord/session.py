@@ -37,7 +37,7 @@ from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cannord import procedures
 from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskTransactor
 from drive_can_bridge.protocols.cannord.control import make_control
-from drive_can_bridge.protocols.cannord.group import Group, Member
+from drive_can_bridge.protocols.cannord.group import Group, GroupMember
 from drive_can_bridge.protocols.cannord.identifiers import broadcasts, identifier, MessageObject
 from drive_can_bridge.protocols.cannord.monitoring import TimeoutWatch
 from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
@@ -104,7 +104,7 @@ class CannordSession(Session):
         self.services = DriveServices(self, access)
         self._answers = CycleAnswers(self, silence=_SILENCE, advice=_ADVICE,
                                      in_turn=not group.alone)
-        group.join(Member(self, request_identifier, self._answers, self._samples))
+        group.join(GroupMember(self, request_identifier, self._answers, self._samples))
         self._cycles = self._answers if self._led else group.exchange
         self.look_after(self._cycles, channel=self._channel)
 

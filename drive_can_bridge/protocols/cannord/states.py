@@ -56,7 +56,7 @@ CONTROL_PARAMETER = Parameter(
     name='control_word', access=AccessMode.WRITE_ONLY, description='Control word of the inverter')
 
 
-class State(Enum):
+class InverterState(Enum):
     """The states of the inverter, by the names that users see."""
 
     NOT_READY = 'not ready'
@@ -73,23 +73,23 @@ class State(Enum):
 
 #: (mask, value, state), as the manuals print the table
 _TABLE = (
-    (0x004F, 0x0000, State.NOT_READY),
-    (0x004F, 0x0040, State.SWITCH_ON_DISABLED),
-    (0x007F, 0x0031, State.READY_TO_SWITCH_ON),
-    (0x007F, 0x0033, State.SWITCHED_ON),
-    (0x007F, 0x0037, State.OPERATION_ENABLED),
-    (0x004F, 0x0008, State.FAULT),
-    (0x004F, 0x000F, State.FAULT_REACTION),
-    (0x007F, 0x0017, State.QUICK_STOP),
+    (0x004F, 0x0000, InverterState.NOT_READY),
+    (0x004F, 0x0040, InverterState.SWITCH_ON_DISABLED),
+    (0x007F, 0x0031, InverterState.READY_TO_SWITCH_ON),
+    (0x007F, 0x0033, InverterState.SWITCHED_ON),
+    (0x007F, 0x0037, InverterState.OPERATION_ENABLED),
+    (0x004F, 0x0008, InverterState.FAULT),
+    (0x004F, 0x000F, InverterState.FAULT_REACTION),
+    (0x007F, 0x0017, InverterState.QUICK_STOP),
 )
 
 
-def state_of(status: int) -> State:
+def state_of(status: int) -> InverterState:
     """Return the state that a status word tells."""
     for mask, value, state in _TABLE:
         if status & mask == value:
             return state
-    return State.UNKNOWN
+    return InverterState.UNKNOWN
 
 
 def is_faulted(status: int) -> bool:

@@ -18,7 +18,7 @@ function 00h goes first; once the device has answered that, any function byte is
 A device that has just started has 00h as its last function byte already and need not answer
 function 00h. So a read is sent all the same: it does no harm, and its answer synchronises. A
 write that was sent like this might be executed although it seems lost; it is reported as *not
-sent*, unless the caller says that this does not matter (:attr:`Write.blind`).
+sent*, unless the caller says that this does not matter (:attr:`RegisterWrite.blind`).
 
 Blind writes do not wait for function 00h, so that the answer to a write that was given up may
 still come. There are two toggles only: it fits the last but one as well, and may say that a drive
@@ -73,7 +73,7 @@ REFUSED_PAUSE = 0.01
 
 
 @dataclass(frozen=True)
-class Read:
+class RegisterRead:
     """
     Read one register, or two adjacent ones.
 
@@ -88,7 +88,7 @@ class Read:
 
 
 @dataclass(frozen=True)
-class Write:
+class RegisterWrite:
     """
     Write one register, or two adjacent ones.
 
@@ -103,7 +103,8 @@ class Write:
     timeout: float | None = None
 
     @classmethod
-    def of(cls, placement: Placement, parameter: Parameter, raw: int, **how: Any) -> 'Write':
+    def of(cls, placement: Placement, parameter: Parameter, raw: int,
+           **how: Any) -> 'RegisterWrite':
         """Return what gives a parameter this raw integer."""
         return cls(placement.span(parameter).address, placement.words(parameter, raw), **how)
 
@@ -113,7 +114,7 @@ class Write:
         return Span(self.address, len(self.words))
 
 
-Step = Union[Read, Write]
+Step = Union[RegisterRead, RegisterWrite]
 
 
 class Answered(NamedTuple):
@@ -190,13 +191,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def attempts(self, step: Step) -> int:
         # What takes more than one write tells what may be executed twice, and what may not.
-        return (step.attempts or self.retry.attempts) if isinstance(step, Read) else 1
+        return (step.attempts or self.retry.attempts) if isinstance(step, RegisterRead) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
-        return isinstance(reply, Silence) and (isinstance(step, Read) or reply.sent)
+        return isinstance(reply, Silence) and (isinstance(step, RegisterRead) or reply.sent)
 
     def repeatable(self, step: Step, *, users: bool) -> bool:
-        return isinstance(step, Read)
+        return isinstance(step, RegisterRead)
 
     def answers(self, answer: PkwMessage, step: Step) -> bool:
         """Tell whether an answer may be that to a step that was given up, or to its 00h."""
@@ -217,7 +218,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._prepare(pkw.idle_request(), now)
 
     def held_until(self, step: Step, now: float) -> float:
-        if isinstance(step, Read) or step.blind:
+        if isinstance(step, RegisterRead) or step.blind:
             return -math.inf
         late = [-math.inf, -math.inf]
         for until, request in self._still_late(now):
@@ -247,7 +248,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             self._disbelieved.add(request.address)
             return False
         self._disbelieved.discard(request.address)
-        if isinstance(step, Read):
+        if isinstance(step, RegisterRead):
             self._open.clear()
         elif step.blind and _conflicts(since, request):
             if not self._abandoned and self._refused_at is None:
@@ -271,7 +272,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         if now < self._until:
             return False
         sent = not self._preparing
-        if sent or self._abandoned or isinstance(step, Write) and not step.blind:
+        if sent or self._abandoned or isinstance(step, RegisterWrite) and not step.blind:
             self.forget()
             return Silence(sent or _is_blind(step))     # it was, before what was asked aside
         self._send_step(step, now)
@@ -281,7 +282,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         """Expect nothing any more; what the device's last function byte is, is unknown."""
         request, step = self._request, self.step
         if request is not None and not self._preparing and self._refused_at is None and (
-                isinstance(step, Write) and not step.blind):
+                isinstance(step, RegisterWrite) and not step.blind):
             self._given_up.append((self._late_until, request))
         self.finish()
         self._synchronised = False
@@ -308,7 +309,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
             return Silence(sent=_is_blind(step))
         if request.code != Function.NONE:
             self._open.clear()
-            if isinstance(step, Write) and step.address in self._disbelieved:
+            if isinstance(step, RegisterWrite) and step.address in self._disbelieved:
                 self._given_up = deque(
                     (each for each in self._given_up if each[1].address != step.address),
                     maxlen=ASKED_MAX)
@@ -320,7 +321,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
     def _is_doubtful(self, step: Step, now: float) -> bool:
         """Tell whether answers to given-up writes would make more than the next one doubtful."""
-        if isinstance(step, Read) or step.blind:
+        if isinstance(step, RegisterRead) or step.blind:
             return False
         late = [each[1] for each in self._still_late(now) if each[1].address == step.address]
         asked = set(map(id, self._asked))
@@ -367,7 +368,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
     def _next_toggle(self, step: Step, now: float) -> bool:
         """Return the toggle of the request for a step: inverted, if no late answer has only it."""
         inverted = not self._toggle
-        if isinstance(step, Read) or step.blind:
+        if isinstance(step, RegisterRead) or step.blind:
             return inverted
         taken = {request.toggle for _, request in self._still_late(now)
                  if request.address == step.address}
@@ -385,7 +386,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._refused_at = now
         if self._asked and self._asked[-1] is self._request:
             self._asked.pop()
-        if isinstance(self.step, Write) and self.step.blind:
+        if isinstance(self.step, RegisterWrite) and self.step.blind:
             self.deadline = min(self._until, now + REFUSED_PAUSE)
         if self._request.code != Function.NONE:
             self._toggle = not self._toggle     # the device has not seen this one
@@ -396,15 +397,15 @@ class MailboxTransactor(Transactor[Step, Reply]):
         """Return how many s the answer to a step has."""
         return self.retry.timeout if step is None or step.timeout is None else step.timeout
 
-    def _write_left(self, write: Write, sent: bool, now: float) -> None:
+    def _write_left(self, write: RegisterWrite, sent: bool, now: float) -> None:
         if sent and self._sent is not None:
             self._sent.note(write.span, write.words)
         self._left(sent, now)
 
     def _try_again(self, step: Step, refused_at: float, now: float) -> Reply | bool:
         """Go on after a refusal: a read ends when its time is over, a write that may wait now."""
-        again = isinstance(step, Write) and step.blind
-        if now >= self._until or self._abandoned or isinstance(step, Write) and not again:
+        again = isinstance(step, RegisterWrite) and step.blind
+        if now >= self._until or self._abandoned or isinstance(step, RegisterWrite) and not again:
             self.finish()   # what the device's last function byte is, is as known as before
             return Silence(sent=False, refused=True)
         if again and now >= refused_at + REFUSED_PAUSE:
@@ -418,7 +419,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         # after function 00h, too: a late answer to the request before never fits
         self._toggle = self._next_toggle(step, now)
         left, self._request = self._left, self._make_request(step, self._toggle)
-        if isinstance(step, Write):
+        if isinstance(step, RegisterWrite):
             self._open.append(self._request)
             left = partial(self._write_left, step)
         self.deadline = self._until = now + self._patience(step)
@@ -427,7 +428,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._send(self._request, left)
 
     def _make_request(self, step: Step, toggle: bool) -> PkwMessage:
-        if isinstance(step, Read):
+        if isinstance(step, RegisterRead):
             return pkw.read_request(step.address, step.count, toggle)
         return pkw.write_request(step.address, step.words, toggle)
 
@@ -445,7 +446,7 @@ def _conflicts(written: Iterable[PkwMessage], request: PkwMessage) -> bool:
 
 
 def _is_blind(step: Step | None) -> bool:
-    return isinstance(step, Write) and step.blind
+    return isinstance(step, RegisterWrite) and step.blind
 
 
 MailboxChannel = Channel[Step, Reply]

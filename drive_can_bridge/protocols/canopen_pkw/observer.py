@@ -16,10 +16,10 @@ from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.observer import hear_node
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, Layout, PkwMessage
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, PkwLayout, PkwMessage
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, listed_by, raws_of, TelegramKind, Verdict)
-from drive_can_bridge.protocols.pairing import RequestContent, Requests
+from drive_can_bridge.protocols.pairing import PendingRequests, RequestContent
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -34,7 +34,7 @@ class PkwObserver(DriveObserver):
         options = drive.options
         self._abort_order: str = options.abort_code_order
         hear_node(self, drive.station, self._booted, drive.parameter_timeout)
-        decode = partial(pkw.decode, layout=Layout(options.layout))
+        decode = partial(pkw.decode, layout=PkwLayout(options.layout))
         for identifier, direction, title, take in (
                 (options.request_cob_id, _REQUEST, 'PKW request', self._take_request),
                 (options.response_cob_id, _RESPONSE, 'PKW response', self._take_response)):
@@ -44,7 +44,7 @@ class PkwObserver(DriveObserver):
             drive.profile.parameters.values(), lambda parameter: (
                 None if placement.address(parameter) is None else placement.span(parameter)))
         self._wanted = addresses.round_spans(drive)
-        self._requests: Requests[PkwMessage] = Requests(
+        self._requests: PendingRequests[PkwMessage] = PendingRequests(
             self, drive.parameter_timeout, self._content, plan=addresses.round_plan(drive),
             setpoints={placement.span(parameter) for parameter in drive.cyclic_request})
         self._last_byte: int | None = None

@@ -73,7 +73,7 @@ Words = tuple[int, int]
 NO_WORDS: Words = (0, 0)
 
 
-class Layout(Enum):
+class PkwLayout(Enum):
     """Where the bytes of the four words stand in the PDO."""
 
     WORD_LE = 'word_le'
@@ -84,9 +84,9 @@ class Layout(Enum):
 #: of each layout: how it packs them, and which of word 1, sub-index, function, words 3 and 4 comes
 #: in which place
 _PLACES = {
-    Layout.WORD_LE: (struct.Struct('<HBBHH'), (0, 1, 2, 3, 4)),
-    Layout.DWORD_SWAPPED: (struct.Struct('<BBHHH'), (1, 2, 0, 4, 3)),
-    Layout.WORD_BE: (struct.Struct('>HBBHH'), (0, 2, 1, 3, 4)),
+    PkwLayout.WORD_LE: (struct.Struct('<HBBHH'), (0, 1, 2, 3, 4)),
+    PkwLayout.DWORD_SWAPPED: (struct.Struct('<BBHHH'), (1, 2, 0, 4, 3)),
+    PkwLayout.WORD_BE: (struct.Struct('>HBBHH'), (0, 2, 1, 3, 4)),
 }
 
 
@@ -264,7 +264,7 @@ def _request(address: Address, writes: bool, count: int, toggle: bool, words: Wo
 # -- bytes ----------------------------------------------------------------------------------------
 
 
-def encode(message: PkwMessage, layout: Layout) -> bytes:
+def encode(message: PkwMessage, layout: PkwLayout) -> bytes:
     """
     Return the eight bytes of a message.
 
@@ -278,7 +278,7 @@ def encode(message: PkwMessage, layout: Layout) -> bytes:
         raise LocalProtocolError(f'{message!r} does not fit its words') from None
 
 
-def decode(data: bytes, layout: Layout) -> PkwMessage:
+def decode(data: bytes, layout: PkwLayout) -> PkwMessage:
     """
     Read a message of either direction.
 

@@ -14,8 +14,7 @@ from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Found, Item, ParameterAccess
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, Read, Refused, Reply, Silence, Step, Write,
-)
+    Answered, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
@@ -30,7 +29,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
     """Parameters by register or object; adjacent registers share a request."""
 
     def read(self, span: Span) -> Generator[Step, Reply, Found]:
-        reply = yield Read(span.address, span.count)
+        reply = yield RegisterRead(span.address, span.count)
         if isinstance(reply, Answered):
             return reply.words[:span.count]
         return (self.retry.unanswered() if isinstance(reply, Silence) else
@@ -48,7 +47,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
             words.update(zip(self.placement.span(parameter).addresses,
                              self.placement.words(parameter, raw)))
         outcome = yield from self._put(
-            Write(min(words), tuple(words[address] for address in sorted(words)), blind))
+            RegisterWrite(min(words), tuple(words[address] for address in sorted(words)), blind))
         return (outcome,) * len(items)
 
     def misfit(self, items: Sequence[Item]) -> Sentence:
@@ -57,7 +56,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
         fits = len(shared) == 1 and sum(span.count for span in spans) == shared[0].count
         return NOTHING if fits else NOT_TOGETHER
 
-    def _put(self, write: Write) -> Generator[Step, Reply, Outcome]:
+    def _put(self, write: RegisterWrite) -> Generator[Step, Reply, Outcome]:
         """
         Write once.
 
@@ -80,7 +79,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
 # -- what the drive is told -----------------------------------------------------------------------
 
 
-def tell(duty: StopDuty, channel: Hashable, write: Write, *, runs: bool,
+def tell(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
          ) -> Generator[Step, Reply, Reply]:
     """
     Write a setpoint or control word, and keep the books of what the drive was told.
@@ -126,7 +125,7 @@ def write_until_answered(writes: Sequence[StopWrite], placement: Placement, time
         name = f'{parameter.name} {raw:04X}h' if is_word else parameter.name
         reply: Reply = Silence()
         for attempt in range(1, STOP_ATTEMPTS + 1):
-            reply = yield Write.of(placement, parameter, raw, blind=True,
+            reply = yield RegisterWrite.of(placement, parameter, raw, blind=True,
                                    timeout=last if attempt == STOP_ATTEMPTS else timeout)
             if not isinstance(reply, Silence):
                 break

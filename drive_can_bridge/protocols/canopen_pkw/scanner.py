@@ -25,7 +25,7 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import TEXTS
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, Layout, PkwMessage
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, PkwLayout, PkwMessage
 from drive_can_bridge.protocols.scanner import (
     Certainty, conclude, Conversation, Finding, Prober, Question, Scanner, spaced)
 
@@ -114,7 +114,7 @@ class CanopenScanner(Scanner):
                     value & _PDO_IDENTIFIER == network.REQUEST_BASE + node):
                 # a device that got the function of the first one last, does not answer that one
                 self._questions += [Frame(network.REQUEST_BASE + node, pkw.encode(
-                    pkw.read_request(STATUS, 1, toggle), pkw.Layout.WORD_LE), False)
+                    pkw.read_request(STATUS, 1, toggle), pkw.PkwLayout.WORD_LE), False)
                     for toggle in (False, True)]
         elif value is None:
             return
@@ -184,7 +184,7 @@ class PkwProber(Prober):
             why = frame_sentences.no_mailbox(mapped)
             return [Finding(key, None, why) for key in KEYS]
         seen = {}
-        for layout in Layout:
+        for layout in PkwLayout:
             seen[layout] = yield from self._try(layout)
         layout_found, reason = _conclude(seen)
         findings = [Finding('layout', layout_found and layout_found.value, reason)]
@@ -210,7 +210,7 @@ class PkwProber(Prober):
         uploaded = None if answer is None else _uploaded(answer.data)
         return None if uploaded is None or uploaded.value is None else uploaded.value >> 16
 
-    def _try(self, layout: Layout) -> Generator[Question, Frame | None, _Evidence]:
+    def _try(self, layout: PkwLayout) -> Generator[Question, Frame | None, _Evidence]:
         evidence = _Evidence()
         yield self._idle()
         self._toggle = False
@@ -226,7 +226,7 @@ class PkwProber(Prober):
                     evidence.refusals.append((address, answer[0], answer[1].words))
         return evidence
 
-    def _word_order(self, layout: Layout) -> Generator[Question, Frame | None, Finding]:
+    def _word_order(self, layout: PkwLayout) -> Generator[Question, Frame | None, Finding]:
         votes: dict[str, list[str]] = {}
         certain = False
         for parameter in self._wide():
@@ -262,7 +262,7 @@ class PkwProber(Prober):
         options = self.drive.options
         return Question(Frame(options.request_cob_id, data, False), options.response_cob_id, fits)
 
-    def _ask(self, address: Address, count: int, layout: Layout) -> _Asking:
+    def _ask(self, address: Address, count: int, layout: PkwLayout) -> _Asking:
         request = pkw.read_request(address, count, self._toggle)
         self._toggle = not self._toggle
         data = pkw.encode(request, layout)
@@ -280,7 +280,7 @@ class PkwProber(Prober):
 
 def harmless(data: bytes) -> bool:
     """Tell whether a request writes nothing, whatever the layout of who gets it."""
-    meanings = [pkw.decode(data, layout).meaning for layout in Layout]
+    meanings = [pkw.decode(data, layout).meaning for layout in PkwLayout]
     return not any(meaning is not None and meaning.writes for meaning in meanings)
 
 
@@ -293,7 +293,7 @@ def _uploaded(data: bytes) -> sdo.Uploaded | None:
     return found if found.object == (sdo.RPDO4_MAPPING, 1) else None
 
 
-def _conclude(seen: dict[Layout, _Evidence]) -> tuple[Layout | None, str]:
+def _conclude(seen: dict[PkwLayout, _Evidence]) -> tuple[PkwLayout | None, str]:
     """Return the layout, and what that rests on."""
     understood = [layout for layout, each in seen.items() if each.understood]
     proven = [layout for layout in understood if seen[layout].refusals]

@@ -55,8 +55,8 @@ from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxTransactor, Procedure, Read, Refused, Reply, Silence, Step)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout, PkwMessage
+    MailboxChannel, MailboxTransactor, Procedure, Refused, RegisterRead, Reply, Silence, Step)
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout, PkwMessage
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
@@ -107,7 +107,7 @@ class Rounds:
             span = pending.pop(0)
             if self._words and self._session.online:
                 self._writers.write_setpoints(self._channel.now)
-            reply = yield Read(span.address, span.count, attempts=1)
+            reply = yield RegisterRead(span.address, span.count, attempts=1)
             if isinstance(reply, Silence):
                 self.gap = NOTHING if not self._words else sentences.one_read_unanswered(
                     self._names(span))
@@ -178,7 +178,7 @@ class PkwSession(Session):
             drive, controlled=control is not None, cells=addresses.keys,
             refusal=lambda parameter: addresses.half_refusal(parameter, drive.profile)))
         options, placement = drive.options, addresses.Placement.of(drive)
-        self._layout = Layout(options.layout)
+        self._layout = PkwLayout(options.layout)
         self._node = WatchedNode(drive.station, heartbeat_timeout=options.heartbeat_timeout)
         self._heard = Heard('no complete round of reads')
         self._started_at = -math.inf    # by NMT, the last time

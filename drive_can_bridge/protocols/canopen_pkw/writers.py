@@ -32,7 +32,7 @@ from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxChannel, Read, Refused, Reply, Silence, Step, Write)
+    Answered, MailboxChannel, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
 from drive_can_bridge.protocols.polled_exchange import TOLERANCE
@@ -209,7 +209,7 @@ class Writers:
             raw, begun_at = setpoint.raw, self._channel.now
             alone = self._word is None and self._stops(index, setpoint)
             self._output.written(index, raw, begun_at)
-            write = Write.of(
+            write = RegisterWrite.of(
                 self._placement, setpoint.parameter, raw, blind=alone,
                 timeout=min(self._patience, timeout) if alone and left > 0 else timeout)
             reply = yield from tell(
@@ -286,7 +286,8 @@ class Writers:
             output.written(self._slot, word, self._channel.now)
             reply = yield from tell(
                 self._session.duty, CONTROL_WORD,
-                Write.of(self._placement, parameter, word, blind=stopping, timeout=timeout),
+                RegisterWrite.of(self._placement, parameter, word, blind=stopping,
+                                 timeout=timeout),
                 runs=word != control.table.disable)
             if isinstance(reply, Silence):
                 unanswered += stopping
@@ -312,7 +313,7 @@ class Writers:
         if not parameter.readable:
             return None
         span = self._placement.span(parameter)
-        reply = yield Read(span.address, span.count, attempts=1)
+        reply = yield RegisterRead(span.address, span.count, attempts=1)
         if not isinstance(reply, Answered):
             return None
         found = self._placement.raw(parameter, reply.words)
@@ -375,7 +376,7 @@ class Writers:
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
         span = self._placement.span(status)
-        reply = yield Read(span.address, span.count, attempts=1, timeout=timeout)
+        reply = yield RegisterRead(span.address, span.count, attempts=1, timeout=timeout)
         return self._placement.raw(status, reply.words) if isinstance(reply, Answered) else None
 
     # -- what the drive refuses -------------------------------------------------------------------

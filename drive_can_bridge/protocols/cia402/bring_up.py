@@ -35,7 +35,7 @@ from drive_can_bridge.protocols.cia402.objects import (
     at_object, differs, ObjectAccess, Procedure, SetUpEnd, SetUpOutcome, SetUpState, silent)
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
-from drive_can_bridge.protocols.cia402.states import MODES, State
+from drive_can_bridge.protocols.cia402.states import MODES, ServoState
 from drive_can_bridge.protocols.cia402.watch import BridgeWatch
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019
@@ -78,7 +78,7 @@ class BringUp:
         self._transfer, self._read = objects.transfer, objects.read
         self._put, self._must = objects.put, objects.must
         self._told: set[str] = set()
-        self.moving: State | None = None
+        self.moving: ServoState | None = None
         self._found = NOTHING           # what was told of a drive that runs
         self.options: dict[int, int] = {}
         self.nmt_at = self.started_at = -math.inf
@@ -169,8 +169,8 @@ class BringUp:
             self._stopped_at = min(self._stopped_at, self._channel.now)
             self.moving = state
             # a fault reaction ends by itself, whatever it is told; a quick stop takes its course
-            braking = state is State.FAULT_REACTION or (
-                state is State.QUICK_STOP_ACTIVE and (yield from self._brakes()))
+            braking = state is ServoState.FAULT_REACTION or (
+                state is ServoState.QUICK_STOP_ACTIVE and (yield from self._brakes()))
             found = (sentences.found_braking if braking else sentences.found_enabled)(state.value)
             if self._channel.now >= until:
                 runs = found if braking else sentences.found_running(state.value)
@@ -179,7 +179,7 @@ class BringUp:
                 self._found = found
                 self._session.report.note(Noted(found, warning=True))
             wanted = DISABLE_WORDS[self._options.disable_word]
-            if state is State.QUICK_STOP_ACTIVE:
+            if state is ServoState.QUICK_STOP_ACTIVE:
                 wanted = states.DISABLE_VOLTAGE
             if not braking and (wanted != word or not looks % _LOOKS):
                 word = wanted

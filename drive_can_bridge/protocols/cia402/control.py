@@ -34,7 +34,7 @@ from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.standing import Standing
-from drive_can_bridge.protocols.cia402.states import PATTERNS, State
+from drive_can_bridge.protocols.cia402.states import PATTERNS, ServoState
 
 DISABLE_WORDS = {'disable_operation': states.SWITCH_ON, 'shutdown': states.SHUTDOWN,
                  'disable_voltage': states.DISABLE_VOLTAGE}
@@ -53,11 +53,11 @@ def control_table(options: Any) -> ControlTable:
         parameter='', disable=states.SHUTDOWN, enable=states.ENABLE,
         quick_stop=states.QUICK_STOP, reset_fault=states.FAULT_RESET,
         status_parameter=STATUS_NAME,
-        ready=StatusPattern(*PATTERNS[State.READY_TO_SWITCH_ON]),
-        enabled=StatusPattern(*PATTERNS[State.OPERATION_ENABLED]),
+        ready=StatusPattern(*PATTERNS[ServoState.READY_TO_SWITCH_ON]),
+        enabled=StatusPattern(*PATTERNS[ServoState.OPERATION_ENABLED]),
         fault=StatusPattern(states.FAULT_BIT, states.FAULT_BIT), running=_RUNNING,
-        reaction=StatusPattern(*PATTERNS[State.FAULT_REACTION]),
-        braking=StatusPattern(*PATTERNS[State.QUICK_STOP_ACTIVE]))
+        reaction=StatusPattern(*PATTERNS[ServoState.FAULT_REACTION]),
+        braking=StatusPattern(*PATTERNS[ServoState.QUICK_STOP_ACTIVE]))
 
 
 class Known(Protocol):
@@ -93,7 +93,7 @@ class DriveRules(TableRules):
     def __init__(self, table: ControlTable, options: Any, known: Known, standing: Standing,
                  ) -> None:
         super().__init__(table)
-        self.state: State | None = None
+        self.state: ServoState | None = None
         self.status = 0
         self.standing = standing
         self.mode_bits = states.INTERPOLATE if options.mode == 'ip' else 0
@@ -118,13 +118,13 @@ class DriveRules(TableRules):
     def _disabling(self, asked: ControlAction | None) -> int:
         if self._quick_stop_unseen:
             return states.QUICK_STOP
-        if self.state is State.QUICK_STOP_ACTIVE:
+        if self.state is ServoState.QUICK_STOP_ACTIVE:
             on_trust = not self.standing.holds
             if on_trust and (asked is None or not self.standing.untold):
                 return states.QUICK_STOP
             self._taken_on_trust = on_trust
             return states.DISABLE_VOLTAGE
-        if self.may_run or self.state in (None, State.OPERATION_ENABLED):
+        if self.may_run or self.state in (None, ServoState.OPERATION_ENABLED):
             return self._disable_word
         if self._disable_word == states.DISABLE_VOLTAGE and asked is not ControlAction.ENABLE:
             return states.DISABLE_VOLTAGE
@@ -135,13 +135,13 @@ class DriveRules(TableRules):
             if self._last & _ENABLE_OPERATION:
                 # what was halted stays so until homing starts: its old target is still there
                 return states.ENABLE | (self.homing_bits or self.mode_bits & states.HALT)
-            if self.state is State.SWITCHED_ON:     # until it is back in its mode
+            if self.state is ServoState.SWITCHED_ON:     # until it is back in its mode
                 return states.SWITCH_ON
-        if self.state is State.OPERATION_ENABLED:
+        if self.state is ServoState.OPERATION_ENABLED:
             return self._enable_word | self.mode_bits
-        if self.state is State.SWITCHED_ON:
+        if self.state is ServoState.SWITCHED_ON:
             return states.SWITCH_ON if self._else_known.unready else self._enable_word
-        return states.SWITCH_ON if self.state is State.READY_TO_SWITCH_ON else states.SHUTDOWN
+        return states.SWITCH_ON if self.state is ServoState.READY_TO_SWITCH_ON else states.SHUTDOWN
 
     def rests(self, word: int) -> bool:
         return not word & (_ENABLE_OPERATION | states.FAULT_RESET) and word != states.QUICK_STOP
@@ -158,14 +158,14 @@ class DriveRules(TableRules):
 
     def reported(self, raw: int, *, behind: bool) -> None:
         self.status, self.state = raw, states.state_of(raw)
-        enabled = self.state is State.OPERATION_ENABLED
+        enabled = self.state is ServoState.OPERATION_ENABLED
         self._seen_enabled = self._seen_enabled or enabled
         if not behind:
             return
         self._answers += 1
         # one that has left it knows a later word: status words do not overtake each other
         known = self._answers > states.STATUS_LAG or self._seen_enabled and not enabled
-        if known or self.state is State.QUICK_STOP_ACTIVE:
+        if known or self.state is ServoState.QUICK_STOP_ACTIVE:
             self._quick_stop_unseen = False
         if known and not self._last & _ENABLE_OPERATION and not enabled:
             self.may_run = False
@@ -174,7 +174,7 @@ class DriveRules(TableRules):
         # it may be in its quick stop still
         self._quick_stop_unseen = (
             self._quick_stop_unseen or self._last == states.QUICK_STOP
-            or self.state is State.QUICK_STOP_ACTIVE)
+            or self.state is ServoState.QUICK_STOP_ACTIVE)
         self.state, self.status, self._answers = None, 0, 0
         self.halted = self._taken_on_trust = False
         self.standing.forget()
@@ -187,9 +187,9 @@ class DriveRules(TableRules):
     @property
     def holds(self) -> Sentence:
         if self.standing.holds:
-            return sentences.quick_stop_holds(State.QUICK_STOP_ACTIVE.value)
+            return sentences.quick_stop_holds(ServoState.QUICK_STOP_ACTIVE.value)
         return together((
-            sentences.quick_stop_holds(State.QUICK_STOP_ACTIVE.value),
+            sentences.quick_stop_holds(ServoState.QUICK_STOP_ACTIVE.value),
             sentences.nothing_says_standing())) if self.standing.untold else NOTHING
 
     def proviso(self) -> Sentence:
@@ -206,7 +206,7 @@ class DriveRules(TableRules):
 
     def remark(self, sending: ControlAction) -> Sentence:
         if sending is ControlAction.ENABLE or self.state not in (
-                State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+                ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE):
             return together((
                 sentences.word_sent_last(self._last), self.lacking, self._else_known.why))
         return sentences.still_braking()
@@ -215,7 +215,7 @@ class DriveRules(TableRules):
 def hint(status: int) -> Sentence:
     """Say what a status word tells about why a drive does not go on; '' for nothing."""
     if status & states.FAULT_BIT or states.state_of(status) in (
-            State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+            ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE):
         return NOTHING
     if not status & states.VOLTAGE_ENABLED:
         return sentences.voltage_disabled()

@@ -21,7 +21,7 @@ from drive_can_bridge.core.reporter import Reporter
 from drive_can_bridge.core.setpoints import Setpoints
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.control import DriveRules
-from drive_can_bridge.protocols.cia402.states import MODES, State, state_of
+from drive_can_bridge.protocols.cia402.states import MODES, ServoState, state_of
 
 
 class Handover:
@@ -50,7 +50,7 @@ class Handover:
     def look(self, status: int, now: float) -> None:
         """Take a status word, before the next control word is chosen."""
         rules, setpoint = self._rules, self._setpoint
-        if state_of(status) is not State.OPERATION_ENABLED:
+        if state_of(status) is not ServoState.OPERATION_ENABLED:
             self._handed, self._rising, self._settling = None, False, 0
             rules.mode_bits, rules.halted = 0, False
             self._waits_since, self._told = math.inf, False

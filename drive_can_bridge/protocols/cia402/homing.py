@@ -49,7 +49,7 @@ _LATCHING_PERIODS = 6
 _WRITE_AGAIN = 1.0
 
 
-class Step(Enum):
+class HomingStep(Enum):
     """How far it has come."""
 
     NONE = 'not under way'
@@ -75,7 +75,7 @@ class Homing:
         self._channel, self._mode = channel, mode
         self._timeout: float = session.configuration.options.homing_timeout
         self._request: ControlRequest | None = None
-        self._step = Step.NONE
+        self._step = HomingStep.NONE
         self.due = math.inf
         self._standing = rules.standing
         self._latches = [Band(place_of(each.parameter, each.measured))
@@ -94,7 +94,7 @@ class Homing:
     @property
     def under_way(self) -> bool:
         """Nothing arms, and the mode is not the drive's own."""
-        return self._step is not Step.NONE
+        return self._step is not HomingStep.NONE
 
     def refusal(self) -> Sentence:
         """Say why it cannot begin now; '' if it can."""
@@ -112,13 +112,13 @@ class Homing:
         self._session.interlock.hold(True)
         self._rules.homing_bits = 0
         self.due = now + self._timeout
-        self._go(Step.LOWERING)
+        self._go(HomingStep.LOWERING)
 
     def handle_timer(self, now: float) -> None:
         """End what lasts too long."""
         if now < self.due:
             return
-        if self._step is not Step.LATCHING:
+        if self._step is not HomingStep.LATCHING:
             self._now = now
             self._end(sentences.homing_timed_out(self._timeout, self._step.value))
             return
@@ -138,27 +138,27 @@ class Homing:
     def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
         """Take a sample, after its status word and what follows from that."""
         step, self._now = self._step, now
-        if step is Step.NONE:
+        if step is HomingStep.NONE:
             return
         if not self._machine.operating:
             self._interrupted(status)
             return
         behind = self._fresh and not self._machine.word_due
         self._fresh = not self._machine.word_due
-        if step is Step.LOWERING and behind:
-            self._go(Step.ENTERING)
+        if step is HomingStep.LOWERING and behind:
+            self._go(HomingStep.ENTERING)
             self._change(states.HOMING_MODE, self._entered)
-        elif step is Step.RUNNING and not self._machine.word_due:
+        elif step is HomingStep.RUNNING and not self._machine.word_due:
             self._look(status)
-        elif step is Step.LATCHING:
+        elif step is HomingStep.LATCHING:
             self._latch(raws, behind)
-        elif step is Step.HOLDING and behind:
-            self._go(Step.LEAVING)
+        elif step is HomingStep.HOLDING and behind:
+            self._go(HomingStep.LEAVING)
             self._change(self._mode, self._left)
 
     # -- steps ------------------------------------------------------------------------------------
 
-    def _go(self, step: Step) -> None:
+    def _go(self, step: HomingStep) -> None:
         self._step, self._fresh = step, False
 
     def _look(self, status: int) -> None:
@@ -191,14 +191,14 @@ class Homing:
         return band.seen_at - self._done_since >= duration
 
     def _entered(self, failure: Sentence) -> None:
-        if self._step is not Step.ENTERING or failure and not self._machine.operating:
+        if self._step is not HomingStep.ENTERING or failure and not self._machine.operating:
             return      # what was stopped meanwhile goes back with the next sample
         if failure:
             self._end(failure)
             return
         self._rules.homing_bits = states.START
         self._answers, self._no_error, self._lowered, self._done_in_a_row = 0, False, False, 0
-        self._go(Step.RUNNING)
+        self._go(HomingStep.RUNNING)
 
     def _end(self, failure: Sentence) -> None:
         """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
@@ -208,7 +208,7 @@ class Homing:
         self._rules.homing_bits = 0
         self._stay.clear()
         self._standing.begin(self._now)
-        self._go(Step.LATCHING)
+        self._go(HomingStep.LATCHING)
 
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
         """Take where the axis is, as soon as it stands: unless it is homed, it has to brake."""
@@ -232,10 +232,10 @@ class Homing:
             setpoints.measure(self._stay[0], driven=False)
             self._standing.end()
             self.due = math.inf
-            self._go(Step.HOLDING)
+            self._go(HomingStep.HOLDING)
 
     def _left(self, failure: Sentence) -> None:
-        if self._step is not Step.LEAVING:
+        if self._step is not HomingStep.LEAVING:
             return
         told = failure or self._failure
         if failure and self._machine.operating:
@@ -244,7 +244,7 @@ class Homing:
             self._answer_stopped()
         self._answer(not told, told or sentences.homed())
         if failure:
-            self._go(Step.HOLDING)
+            self._go(HomingStep.HOLDING)
         else:
             self._finish()
 
@@ -255,9 +255,9 @@ class Homing:
         self._rules.homing_bits = 0
         self.due = math.inf
         # a mode that changes now would change how the drive brakes
-        if states.state_of(status) not in states.MOVING and self._step is not Step.LEAVING and (
-                self._now >= self._write_at):
-            self._go(Step.LEAVING)
+        if (states.state_of(status) not in states.MOVING and self._now >= self._write_at
+                and self._step is not HomingStep.LEAVING):
+            self._go(HomingStep.LEAVING)
             # it may show it when it is enabled
             self._channel.run(self._write(self._mode, self._session.retry.attempts),
                               self._written, self._now)
@@ -268,7 +268,7 @@ class Homing:
         return NOTHING if reply.data is not None else sentences.mode_refused(mode)
 
     def _written(self, failure: Sentence) -> None:
-        if self._step is not Step.LEAVING:
+        if self._step is not HomingStep.LEAVING:
             return
         if not failure:
             self._finish()
@@ -276,7 +276,7 @@ class Homing:
         if not self.not_back:
             self._session.report.note(Noted(failure, warning=True))
         self.not_back, self._write_at = failure, self._now + _WRITE_AGAIN
-        self._go(Step.HOLDING)
+        self._go(HomingStep.HOLDING)
 
     def _change(self, mode: int, then: Callable[[Sentence], None]) -> None:
         step = self._step
@@ -313,5 +313,5 @@ class Homing:
     def _finish(self) -> None:
         self._rules.homing_bits = None
         self.due, self._write_at, self.not_back = math.inf, -math.inf, NOTHING
-        self._go(Step.NONE)
+        self._go(HomingStep.NONE)
         self._session.interlock.hold(False)

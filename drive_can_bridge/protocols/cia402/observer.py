@@ -19,13 +19,13 @@ from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.observer import hear_node, NmtObserver
-from drive_can_bridge.protocols.canopen.sdo import SdoMessage, SdoCommand as Said
+from drive_can_bridge.protocols.canopen.sdo import SdoCommand as Said, SdoMessage
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.states import state_of
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, listed_by, Observed, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import (
-    AnswerWatch, CYCLES_WAITED, CyclicWatch, RequestContent, Requests)
+    AnswerWatch, CYCLES_WAITED, CyclicWatch, PendingRequests, RequestContent)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _REQUEST, _RESPONSE = Direction.REQUEST, Direction.RESPONSE
@@ -94,7 +94,8 @@ class Cia402Observer(DriveObserver):
         else:
             self._events = EventWatch(drive.period, self.observed)
             self.watches.append(self._events)
-        self._requests: Requests[Place] = Requests(self, drive.parameter_timeout, self._content)
+        self._requests: PendingRequests[Place] = PendingRequests(self, drive.parameter_timeout,
+                                                                 self._content)
         self._segments = AnswerWatch(self, drive.parameter_timeout, self._lose_segment)
         self._transfer: Place | None = None     # by segments, under way
         self._begun: Place | None = None        # a write by segments, asked for

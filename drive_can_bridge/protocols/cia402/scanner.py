@@ -96,7 +96,7 @@ class Cia402Scanner(Scanner):
         sync = identifier == network.SYNC_IDENTIFIER
         told = states.state_of(word)
         fits = len(data) <= 1 if sync else len(data) >= 2 and node and (
-            told is not states.State.UNKNOWN if identifier < pdo.RPDO_BASE
+            told is not states.ServoState.UNKNOWN if identifier < pdo.RPDO_BASE
             else not word & _RESERVED)
         self._cycles[identifier] = self._cycles[identifier] + 1 if fits else 0
         request = pdo.RPDO_BASE + node

@@ -57,7 +57,7 @@ from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
 from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
-    CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, State, state_of, STATUS_PARAMETER)
+    CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cia402.watch import WATCH_INTERVALS
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script
@@ -227,7 +227,7 @@ class Cia402Session(Session):
         # the next activation sees for itself
         found, self._bring_up.moving = self._bring_up.moving, None
         if self.stage is not Stage.IDLE and not self.exchange.cycling and (
-                self._rules.may_run or found is State.OPERATION_ENABLED):
+                self._rules.may_run or found is ServoState.OPERATION_ENABLED):
             # it has acknowledged its stop by SDO, and nobody has seen it disabled since
             for happened in Happened.RUN_LEFT, Happened.STOP_LEFT, Happened.SILENT:
                 self.duty.channel(CYCLE, happened)
@@ -563,7 +563,7 @@ class Cia402Session(Session):
     def _look_at_state(self, now: float) -> None:
         """Ask for what the status word does not say, where something depends on it."""
         state, control = self._rules.state, self._machine
-        if state is not State.OPERATION_ENABLED:
+        if state is not ServoState.OPERATION_ENABLED:
             self._mode_shown = None
         if not control.pending:
             self._error_code = None
@@ -574,7 +574,7 @@ class Cia402Session(Session):
             self._channel.run(self._look_at_axis(), self._looked, now)
         elif self.stage is not Stage.RUNNING:
             return      # at the end nothing else is asked
-        elif state is State.OPERATION_ENABLED and self._mode_shown != self._mode and (
+        elif state is ServoState.OPERATION_ENABLED and self._mode_shown != self._mode and (
                 not control.stopping and not self._homing.under_way):
             self._looking = True
             self._channel.run(self._look_at_mode(), self._looked, now)
@@ -588,7 +588,7 @@ class Cia402Session(Session):
 
     def _look_at_mode(self) -> Generator[Transfer, TransferResult, None]:
         """Read 6061h until it shows the mode."""
-        while self._rules.state is State.OPERATION_ENABLED:
+        while self._rules.state is ServoState.OPERATION_ENABLED:
             reply = yield Transfer(states.MODE_SHOWN)
             if reply.abort in sdo.ABSENT:
                 self._bring_up.tell(sentences.mode_not_shown())
@@ -616,7 +616,7 @@ class Cia402Session(Session):
     @property
     def mode_lacking(self) -> Sentence:
         """What the drive lacks to be driven although it reports enabled; '' if nothing."""
-        if self._mode_shown == self._mode or self._rules.state is not State.OPERATION_ENABLED:
+        if self._mode_shown == self._mode or self._rules.state is not ServoState.OPERATION_ENABLED:
             return NOTHING
         return sentences.mode_differs(
             self.configuration.options.mode, self._mode, self._mode_shown)
@@ -739,8 +739,8 @@ class Cia402Session(Session):
         self._runs_on = bool(failed)
         return failed
 
-    def _state_in_the_end(self) -> Generator[Transfer, TransferResult, State]:
-        state = State.UNKNOWN
+    def _state_in_the_end(self) -> Generator[Transfer, TransferResult, ServoState]:
+        state = ServoState.UNKNOWN
         while True:
             reply = yield Transfer(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)
             if reply.data is not None:

@@ -29,7 +29,7 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
-from drive_can_bridge.protocols.cia402.states import State, state_of
+from drive_can_bridge.protocols.cia402.states import ServoState, state_of
 
 #: s for which nothing may say that the axis moves
 STILL = 0.5
@@ -122,7 +122,7 @@ class Standing:
                         if each.index in (*_INSTEAD, states.POSITION) and not each.subindex}
         self.band = Band(_width(drive))
         self.quick_stop_option: int | None = None
-        self._state: State | None = None
+        self._state: ServoState | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -153,7 +153,7 @@ class Standing:
         self._now, state = now, state_of(raw)
         if state is not self._state:
             self._state = state
-            if state is State.QUICK_STOP_ACTIVE:
+            if state is ServoState.QUICK_STOP_ACTIVE:
                 self.begin(now)
             else:
                 self.end()
@@ -253,7 +253,7 @@ class Standing:
 
         Where 605Ah says that it does, or nothing, the drive is given its time to leave that state.
         """
-        if self._state is not State.QUICK_STOP_ACTIVE:
+        if self._state is not ServoState.QUICK_STOP_ACTIVE:
             return False
         if self.quick_stop_option in _STAYS:
             return self._says_so or self.stands
@@ -266,7 +266,7 @@ class Standing:
 
         That is enough for what users ask for, and says nothing else.
         """
-        return (self._state is State.QUICK_STOP_ACTIVE
+        return (self._state is ServoState.QUICK_STOP_ACTIVE
                 and not self._tells_position and not self._tells_velocity
                 and not self._says_so and self._now - self._since >= self._timeout)
 

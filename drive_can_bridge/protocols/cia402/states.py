@@ -68,7 +68,7 @@ CONTROL_PARAMETER = Parameter(
     description='Control word of the drive')
 
 
-class State(Enum):
+class ServoState(Enum):
     """The states of a drive, by the names that users see."""
 
     NOT_READY = 'not ready to switch on'
@@ -85,25 +85,25 @@ class State(Enum):
 
 #: state: (mask, value) of the status word
 PATTERNS = {
-    State.NOT_READY: (0x004F, 0x0000),
-    State.SWITCH_ON_DISABLED: (0x004F, 0x0040),
-    State.READY_TO_SWITCH_ON: (0x006F, 0x0021),
-    State.SWITCHED_ON: (0x006F, 0x0023),
-    State.OPERATION_ENABLED: (0x006F, 0x0027),
-    State.QUICK_STOP_ACTIVE: (0x006F, 0x0007),
-    State.FAULT_REACTION: (0x004F, 0x000F),
-    State.FAULT: (0x004F, 0x0008),
+    ServoState.NOT_READY: (0x004F, 0x0000),
+    ServoState.SWITCH_ON_DISABLED: (0x004F, 0x0040),
+    ServoState.READY_TO_SWITCH_ON: (0x006F, 0x0021),
+    ServoState.SWITCHED_ON: (0x006F, 0x0023),
+    ServoState.OPERATION_ENABLED: (0x006F, 0x0027),
+    ServoState.QUICK_STOP_ACTIVE: (0x006F, 0x0007),
+    ServoState.FAULT_REACTION: (0x004F, 0x000F),
+    ServoState.FAULT: (0x004F, 0x0008),
 }
 #: in which a motor has current, and may move
-MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
+MOVING = (ServoState.OPERATION_ENABLED, ServoState.QUICK_STOP_ACTIVE, ServoState.FAULT_REACTION)
 _MASK = 0x006F
 #: of all combinations of the bits that states are told by
 _STATES = {raw: next((state for state, (mask, value) in PATTERNS.items()
-                      if raw & mask == value), State.UNKNOWN)
+                      if raw & mask == value), ServoState.UNKNOWN)
            for raw in range(_MASK + 1) if raw & _MASK == raw}
 
 
-def state_of(status: int) -> State:
+def state_of(status: int) -> ServoState:
     """Return the state that a status word tells."""
     return _STATES[status & _MASK]
 

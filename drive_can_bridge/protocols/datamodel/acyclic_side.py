@@ -24,8 +24,8 @@ from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel import procedures
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterTransactor, Read, Reply, Step, STOP_EEPROM_WAIT, Words,
-    Write)
+    AcyclicChannel, AcyclicCodec, ParameterRead, ParameterTransactor, ParameterWrite, Reply, Step,
+    STOP_EEPROM_WAIT, Words)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
@@ -128,7 +128,7 @@ class AcyclicSide:
         self.channel.receive(words, now)
 
     def _answers(self, frame: Frame, step: Step) -> bool:
-        if not isinstance(step, Read):
+        if not isinstance(step, ParameterRead):
             return False
         try:
             self._decode(frame, step.key)
@@ -172,7 +172,8 @@ class AcyclicSide:
             longest += self._session.retry.timeout + (STOP_ATTEMPTS + 2) * silence
         # late answers are not believed, and what others ask now may be answered late, too
         asked = {self.numbers.number(each.parameter) for each in told}.union(self._witnesses)
-        return longest + answer * (1 + sum(self.channel.doubtful(Read(each)) for each in asked))
+        return longest + answer * (1 + sum(
+            self.channel.doubtful(ParameterRead(each)) for each in asked))
 
     def begin_stop(self, now: float, *, setpoints: bool = True, again: bool = False) -> None:
         """
@@ -201,12 +202,12 @@ class AcyclicSide:
         return self.stop.writes(word=setpoints or self.control_slot is None, setpoints=setpoints)
 
     def _read_status(self, status: Parameter, timeout: float) -> StatusRead[Step, Reply]:
-        words = yield Read(
+        words = yield ParameterRead(
             self.numbers.number(status), attempts=1, late_will_do=True, timeout=timeout)
         return None if words is None else status.raw_from_word(words[0])
 
 
-def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
+def confirm(writes: Sequence[tuple[Parameter, ParameterWrite]], timeout: float,
             witnesses: Sequence[int]) -> Generator[Step, Words | None, list[Sentence]]:
     """
     Read back what stops a drive, since nobody acknowledges it, and write it again as needed.
@@ -221,7 +222,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
     blind = [each for each in writes if not each[0].readable]
     readable = wrong = [each for each in writes if each[0].readable]
     failed: list[Sentence] = []
-    taken: set[Write] = set()
+    taken: set[ParameterWrite] = set()
     silent = True
     for attempt in range(STOP_ATTEMPTS):
         for each in (*blind, *wrong) if attempt else ():
@@ -230,7 +231,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
         doubtful, failed, silent = wrong, [], False
         wrong = []
         for parameter, write in doubtful:
-            reply = None if silent else (yield Read(
+            reply = None if silent else (yield ParameterRead(
                 write.number, attempts=1, late_will_do=True, timeout=timeout))
             silent = reply is None
             if reply == write.words:
@@ -246,7 +247,7 @@ def confirm(writes: Sequence[tuple[Parameter, Write]], timeout: float,
         numbers = *(write.number for _, write in readable), *witnesses
         # the first one twice: its answer may be late
         for number in (*numbers[:1], *numbers)[:STOP_ATTEMPTS]:
-            silent = (yield Read(
+            silent = (yield ParameterRead(
                 number, attempts=1, late_will_do=True, timeout=timeout)) is None
             if not silent:
                 break

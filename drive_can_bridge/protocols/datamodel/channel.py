@@ -2,13 +2,13 @@
 """
 The acyclic channel to one station: reads that are answered, and writes that are not.
 
-=================== ==================================================================
-step                result sent back
-=================== ==================================================================
-``Read(n, count)``  the words, or None when nobody answered after all attempts
-``Write(n, words)`` (), as soon as the bus has taken the frame (nobody acknowledges it); None when
-                    the bus refused it
-=================== ==================================================================
+============================ =================================================================
+step                         result sent back
+============================ =================================================================
+``ParameterRead(n, count)``  the words, or None when nobody answered after all attempts
+``ParameterWrite(n, words)`` (), as soon as the bus has taken the frame (nobody acknowledges it);
+                             None when the bus refused it
+============================ =================================================================
 
 As nobody answers writes, some of them are no exchange. A control word goes before all procedures,
 and takes the place of one that has not left yet (:meth:`~ParameterTransactor.write_first`). What
@@ -48,7 +48,7 @@ STOP_EEPROM_WAIT = 0.025
 
 
 @dataclass(frozen=True)
-class Read:
+class ParameterRead:
     """
     Read ``count`` consecutive parameters.
 
@@ -71,7 +71,7 @@ class Read:
 
 
 @dataclass(frozen=True)
-class Write:
+class ParameterWrite:
     """Write consecutive parameters."""
 
     number: int
@@ -84,7 +84,7 @@ class Write:
         return Chunk(self.number, len(self.words))
 
 
-Step = Union[Read, Write]
+Step = Union[ParameterRead, ParameterWrite]
 Words = tuple[int, ...]
 Reply = Union[Words, None]
 Procedure = Generator[Step, Reply, Any]
@@ -147,8 +147,8 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._eeprom_free_at = -math.inf
         self._stop_free_at = -math.inf      # for what confirms a stop, or tells it again
         self._stop_wait_until = -math.inf   # for the EEPROM, what tells it first
-        self._first: tuple[Write, Left] | None = None
-        self._urgent: deque[tuple[Write, Left]] = deque()
+        self._first: tuple[ParameterWrite, Left] | None = None
+        self._urgent: deque[tuple[ParameterWrite, Left]] = deque()
 
     @property
     def silence(self) -> float:
@@ -157,12 +157,12 @@ class ParameterTransactor(Transactor[Step, Reply]):
     # -- one exchange -----------------------------------------------------------------------------
 
     @property
-    def outstanding(self) -> Read | None:
+    def outstanding(self) -> ParameterRead | None:
         """The read that waits for its answer, if any."""
-        return self.step if isinstance(self.step, Read) else None
+        return self.step if isinstance(self.step, ParameterRead) else None
 
     def begin(self, step: Step, now: float) -> None:
-        if isinstance(step, Read):
+        if isinstance(step, ParameterRead):
             self._emit(self._codec.encode_read(step.number, step.count), None)
             self.asked_at = now
             self.expect(step, now + (
@@ -195,13 +195,13 @@ class ParameterTransactor(Transactor[Step, Reply]):
 
     def attempts(self, step: Step) -> int:
         # A write is never repeated: it may be a command.
-        return (step.attempts or self.retry.attempts) if isinstance(step, Read) else 1
+        return (step.attempts or self.retry.attempts) if isinstance(step, ParameterRead) else 1
 
     def unanswered(self, step: Step, reply: Reply) -> bool:
-        return reply is None and isinstance(step, Read)
+        return reply is None and isinstance(step, ParameterRead)
 
     def key(self, step: Step) -> Hashable | None:
-        if not isinstance(step, Read):
+        if not isinstance(step, ParameterRead):
             return None
         if self.anonymous:
             return ANYTHING
@@ -209,7 +209,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
 
     def doubted(self, step: Step) -> Hashable | None:
         # one that was asked before the stop was written proves nothing
-        if self.anonymous or not isinstance(step, Read):
+        if self.anonymous or not isinstance(step, ParameterRead):
             return self.key(step)
         return step.key
 
@@ -217,7 +217,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         if self.anonymous:
             return None
         timeout = min(STOP_PATIENCE, self.retry.timeout)
-        asides = [Read(number, count, attempts=1, late_will_do=True, timeout=timeout)
+        asides = [ParameterRead(number, count, attempts=1, late_will_do=True, timeout=timeout)
                   for number in ASIDE for count in range(1, 5)]
         return next((each for each in asides if not is_late(each.key)), None)
 
@@ -228,7 +228,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
 
     # -- writes that are no exchange --------------------------------------------------------------
 
-    def write(self, write: Write, told: Left, now: float) -> None:
+    def write(self, write: ParameterWrite, told: Left, now: float) -> None:
         """Send a write now."""
         self.wrote_at, self.free_at = now, now + SPACING
         if write.eeprom:
@@ -248,7 +248,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._eeprom_free_at = max(self._eeprom_free_at, now + gap)
         self._stop_free_at = max(self._stop_free_at, now + min(gap, STOP_EEPROM_WAIT))
 
-    def write_first(self, write: Write, left: Left, now: float) -> None:
+    def write_first(self, write: ParameterWrite, left: Left, now: float) -> None:
         """
         Write something before everything that waits.
 
@@ -259,7 +259,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._first = write, left
         self.wake(now)
 
-    def write_now(self, write: Write, left: Left, now: float) -> None:
+    def write_now(self, write: ParameterWrite, left: Left, now: float) -> None:
         """
         Write what stops a drive: after nothing but other such writes, whatever is under way.
 

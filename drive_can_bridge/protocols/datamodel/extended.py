@@ -68,7 +68,7 @@ class CyclicResponse:
 
 
 @dataclass(frozen=True)
-class Write:
+class WriteTelegram:
     """Write 1 to 4 consecutive parameters, with 11 bits one. The drive never answers."""
 
     number: int
@@ -76,7 +76,7 @@ class Write:
 
 
 @dataclass(frozen=True)
-class ReadRequest:
+class ReadTelegram:
     """Ask for 1 to 4 consecutive parameters."""
 
     number: int
@@ -91,7 +91,7 @@ class ReadResponse:
     words: tuple[int, ...]
 
 
-Telegram = Union[CyclicRequest, CyclicResponse, Write, ReadRequest, ReadResponse]
+Telegram = Union[CyclicRequest, CyclicResponse, WriteTelegram, ReadTelegram, ReadResponse]
 
 
 def station_of(identifier: int) -> int:
@@ -185,10 +185,10 @@ def decode(frame: Frame, *, count: int = SLOTS, strict: bool = False) -> Telegra
     if identifier & W:
         if response:
             raise RemoteProtocolError(frame_sentences.write_acknowledged(frame))
-        return Write(number, unpack_words(data, length, strict=strict))
+        return WriteTelegram(number, unpack_words(data, length, strict=strict))
     if response:
         return ReadResponse(number, unpack_words(data, length, strict=strict))
-    return ReadRequest(number, length)
+    return ReadTelegram(number, length)
 
 
 def check_received(frame: Frame, number: int, count: int) -> None:

@@ -8,13 +8,13 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.protocols.datamodel import extended, standard
-from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
+from drive_can_bridge.protocols.datamodel.extended import ReadTelegram, WriteTelegram
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
 from drive_can_bridge.protocols.datamodel.standard_round import reads
 from drive_can_bridge.protocols.observer import (
     DriveObserver, Emit, Handler, listed_by, raws_of, Telegram, TelegramKind, Verdict)
 from drive_can_bridge.protocols.pairing import (
-    CYCLES_WAITED, CyclicWatch, RequestContent, Requests, WriteGap)
+    CYCLES_WAITED, CyclicWatch, PendingRequests, RequestContent, WriteGap)
 from drive_can_bridge.protocols.polled_exchange import Chunk
 from drive_can_bridge.protocols.telegrams import Direction
 
@@ -38,7 +38,7 @@ class _Traffic:
         self._listed = listed_by(
             drive.profile.parameters.values(), lambda parameter: (
                 None if parameter.number is None else parameter.number + self._offset))
-        self._requests: Requests[Chunk] = Requests(
+        self._requests: PendingRequests[Chunk] = PendingRequests(
             observer, drive.parameter_timeout, self._content, plan=plan,
             setpoints={Chunk((parameter.number or 0) + self._offset) for parameter in setpoints})
         self._gap = WriteGap(drive.options.eeprom_write_gap)
@@ -46,9 +46,9 @@ class _Traffic:
         self._volatile = {(parameter.number or 0) + self._offset
                           for parameter in drive.cyclic_request}
 
-    def take(self, request: ReadRequest | Write, now: float) -> None:
+    def take(self, request: ReadTelegram | WriteTelegram, now: float) -> None:
         """Take a request; nobody answers a write."""
-        if isinstance(request, ReadRequest):
+        if isinstance(request, ReadTelegram):
             chunk = Chunk(request.number, request.count)
             self._requests.ask(chunk, chunk, now)
             return
@@ -145,7 +145,7 @@ class ExtendedObserver(DriveObserver):
         telegram = self.decoded(
             lambda data: extended.decode(Frame(identifier, data, True), strict=self._strict),
             data, now, _RESPONSE if identifier & extended.DIR else _REQUEST, _PARAMETER, 'frame')
-        if isinstance(telegram, (ReadRequest, Write)):
+        if isinstance(telegram, (ReadTelegram, WriteTelegram)):
             self._traffic.take(telegram, now)
         elif isinstance(telegram, extended.ReadResponse):
             self._traffic.answered(Chunk(telegram.number, len(telegram.words)), telegram.words,
@@ -168,8 +168,8 @@ class StandardObserver(DriveObserver):
         self._traffic = _Traffic(self, drive, plan=reads(drive), setpoints=drive.cyclic_request)
         self._last: Chunk | None = None
 
-    def _take_request(self, request: ReadRequest | Write, now: float) -> None:
-        if isinstance(request, ReadRequest):
+    def _take_request(self, request: ReadTelegram | WriteTelegram, now: float) -> None:
+        if isinstance(request, ReadTelegram):
             self._last = Chunk(request.number, request.count)
         self._traffic.take(request, now)
 

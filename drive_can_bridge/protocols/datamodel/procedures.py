@@ -21,7 +21,7 @@ from drive_can_bridge.core.requests import (
 from drive_can_bridge.protocols.access import (
     Found, Item, ParameterAccess, ParameterPlacement, read_back)
 from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, Read, Reply, Step, Words, Write)
+    AcyclicChannel, ParameterRead, ParameterWrite, Reply, Step, Words)
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.options import effective, padded
 from drive_can_bridge.protocols.polled_exchange import Chunk, plan_reads
@@ -59,14 +59,14 @@ class Numbers(ParameterPlacement[Chunk]):
         """
         return plan_reads(spans, SLOTS, known=known)
 
-    def read(self, parameter: Parameter) -> Read:
+    def read(self, parameter: Parameter) -> ParameterRead:
         """Return the step that reads a parameter."""
-        return Read(self.number(parameter))
+        return ParameterRead(self.number(parameter))
 
-    def write(self, parameter: Parameter, raw: int) -> Write:
+    def write(self, parameter: Parameter, raw: int) -> ParameterWrite:
         """Return the step that writes a parameter; one of unknown storage counts as EEPROM."""
-        return Write(self.number(parameter), self.words(parameter, raw),
-                     parameter.storage is not Storage.RAM)
+        return ParameterWrite(self.number(parameter), self.words(parameter, raw),
+                              parameter.storage is not Storage.RAM)
 
 
 NOT_WRITABLE = sentences.never_written(CYCLIC_PARAMETER)
@@ -84,7 +84,7 @@ class Put(NamedTuple):
     sent: bool = True
 
 
-def put(write: Write, *, look: bool, verify: bool = True) -> Generator[Step, Reply, Put]:
+def put(write: ParameterWrite, *, look: bool, verify: bool = True) -> Generator[Step, Reply, Put]:
     """
     Write words and read them back, since nobody acknowledges writes.
 
@@ -93,7 +93,7 @@ def put(write: Write, *, look: bool, verify: bool = True) -> Generator[Step, Rep
     :param look: write nothing where the drive has the words already: EEPROM cells wear.
     :param verify: read them back.
     """
-    read = Read(write.number, len(write.words))
+    read = ParameterRead(write.number, len(write.words))
     if look:
         found = yield read
         if found is None or found == write.words:
@@ -128,7 +128,7 @@ class DataModelAccess(ParameterAccess[Chunk, Step, Reply]):
 
     def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
         # one bad number makes the drive ignore the whole frame
-        words = yield Read(span.address, span.size)
+        words = yield ParameterRead(span.address, span.size)
         return self.retry.unanswered() if words is None else words
 
     def misfit(self, items: Sequence[Item]) -> Sentence:
@@ -155,7 +155,7 @@ class DataModelAccess(ParameterAccess[Chunk, Step, Reply]):
         for number, (parameter, raw) in zip(numbers, items):
             words[number - first] = parameter.word_from_raw(raw)
         readable = all(parameter.readable for parameter, _ in items)
-        write = Write(first, tuple(words), any(
+        write = ParameterWrite(first, tuple(words), any(
             parameter.storage is not Storage.RAM for parameter, _ in items))
         became = yield from put(write, look=look and write.eeprom and readable,
                                 verify=self._verify and readable)
@@ -185,12 +185,12 @@ def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] 
     :param needed: request map of a drive that is being cycled. Any other one ends the look at
         once, because each further cycle would put setpoints into wrong parameters.
     """
-    request = yield Read(request_base, SLOTS, attempts=1, late_will_do=True)
+    request = yield ParameterRead(request_base, SLOTS, attempts=1, late_will_do=True)
     if request is None:
         return None
     if needed is not None and effective(request) != needed:
         return Maps(request, None)
-    response = yield Read(response_base, SLOTS, attempts=1, late_will_do=True)
+    response = yield ParameterRead(response_base, SLOTS, attempts=1, late_will_do=True)
     return Maps(request, response)
 
 
@@ -210,7 +210,7 @@ def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
     sequence += list(enumerate(wanted_response, response_base))
     sequence += [(request_base, wanted_request[0])]
     for number, word in sequence:
-        became = yield from put(Write(number, (word,), eeprom=True), look=True)
+        became = yield from put(ParameterWrite(number, (word,), eeprom=True), look=True)
         if not became.sent:
             return sentences.write_refused(f'map parameter {number}:', sentences.not_sent()), True
         if not became.found:

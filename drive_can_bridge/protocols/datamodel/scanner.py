@@ -74,7 +74,7 @@ class ExtendedScanner(Scanner):
                     telegram.number in (REQUEST_MAP_BASE, RESPONSE_MAP_BASE)):
                 self._take_map(station, telegram.number, telegram.words)
         else:
-            if not isinstance(telegram, extended.Write):    # which nobody answers
+            if not isinstance(telegram, extended.WriteTelegram):    # which nobody answers
                 self.hear_request(frame, now)
             self.master = frame_sentences.requests_to_station(station, self.protocol)
 
@@ -132,7 +132,7 @@ class StandardScanner(Scanner):
             request = standard.decode_request(frame)
         except RemoteProtocolError:
             return
-        if isinstance(request, extended.ReadRequest):
+        if isinstance(request, extended.ReadTelegram):
             self._request(station, frame.data, now)
 
     def hear(self, frame: Frame, now: float) -> None:

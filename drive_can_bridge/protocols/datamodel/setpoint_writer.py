@@ -24,7 +24,7 @@ from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterTransactor, Procedure, Reply, Step, Write)
+    ParameterTransactor, ParameterWrite, Procedure, Reply, Step)
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
@@ -213,8 +213,8 @@ class SetpointWriter:
         runs = raw != self._raws(neutral=True)[index]
         # What is sent cyclically is volatile: EEPROM parameters are refused by the configuration.
         self._transactor.write(
-            Write(self._numbers.number(parameter), self._numbers.words(parameter, raw),
-                  eeprom=False),
+            ParameterWrite(self._numbers.number(parameter), self._numbers.words(parameter, raw),
+                           eeprom=False),
             lambda sent, then: self._left(index, raw, sent, then, runs=runs), now)
         self._output.written(index, raw, now)
 

@@ -39,8 +39,7 @@ from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.errors import LocalProtocolError, RemoteProtocolError
 from drive_can_bridge.core.frame import Frame, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.datamodel.extended import (
-    check_received, check_window, ReadRequest, Write,
-)
+    check_received, check_window, ReadTelegram, WriteTelegram)
 
 REQUEST_ID_BASE = 0x3F0
 RESPONSE_ID_BASE = 0x7F0
@@ -99,7 +98,7 @@ def encode_read_response(response_identifier: int, words: Sequence[int]) -> Fram
 # -- decoding -------------------------------------------------------------------------------------
 
 
-def decode_request(frame: Frame) -> ReadRequest | Write:
+def decode_request(frame: Frame) -> ReadTelegram | WriteTelegram:
     """
     Decode what the master sends (the drive's side).
 
@@ -112,12 +111,12 @@ def decode_request(frame: Frame) -> ReadRequest | Write:
         raise RemoteProtocolError(frame_sentences.length_differs(len(data), PAYLOAD, frame))
     if data[0] == WRITE:
         _, number, word = _WRITE.unpack(data)
-        return Write(number, (word,))
+        return WriteTelegram(number, (word,))
     if data[0] != READ:
         raise RemoteProtocolError(frame_sentences.unknown_function(frame, data[0], READ, WRITE))
     _, number, count = _READ_REQUEST.unpack(data)
     check_received(frame, number, count)
-    return ReadRequest(number, count)
+    return ReadTelegram(number, count)
 
 
 def decode_read_response(frame: Frame, count: int, *, strict: bool = False) -> tuple[int, ...]:

@@ -8,7 +8,8 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.process_image import control_word, status_word
-from drive_can_bridge.protocols.datamodel.channel import ParameterTransactor, Procedure, Read
+from drive_can_bridge.protocols.datamodel.channel import (
+    ParameterRead, ParameterTransactor, Procedure)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.polled_exchange import Chunk, round_time
@@ -76,7 +77,7 @@ class StandardRound:
         """Read all; return the raw integers, or None when one read was not answered."""
         found: dict[int, int] = {}
         for chunk in self._reads:
-            words = yield Read(chunk.address, chunk.size, attempts=1)
+            words = yield ParameterRead(chunk.address, chunk.size, attempts=1)
             if words is None:
                 self.gap = (NOTHING if chunk is self._reads[0] else
                             sentences.one_read_unanswered(self._names(chunk)))

@@ -36,7 +36,7 @@ from drive_can_bridge.core.sentences import client_by_rclpy
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.process.environment import domain_problem
 from drive_can_bridge.ros.client.foreign import foreign
-from drive_can_bridge.ros.rcl.end import End, Names
+from drive_can_bridge.ros.rcl.end import Names, TopicEnd
 
 # What makes messages from their definitions comes with every type support, is used by none, and
 # takes 0.15 s to be imported; its package goes without where it cannot be.
@@ -97,7 +97,7 @@ class ClientNode:
         try:
             # takes no signals, and no log file: a stop has to work where nothing can be written
             self.context.init([], initialize_logging=False)
-            self.end = End(self.context, name, _tell_slow)
+            self.end = TopicEnd(self.context, name, _tell_slow)
         except Exception as error:  # rcl fails in several types
             reason = str(error).partition(', at ')[0]
             raise DriveCanError(sentences.ros_does_not_start(why=reason)) from error
@@ -129,7 +129,7 @@ class ClientNode:
 class HasEnd(Protocol):
     """A client node, or another one that has its part in the graph."""
 
-    end: End
+    end: TopicEnd
 
 
 def _tell_slow(reason: str) -> None:
@@ -455,7 +455,7 @@ def undemanding_quality() -> QoSProfile:
     return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-class Outbox:
+class NewestPublisher:
     """A publisher of the newest message only."""
 
     def __init__(self, node: HasEnd, message_type: Any, topic: str) -> None:

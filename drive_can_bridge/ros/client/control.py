@@ -95,7 +95,7 @@ class _Stopping:
             self._inbox.close()
 
 
-class Stop:
+class StopRequests:
     """
     A stop of drives, begun for each one as soon as it is seen.
 

@@ -13,7 +13,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.sentences import other_middleware
-from drive_can_bridge.ros.rcl.end import End
+from drive_can_bridge.ros.rcl.end import TopicEnd
 from drive_can_bridge.ros.recognition import namespace_of
 
 VENDORS = {b'\x01\x0f': 'Fast DDS', b'\x01\x10': 'Cyclone DDS'}
@@ -24,7 +24,7 @@ _BRIDGE = 'drive_can_bridge'
 
 
 class _Node(Protocol):
-    end: End
+    end: TopicEnd
 
 
 def ours() -> str:

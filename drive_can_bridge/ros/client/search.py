@@ -32,7 +32,7 @@ from drive_can_bridge.process.presence import bridges, short
 from drive_can_bridge.ros.client.calls import ClientNode, Inbox, NodeCalls
 from drive_can_bridge.ros.client.foreign import foreign, why_not
 from drive_can_bridge.ros.client.signs import Signs
-from drive_can_bridge.ros.rcl.end import End
+from drive_can_bridge.ros.rcl.end import TopicEnd
 from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, namespace_of
 
 #: s between two looks at what has arrived
@@ -189,7 +189,7 @@ class FoundBridge:
 class Seeing(Protocol):
     """A node that can say what it sees in the graph."""
 
-    end: End
+    end: TopicEnd
 
     def services(self) -> Entries:
         """Return all services that have been discovered, with their types."""

@@ -23,7 +23,7 @@ from std_srvs.srv import SetBool
 from drive_can_bridge.configuration.load import configuration_from_file
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
-from drive_can_bridge.monitor.snapshot import read_status, Report
+from drive_can_bridge.monitor.snapshot import read_status, StatusReport
 from drive_can_bridge.process.beginning import let_signals_in
 from drive_can_bridge.ros.monitor.client import statuses
 from drive_can_bridge.ros.rcl.extension import GONE
@@ -63,7 +63,7 @@ class _DriveCommander:
         self._ready = False
         self._begun_at: float | None = None
 
-    def reported(self, report: Report, now: float) -> None:
+    def reported(self, report: StatusReport, now: float) -> None:
         """Take what the bridge says of the drive."""
         control = report.facts.get('control_state')
         there = report.state not in ('offline', 'mapping differs', 'fault')

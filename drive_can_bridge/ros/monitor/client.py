@@ -5,8 +5,8 @@ A hidden node that attaches to whatever bridges there are, and fills the model.
 It subscribes and asks, and that is all: no topic, no service, no parameter of its own. Everything
 happens in :meth:`MonitorClient.poll`, in the thread that calls it.
 
-:class:`Operations` is what a person may ask of a drive through it: reads, writes, stops. Nothing
-here can move one.
+:class:`ServiceOperations` is what a person may ask of a drive through it: reads, writes, stops.
+Nothing here can move one.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -26,7 +26,7 @@ from drive_can_bridge.core.sentences import (
     may_still_be_running, no_answer_to_stop, nobody_answered, nobody_takes, write_not_confirmed)
 from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.model import Model
-from drive_can_bridge.monitor.snapshot import Outcome, Place, Status, Stop
+from drive_can_bridge.monitor.snapshot import OperationOutcome, Place, Status, StopAction
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
     ClientNode, HasEnd, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
@@ -47,13 +47,13 @@ PARAMETER_TIMEOUT = 15.0
 
 #: service and request of each, s that the answer may take (it comes when the drive's status says
 #: so) and after how many it is asked again; ``enable`` is asked for its false only
-_STOPS: dict[Stop, tuple[str, Any, Callable[[], Any], float, float]] = {
-    Stop.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request, STOP_TIMEOUT, STOP_AGAIN),
-    Stop.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False), CONTROL_TIMEOUT,
-                   math.inf),
+_STOPS: dict[StopAction, tuple[str, Any, Callable[[], Any], float, float]] = {
+    StopAction.QUICK_STOP: ('quick_stop', Trigger, Trigger.Request, STOP_TIMEOUT, STOP_AGAIN),
+    StopAction.DISABLE: ('enable', SetBool, lambda: SetBool.Request(data=False), CONTROL_TIMEOUT,
+                         math.inf),
 }
-_UNASKED = Outcome(False, nobody_answered())
-_UNCONFIRMED = Outcome(False, together([write_not_confirmed(), nobody_answered()]))
+_UNASKED = OperationOutcome(False, nobody_answered())
+_UNCONFIRMED = OperationOutcome(False, together([write_not_confirmed(), nobody_answered()]))
 
 
 def stamp_of(message: Any) -> float:
@@ -331,7 +331,7 @@ def _number(value: Any) -> float:
     return math.nan if found is None else float(found)
 
 
-class Operations:
+class ServiceOperations:
     """
     Services of drives, for those who see them through a monitor's node.
 
@@ -340,10 +340,10 @@ class Operations:
 
     def __init__(self, node: HasEnd) -> None:
         self._node = node
-        self._stops: dict[tuple[str, Stop], Service] = {}
+        self._stops: dict[tuple[str, StopAction], Service] = {}
         self._calls = NodeCalls(node, PARAMETER_TIMEOUT)
 
-    def poll(self, stops: Mapping[str, Collection[Stop]], now: float) -> bool:
+    def poll(self, stops: Mapping[str, Collection[StopAction]], now: float) -> bool:
         """Take the answers that have arrived; return whether somebody still waits for one."""
         wanted = [(drive, stop) for drive, each in stops.items() for stop in each]
         for gone in self._stops.keys() - set(wanted):
@@ -357,44 +357,45 @@ class Operations:
         self._calls.look(now)
         return self._calls.busy or any(service.busy for service in self._stops.values())
 
-    def _keep_at_hand(self, drive: str, stop: Stop) -> Service:
+    def _keep_at_hand(self, drive: str, stop: StopAction) -> Service:
         name, kind, _, patience, again = _STOPS[stop]
         made = Service(self._node, kind, f'{drive}/{name}', patience, again)
         self._stops[drive, stop] = made
         return made
 
-    def stop(self, drive: str, stop: Stop, done: Callable[[Outcome], None], now: float) -> None:
+    def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],
+             now: float) -> None:
         """Stop a drive, one that no poll has told of yet too."""
         name, _, request, patience, _ = _STOPS[stop]
         service = self._stops.get((drive, stop)) or self._keep_at_hand(drive, stop)
 
         def take(response: Any) -> None:
             if response is not None:
-                done(Outcome(response.success, printable(response.message)))
+                done(OperationOutcome(response.success, printable(response.message)))
             else:
-                done(Outcome(False, may_still_be_running(
+                done(OperationOutcome(False, may_still_be_running(
                     no_answer_to_stop(patience) if service.ready else nobody_takes(name))))
         service.send(request(), take, now, unasked=lambda: self._unasked(drive, take, done))
 
     def _unasked(self, drive: str, take: Callable[[Any], None],
-                 done: Callable[[Outcome], None]) -> None:
+                 done: Callable[[OperationOutcome], None]) -> None:
         reason = why_not(self._node, drive)
         if reason is None:
             take(None)
         else:
-            done(Outcome(False, may_still_be_running(reason)))
+            done(OperationOutcome(False, may_still_be_running(reason)))
 
-    def write(self, drive: str, name: str, value: Value, done: Callable[[Outcome], None],
+    def write(self, drive: str, name: str, value: Value, done: Callable[[OperationOutcome], None],
               now: float) -> None:
         """Write a parameter of a drive."""
         def take(response: SetParameters.Response | None) -> None:
             results = [] if response is None else response.results
-            done(Outcome(results[0].successful, printable(results[0].reason)) if results
+            done(OperationOutcome(results[0].successful, printable(results[0].reason)) if results
                  else _UNCONFIRMED)
         self._ask(drive, 'set_parameters',
                   SetParameters.Request(parameters=[parameter_message(name, value)]), take, now,
                   lambda: done(_UNASKED if (reason := why_not(self._node, drive)) is None
-                               else Outcome(False, reason)))
+                               else OperationOutcome(False, reason)))
 
     def read(self, drive: str, names: Sequence[str],
              done: Callable[[Sequence[Value | None]], None], now: float) -> None:

@@ -46,7 +46,7 @@ class Asking(Protocol):
         """Wait for no answer any more."""
 
 
-class Reading(Protocol):
+class ReadingEnd(Protocol):
     """A subscription."""
 
     def take(self) -> Any:
@@ -155,7 +155,7 @@ class _PrivateEnd:
     def asking(self, kind: Any, name: str) -> Asking:
         return _Asking(self._node, kind, name)
 
-    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> Reading:
+    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> ReadingEnd:
         return _Reading(self._node, kind, topic, quality)
 
     def writing(self, kind: Any, topic: str, quality: QoSProfile) -> Writing:
@@ -176,7 +176,7 @@ def _node(context: Context, name: str) -> Any:
                                   QoSProfile(depth=1).get_c_qos_profile())
 
 
-class End:
+class TopicEnd:
     """
     One end.
 
@@ -243,9 +243,9 @@ class End:
         made: Asking = self._do('asking', kind, name)
         return made
 
-    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> Reading:
+    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> ReadingEnd:
         """Return a subscription."""
-        made: Reading = self._do('reading', kind, topic, quality)
+        made: ReadingEnd = self._do('reading', kind, topic, quality)
         return made
 
     def writing(self, kind: Any, topic: str, quality: QoSProfile) -> Writing:

@@ -28,7 +28,7 @@ _SEQUENCE_SIZE = 3 * _WORD
 _SEQUENCE = re.compile(r'sequence<(.+?)(?:, \d+)?>')
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """
     The strings and sequences of a message, its parts' among them.
 
@@ -40,17 +40,17 @@ class Layout(NamedTuple):
     size: int
     alignment: int
     lists: struct.Struct
-    entries: tuple[tuple[int, 'Layout | None'], ...]
+    entries: tuple[tuple[int, 'MessageLayout | None'], ...]
 
 
 @cache
-def layout_of(kind: Any) -> Layout:
+def layout_of(kind: Any) -> MessageLayout:
     """
     Return the layout of a type of messages.
 
     :raises Unfit: it has something that nobody of ours has.
     """
-    parts: list[tuple[int, Layout | None]] = []
+    parts: list[tuple[int, MessageLayout | None]] = []
     end, alignment = 0, 1
     for text in kind.get_fields_and_field_types().values():
         size, needs, inside = _field(text)
@@ -60,15 +60,16 @@ def layout_of(kind: Any) -> Layout:
     return _layout(end + -end % alignment, alignment, parts)
 
 
-def _layout(size: int, alignment: int, parts: list[tuple[int, Layout | None]]) -> Layout:
+def _layout(size: int, alignment: int,
+            parts: list[tuple[int, MessageLayout | None]]) -> MessageLayout:
     code, at = '=', 0
     for offset, _ in parts:
         code += f'{offset - at}x2{_WORD_CODE}'
         at = offset + 2 * _WORD
-    return Layout(size, alignment, struct.Struct(f'{code}{size - at}x'), tuple(parts))
+    return MessageLayout(size, alignment, struct.Struct(f'{code}{size - at}x'), tuple(parts))
 
 
-def _field(text: str) -> tuple[int, int, list[tuple[int, Layout | None]]]:
+def _field(text: str) -> tuple[int, int, list[tuple[int, MessageLayout | None]]]:
     """Return size, alignment, and the strings and sequences of a field."""
     if text in _FLAT:
         size = struct.calcsize(_FLAT[text])
@@ -86,7 +87,7 @@ def _field(text: str) -> tuple[int, int, list[tuple[int, Layout | None]]]:
     return found.size, found.alignment, list(found.entries)
 
 
-def cut(address: int, layout: Layout) -> int:
+def cut(address: int, layout: MessageLayout) -> int:
     """
     Cut what is too long in a message.
 
@@ -95,7 +96,7 @@ def cut(address: int, layout: Layout) -> int:
     return _cut(address, 1, layout)
 
 
-def _cut(address: int, count: int, layout: Layout) -> int:
+def _cut(address: int, count: int, layout: MessageLayout) -> int:
     longest = 0
     if not layout.entries:
         return 0

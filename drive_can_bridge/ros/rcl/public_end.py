@@ -25,7 +25,7 @@ _TURNS_MAX = 200
 
 
 class PublicEnd:
-    """See :class:`.end.End`."""
+    """See :class:`.end.TopicEnd`."""
 
     def __init__(self, context: Context, name: str) -> None:
         self._node = Node(
@@ -69,18 +69,18 @@ class PublicEnd:
         return [bytes(found.endpoint_gid)
                 for found in self._node.get_subscriptions_info_by_topic(topic, no_mangle=True)]
 
-    def asking(self, kind: Any, name: str) -> '_Asking':
+    def asking(self, kind: Any, name: str) -> '_PublicAsking':
         """Return a client."""
-        return _Asking(self, self._node, self._node.create_client(
+        return _PublicAsking(self, self._node, self._node.create_client(
             kind, name, qos_profile=qos_profile_parameters))
 
-    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> '_Reading':
+    def reading(self, kind: Any, topic: str, quality: QoSProfile) -> '_PublicReading':
         """Return a subscription."""
-        return _Reading(self, self._node, kind, topic, quality)
+        return _PublicReading(self, self._node, kind, topic, quality)
 
-    def writing(self, kind: Any, topic: str, quality: QoSProfile) -> '_Writing':
+    def writing(self, kind: Any, topic: str, quality: QoSProfile) -> '_PublicWriting':
         """Return a publisher."""
-        return _Writing(self._node, self._node.create_publisher(kind, topic, quality))
+        return _PublicWriting(self._node, self._node.create_publisher(kind, topic, quality))
 
     def close(self) -> None:
         """Take the node out of the graph."""
@@ -88,7 +88,7 @@ class PublicEnd:
         self._node.destroy_node()
 
 
-class _Asking:
+class _PublicAsking:
     def __init__(self, end: PublicEnd, node: Node, client: Client) -> None:
         self._end, self._node, self._client = end, node, client
         self._number = 0
@@ -117,7 +117,7 @@ class _Asking:
         self._node.destroy_client(self._client)
 
 
-class _Reading:
+class _PublicReading:
     def __init__(self, end: PublicEnd, node: Node, kind: Any, topic: str,
                  quality: QoSProfile) -> None:
         self._end, self._node = end, node
@@ -138,7 +138,7 @@ class _Reading:
         self._node.destroy_subscription(self._subscription)
 
 
-class _Writing:
+class _PublicWriting:
     def __init__(self, node: Node, publisher: Publisher) -> None:
         self._node, self._publisher = node, publisher
 

@@ -30,7 +30,7 @@ from rclpy.service import Service
 
 from drive_can_bridge.ros.rcl import escaped
 from drive_can_bridge.ros.rcl.extension import extension, RCLError
-from drive_can_bridge.ros.rcl.layout import cut, ENTRIES_MAX, Layout, layout_of
+from drive_can_bridge.ros.rcl.layout import cut, ENTRIES_MAX, layout_of, MessageLayout
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
 #: rcl/types.h
@@ -120,7 +120,7 @@ class Header:
             raise Unfit('headers of requests are laid out differently')
 
 
-class Response(NamedTuple):
+class ReadyResponse(NamedTuple):
     """An answer that is ready to be sent."""
 
     service: Service
@@ -199,7 +199,7 @@ class RclServices:
             finally:
                 functions.destroy(raw)
 
-    def prepare(self, service: Service, message: Any, header: Any) -> Response:
+    def prepare(self, service: Service, message: Any, header: Any) -> ReadyResponse:
         """
         Make an answer ready.
 
@@ -207,10 +207,10 @@ class RclServices:
         """
         if not isinstance(header, Header):
             raise Unfit(f'a header of type {type(header).__name__}')
-        return Response(service, message, header, self._functions_of(type(message)),
-                        header.caller)
+        return ReadyResponse(service, message, header, self._functions_of(type(message)),
+                             header.caller)
 
-    def send(self, response: Response) -> None:
+    def send(self, response: ReadyResponse) -> None:
         """
         Send an answer. Other threads run meanwhile; the service may be destroyed by them.
 
@@ -297,7 +297,7 @@ def _in_c(message: Any, functions: _Functions) -> int:
     return raw
 
 
-def _read(raw: int, layout: Layout, functions: _Functions) -> Any:
+def _read(raw: int, layout: MessageLayout, functions: _Functions) -> Any:
     """Return a request in Python, but for what is too long in it."""
     count = cut(raw, layout)
     request = functions.to_python(raw)

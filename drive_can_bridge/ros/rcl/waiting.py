@@ -91,7 +91,7 @@ class Waiting:
             yield wait
 
 
-class WakeEvent(Protocol):
+class Wakeable(Protocol):
     """What a thread waits for that nobody else wakes."""
 
     def wait(self) -> object:
@@ -104,7 +104,7 @@ class WakeEvent(Protocol):
 class Sleeping:
     """In place of :class:`Waiting`, where somebody else takes the requests."""
 
-    def __init__(self, wake_event: WakeEvent) -> None:
+    def __init__(self, wake_event: Wakeable) -> None:
         self._wake_event = wake_event
         self.wake = wake_event.ring
 

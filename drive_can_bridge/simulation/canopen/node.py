@@ -13,9 +13,10 @@ from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.sdo import REQUEST_BASE, RESPONSE_BASE
-from drive_can_bridge.simulation.canopen.sdo import Absent, checked_length, Objects, SdoServer
+from drive_can_bridge.simulation.canopen.sdo import (
+    Absent, checked_length, SdoServer, ServedObjects)
 from drive_can_bridge.simulation.drive import Companion, IgnoredFrame, SimulatedDrive
-from drive_can_bridge.simulation.registers import Refused
+from drive_can_bridge.simulation.registers import AccessRefused
 
 #: objects by index and sub-index
 Contents = dict[tuple[int, int], bytes]
@@ -59,7 +60,7 @@ class CanopenNode(Companion):
     :ivar absent: objects that it does not have, although it could.
     """
 
-    def __init__(self, drive: SimulatedDrive, objects: Objects, *,
+    def __init__(self, drive: SimulatedDrive, objects: ServedObjects, *,
                  constants: Callable[[], Contents], trip_code: int, heartbeat: int | None = None,
                  make_emergency: Callable[[int], Emergency] = _maker_emergency,
                  segmented_writes: bool = False) -> None:
@@ -202,7 +203,7 @@ class CanopenNode(Companion):
             self._heartbeat = int.from_bytes(checked_length(data, 2), 'little')
             self._plan_heartbeat(self._now)
         elif self._content(index, subindex) is not None:
-            raise Refused(sdo.WRITE_OF_READ_ONLY)
+            raise AccessRefused(sdo.WRITE_OF_READ_ONLY)
         else:
             self._objects.write_object(index, subindex, data)
 
@@ -210,7 +211,7 @@ class CanopenNode(Companion):
         """
         Return an object that is no register; None: its index has registers.
 
-        :raises Refused: its index has none, and no such sub-index.
+        :raises AccessRefused: its index has none, and no such sub-index.
         """
         objects = {
             # what every node has: device type, errors, identifiers, heartbeat, identity
@@ -223,5 +224,5 @@ class CanopenNode(Companion):
             **self._constants(),
         }
         if (index, subindex) not in objects and any(place[0] == index for place in objects):
-            raise Refused(sdo.NO_SUCH_SUBINDEX)
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX)
         return objects.get((index, subindex))

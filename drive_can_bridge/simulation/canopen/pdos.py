@@ -19,7 +19,7 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.simulation.canopen.sdo import (
     Absent, bytes_of, checked_length, ObjectDictionary)
-from drive_can_bridge.simulation.registers import Refused
+from drive_can_bridge.simulation.registers import AccessRefused
 
 COUNT, ENTRIES_MAX, BITS_MAX = 4, 8, 64
 INVALID, NO_REMOTE, EXTENDED = 1 << 31, 1 << 30, 1 << 29
@@ -60,7 +60,7 @@ class PdoHabits:
 
 
 @dataclass
-class Pdo:
+class SimulatedPdo:
     """
     One PDO.
 
@@ -108,7 +108,7 @@ class Pdos:
         self.habits = PdoHabits()
         self.absent = Absent()
         self._node, self._mapped, self._kind = node, (receive, transmit), kind
-        self._stored: tuple[list[Pdo], list[Pdo]] | None = None
+        self._stored: tuple[list[SimulatedPdo], list[SimulatedPdo]] | None = None
         self.begin()
 
     def store(self) -> None:
@@ -122,8 +122,9 @@ class Pdos:
         if self._stored is not None:
             self.receive, self.transmit = deepcopy(self._stored)
             return
-        self.receive = [Pdo(False, 0x200 + 0x100 * n + self._node) for n in range(COUNT)]
-        self.transmit = [Pdo(True, 0x40000180 + 0x100 * n + self._node) for n in range(COUNT)]
+        self.receive = [SimulatedPdo(False, 0x200 + 0x100 * n + self._node) for n in range(COUNT)]
+        self.transmit = [SimulatedPdo(True,
+                                      0x40000180 + 0x100 * n + self._node) for n in range(COUNT)]
         for pdos, made in zip((self.receive, self.transmit), self._mapped, strict=True):
             for number, entries in made.items():
                 pdo = pdos[number - 1]
@@ -132,7 +133,7 @@ class Pdos:
 
     # -- objects ----------------------------------------------------------------------------------
 
-    def find(self, index: int) -> tuple[Pdo, bool] | None:
+    def find(self, index: int) -> tuple[SimulatedPdo, bool] | None:
         """Return the PDO that an object is of, and whether it is its mapping; None: of none."""
         for base, pdos in ((0x1400, self.receive), (0x1800, self.transmit)):
             for mapping in (False, True):
@@ -141,23 +142,23 @@ class Pdos:
                     return pdos[number], mapping
         return None
 
-    def read(self, pdo: Pdo, mapping: bool, subindex: int) -> bytes:
+    def read(self, pdo: SimulatedPdo, mapping: bool, subindex: int) -> bytes:
         if mapping:
             if subindex == 0:
                 return bytes((pdo.count,))
             if subindex <= ENTRIES_MAX:
                 return pdo.entries[subindex - 1].to_bytes(4, 'little')
-            raise Refused(sdo.NO_SUCH_SUBINDEX)
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX)
         contents = {0: 5 if pdo.transmit else 2, 1: pdo.cob_id, 2: pdo.type}
         if pdo.transmit:
             contents |= {3: pdo.inhibit, 5: pdo.event}
         if subindex not in contents:
-            raise Refused(sdo.NO_SUCH_SUBINDEX)
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX)
         return contents[subindex].to_bytes(_WIDTHS.get(subindex, 1), 'little')
 
-    def write(self, pdo: Pdo, mapping: bool, subindex: int, data: bytes, *,
+    def write(self, pdo: SimulatedPdo, mapping: bool, subindex: int, data: bytes, *,
               operational: bool = False) -> None:
-        """Write one of its objects. :raises Refused: against the rules."""
+        """Write one of its objects. :raises AccessRefused: against the rules."""
         self.read(pdo, mapping, subindex)      # it exists
         checks = self.habits.mapping
         checked = checks is Checks.CHECKED or checks is Checks.OPERATIONAL and operational
@@ -165,31 +166,31 @@ class Pdos:
             self._map(pdo, subindex, data, checked=checked)
             return
         if subindex == 0:
-            raise Refused(sdo.WRITE_OF_READ_ONLY)
+            raise AccessRefused(sdo.WRITE_OF_READ_ONLY)
         value = int.from_bytes(checked_length(data, _WIDTHS[subindex]), 'little')
         valid = not pdo.cob_id & INVALID
         if subindex == 1:
             if (value & EXTENDED or self.habits.no_remote and pdo.transmit
                     and not value & NO_REMOTE or checked and valid and not value & INVALID
                     and value != pdo.cob_id):
-                raise Refused(sdo.VALUE_OUT_OF_RANGE)
+                raise AccessRefused(sdo.VALUE_OUT_OF_RANGE)
             pdo.cob_id = value
             pdo.pending = pdo.sent = None
         elif subindex == 2:
             if value not in self.habits.types:
-                raise Refused(sdo.VALUE_OUT_OF_RANGE)
+                raise AccessRefused(sdo.VALUE_OUT_OF_RANGE)
             pdo.type = value
         elif subindex == 3:
             if valid and checked:
-                raise Refused(sdo.DEVICE_STATE)
+                raise AccessRefused(sdo.DEVICE_STATE)
             pdo.inhibit = value
         else:
             pdo.event = value
 
-    def _map(self, pdo: Pdo, subindex: int, data: bytes, *, checked: bool) -> None:
+    def _map(self, pdo: SimulatedPdo, subindex: int, data: bytes, *, checked: bool) -> None:
         if self.habits.fixed_mapping or checked and (
                 not pdo.cob_id & INVALID or subindex and pdo.count):
-            raise Refused(ACCESS)
+            raise AccessRefused(ACCESS)
         if subindex:
             entry = int.from_bytes(checked_length(data, 4), 'little')
             if entry and checked:
@@ -201,15 +202,15 @@ class Pdos:
             pdo.count = min(count, ENTRIES_MAX)
             return
         if count > ENTRIES_MAX:
-            raise Refused(TOO_LONG)
+            raise AccessRefused(TOO_LONG)
         for entry in pdo.entries[:count]:
             self._mappable(pdo, entry)
         if sum(entry & 0xFF for entry in pdo.entries[:count]) > BITS_MAX:
-            raise Refused(TOO_LONG)
+            raise AccessRefused(TOO_LONG)
         pdo.count = count
 
-    def _mappable(self, pdo: Pdo, entry: int) -> None:
-        """Check an entry. :raises Refused: no such object, or it does not travel like this."""
+    def _mappable(self, pdo: SimulatedPdo, entry: int) -> None:
+        """Check an entry. :raises AccessRefused: no such object, or it does not travel so."""
         place, bits = (entry >> 16, entry >> 8 & 0xFF), entry & 0xFF
         self.absent.check(*place)
         cell = self._objects.cells.get(place)
@@ -217,11 +218,11 @@ class Pdos:
             self._objects.find(*place)      # says what is missing
         if (cell is None or place[0] < _MAPPABLE_FROM or bits % 8 or bits > 8 * bytes_of(cell)
                 or not (cell.readable if pdo.transmit else cell.writable)):
-            raise Refused(NOT_MAPPABLE)
+            raise AccessRefused(NOT_MAPPABLE)
 
     # -- traffic ----------------------------------------------------------------------------------
 
-    def cells(self, pdo: Pdo, data: bytes) -> list[tuple[Parameter, int]]:
+    def cells(self, pdo: SimulatedPdo, data: bytes) -> list[tuple[Parameter, int]]:
         """Return what an RPDO says: parameters and raw integers."""
         found, at = [], 0
         for entry in pdo.mapped:
@@ -237,13 +238,13 @@ class Pdos:
         place = entry >> 16, entry >> 8 & 0xFF
         return None if place in self.absent else self._objects.cells.get(place)
 
-    def frame(self, pdo: Pdo, now: float) -> Frame:
+    def frame(self, pdo: SimulatedPdo, now: float) -> Frame:
         """Make a TPDO of what its objects hold now."""
         pdo.sent = self.content(pdo)
         pdo.sent_at = now
         return Frame(pdo.cob_id & 0x7FF, pdo.sent, False)
 
-    def content(self, pdo: Pdo) -> bytes:
+    def content(self, pdo: SimulatedPdo) -> bytes:
         content = b''
         for entry in pdo.mapped:
             length, cell = (entry & 0xFF) // 8, self._cell(entry)
@@ -251,13 +252,13 @@ class Pdos:
             content += told[:length].ljust(length, b'\0')
         return content[:BITS_MAX // 8]
 
-    def synchronised(self, pdo: Pdo) -> bool:
+    def synchronised(self, pdo: SimulatedPdo) -> bool:
         """Tell whether this TPDO leaves with a SYNC: with each, or with content that is new."""
         if pdo.identifier is None or pdo.type > 240:
             return False
         return bool(pdo.type) or self.content(pdo) != pdo.sent
 
-    def due(self, pdo: Pdo) -> float:
+    def due(self, pdo: SimulatedPdo) -> float:
         """Return when a TPDO leaves by itself."""
         if pdo.identifier is None or pdo.type < 254:
             return math.inf

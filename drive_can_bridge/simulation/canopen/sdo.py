@@ -12,7 +12,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.simulation.registers import Refusal, Refused, Registers
+from drive_can_bridge.simulation.registers import AccessRefused, Registers, WriteRefusal
 
 TOO_HIGH, TOO_LOW = 0x06090031, 0x06090032
 
@@ -23,9 +23,9 @@ WRITE_MAX = 1024
 TYPE_TOO_LONG, TYPE_TOO_SHORT = 0x06070012, 0x06070013
 #: abort codes of what registers refuse
 CODES = {
-    Refusal.READ_ONLY: sdo.WRITE_OF_READ_ONLY,
-    Refusal.OUT_OF_RANGE: sdo.VALUE_OUT_OF_RANGE,
-    Refusal.FORBIDDEN: sdo.DEVICE_STATE,
+    WriteRefusal.READ_ONLY: sdo.WRITE_OF_READ_ONLY,
+    WriteRefusal.OUT_OF_RANGE: sdo.VALUE_OUT_OF_RANGE,
+    WriteRefusal.FORBIDDEN: sdo.DEVICE_STATE,
 }
 
 
@@ -51,10 +51,10 @@ class Absent:
         """
         See whether an object is there.
 
-        :raises Refused: it was taken away.
+        :raises AccessRefused: it was taken away.
         """
         if (index, subindex) in self:
-            raise Refused(sdo.NO_SUCH_OBJECT)
+            raise AccessRefused(sdo.NO_SUCH_OBJECT)
 
 
 class ObjectDictionary:
@@ -81,7 +81,7 @@ class ObjectDictionary:
             return bytes((self._counts[index],))
         cell = self.find(index, subindex)
         if not cell.readable:
-            raise Refused(sdo.READ_OF_WRITE_ONLY)
+            raise AccessRefused(sdo.READ_OF_WRITE_ONLY)
         return self.content(cell)
 
     def content(self, cell: Parameter) -> bytes:
@@ -91,16 +91,16 @@ class ObjectDictionary:
 
     def write_object(self, index: int, subindex: int, data: bytes) -> None:
         if subindex == 0 and index in self._counts:
-            raise Refused(sdo.WRITE_OF_READ_ONLY)
+            raise AccessRefused(sdo.WRITE_OF_READ_ONLY)
         cell = self.find(index, subindex)
         raw = cell.raw_from_word(int.from_bytes(checked_length(data, bytes_of(cell)), 'little'))
         refusal = self._registers.refusal({cell.name: raw})
-        if refusal is Refusal.OUT_OF_RANGE:
+        if refusal is WriteRefusal.OUT_OF_RANGE:
             low, high = cell.raw_limits
-            raise Refused(TOO_HIGH if raw > high else TOO_LOW if raw < low else
-                          sdo.VALUE_OUT_OF_RANGE)
+            raise AccessRefused(TOO_HIGH if raw > high else TOO_LOW if raw < low else
+                                sdo.VALUE_OUT_OF_RANGE)
         if refusal is not None:
-            raise Refused(CODES[refusal])
+            raise AccessRefused(CODES[refusal])
         self._registers.write(cell.name, raw)
 
     def raw(self, index: int, subindex: int = 0) -> int:
@@ -111,17 +111,17 @@ class ObjectDictionary:
         """
         Return an object.
 
-        :raises Refused: there is none.
+        :raises AccessRefused: there is none.
         """
         cell = self.cells.get((index, subindex))
         if cell is None:
-            raise Refused(sdo.NO_SUCH_SUBINDEX if any(
+            raise AccessRefused(sdo.NO_SUCH_SUBINDEX if any(
                 place[0] == index for place in self.cells) else sdo.NO_SUCH_OBJECT)
         return cell
 
 
-class Objects(Protocol):
-    """An object dictionary. Reading and writing raise :class:`Refused`, with SDO abort codes."""
+class ServedObjects(Protocol):
+    """An object dictionary. Access raises :class:`AccessRefused`, with SDO abort codes."""
 
     def read_object(self, index: int, subindex: int) -> bytes:
         """Return the content of an object."""
@@ -137,7 +137,7 @@ class SdoServer:
     :param segmented_writes: takes them.
     """
 
-    def __init__(self, objects: Objects, *, segmented_writes: bool = False) -> None:
+    def __init__(self, objects: ServedObjects, *, segmented_writes: bool = False) -> None:
         self._objects = objects
         self._segmented_writes = segmented_writes
         self._place = 0, 0
@@ -156,7 +156,7 @@ class SdoServer:
             return None
         try:
             answer = self._serve(request)
-        except Refused as error:
+        except AccessRefused as error:
             self.reset()
             answer = SdoMessage(SdoCommand.ABORT, self._place, number=error.code)
         return None if answer is None else sdo.encode(answer)
@@ -166,14 +166,14 @@ class SdoServer:
             kind, place, data, number, toggle, last = sdo.decode(Direction.REQUEST, request)
         except RemoteProtocolError:
             self._place = int.from_bytes(request[1:3], 'little'), request[3]
-            raise Refused(sdo.UNKNOWN_COMMAND) from None
+            raise AccessRefused(sdo.UNKNOWN_COMMAND) from None
         if place is None:
             under_way = (self._rest if kind is SdoCommand.SEGMENT_WANTED else
                          self._written is not None)
             if not under_way:
-                raise Refused(sdo.UNKNOWN_COMMAND)
+                raise AccessRefused(sdo.UNKNOWN_COMMAND)
             if toggle != self._toggle:
-                raise Refused(sdo.TOGGLE_NOT_ALTERNATED)
+                raise AccessRefused(sdo.TOGGLE_NOT_ALTERNATED)
             self._toggle ^= sdo.TOGGLE
             return self._next_segment(toggle) if kind is SdoCommand.SEGMENT_WANTED else (
                 self._take_segment(data, toggle, last))
@@ -188,16 +188,16 @@ class SdoServer:
         elif self._segmented_writes:
             self._written, self._toggle, self._announced = b'', 0, number
         else:
-            raise Refused(sdo.UNKNOWN_COMMAND)
+            raise AccessRefused(sdo.UNKNOWN_COMMAND)
         return SdoMessage(SdoCommand.DOWNLOADED, place)
 
     def _take_segment(self, data: bytes, toggle: int, last: bool) -> SdoMessage:
         data = self._written = (self._written or b'') + data
         if len(data) > (self._announced or WRITE_MAX):
-            raise Refused(TYPE_TOO_LONG)
+            raise AccessRefused(TYPE_TOO_LONG)
         if last:
             if len(data) < self._announced:
-                raise Refused(TYPE_TOO_SHORT)
+                raise AccessRefused(TYPE_TOO_SHORT)
             self.reset()
             self._objects.write_object(*self._place, data)
         return SdoMessage(SdoCommand.SEGMENT_TAKEN, None, toggle=toggle)
@@ -217,8 +217,8 @@ def checked_length(data: bytes, length: int) -> bytes:
     """
     Return the data if they have the length of their object.
 
-    :raises Refused: too long or too short.
+    :raises AccessRefused: too long or too short.
     """
     if len(data) != length:
-        raise Refused(TYPE_TOO_LONG if len(data) > length else TYPE_TOO_SHORT)
+        raise AccessRefused(TYPE_TOO_LONG if len(data) > length else TYPE_TOO_SHORT)
     return data

@@ -9,7 +9,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.protocols.cannord.states import State
+from drive_can_bridge.protocols.cannord.states import InverterState
 
 PERCENT = 100 / 16384
 
@@ -40,7 +40,7 @@ VALUES = (ACTUAL, CURRENT, INPUTS, VALUE_4, VALUE_5)
 PARAMETERS = (ACCELERATION, ACCELERATION_2, OFFSET, POSITION, COUNTER, FAULT_NUMBER, FLAG)
 
 #: the state that most things end in, by its name
-STANDING = State.READY_TO_SWITCH_ON.value
+STANDING = InverterState.READY_TO_SWITCH_ON.value
 READY_FRAME = '002#7E040000'
 #: ready to switch on, standing still
 READY = '003#310B0000'

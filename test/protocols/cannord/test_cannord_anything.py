@@ -75,8 +75,8 @@ def test_any_bytes(data: bytes, value_order: str, index_byte: str, swap: bool) -
 @given(WORDS)
 def test_any_status_word(word: int) -> None:
     state = states.state_of(word)
-    if state in (states.State.FAULT, states.State.FAULT_REACTION):
+    if state in (states.InverterState.FAULT, states.InverterState.FAULT_REACTION):
         assert states.is_faulted(word)
-    elif state is not states.State.UNKNOWN:
+    elif state is not states.InverterState.UNKNOWN:
         assert not states.is_faulted(word)
-    assert (state is states.State.OPERATION_ENABLED) == (word & 0x7F == 0x37)
+    assert (state is states.InverterState.OPERATION_ENABLED) == (word & 0x7F == 0x37)

@@ -17,8 +17,7 @@ from drive_can_bridge.core.parameters import Parameter, ParameterType
 from drive_can_bridge.protocols.cannord import identifiers, process_data, states
 from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
-    ERRORS, ParameterLayout, Response, Task,
-)
+    ERRORS, ParameterLayout, ResponseId, Task)
 
 FILE = json.loads((Path(__file__).parents[2] / 'vectors' / 'cannord.json').read_text(
     encoding='utf-8'))
@@ -96,7 +95,7 @@ def test_every_task_and_answer_has_a_vector() -> None:
     found = {kind: {row['code'] for row in FILE['parameter']
                     if row['kind'] == kind and row['expect'] == 'ok'}
              for kind in ('task', 'answer')}
-    assert found == {'task': set(map(int, Task)), 'answer': set(map(int, Response))}
+    assert found == {'task': set(map(int, Task)), 'answer': set(map(int, ResponseId))}
 
 
 def test_errors_have_words() -> None:
@@ -115,7 +114,7 @@ def test_states(row: dict[str, str]) -> None:
 
 @pytest.mark.parametrize('text', FILE['status_words_of_no_state'])
 def test_words_of_no_state(text: str) -> None:
-    assert states.state_of(int(text, 16)) is states.State.UNKNOWN
+    assert states.state_of(int(text, 16)) is states.InverterState.UNKNOWN
 
 
 def test_control_words() -> None:

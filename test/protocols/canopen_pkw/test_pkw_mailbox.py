@@ -7,12 +7,12 @@ from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxTransactor, Read, Refused, Reply, Silence, Write)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Layout
+    Answered, MailboxTransactor, Refused, RegisterRead, RegisterWrite, Reply, Silence)
+from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout
 
 REGISTER = Address(455)
 OBJECT = Address(0x2004, 0x06)
-READ = Read(REGISTER)
+READ = RegisterRead(REGISTER)
 IDLE = '0000000000000000'
 
 
@@ -26,18 +26,18 @@ class Box:
         self.left: Left = lambda sent, now: None
 
     def send(self, message: pkw.PkwMessage, left: Left) -> None:
-        self.sent.append(pkw.encode(message, Layout.WORD_LE).hex().upper())
+        self.sent.append(pkw.encode(message, PkwLayout.WORD_LE).hex().upper())
         self.left = left
 
     def take(self) -> list[str]:
         sent, self.sent = self.sent, []
         return sent
 
-    def begin(self, step: Read | Write, now: float) -> list[str]:
+    def begin(self, step: RegisterRead | RegisterWrite, now: float) -> list[str]:
         self.box.begin(step, now)
         return self.take()
 
-    def asks(self, step: Read | Write, now: float) -> list[str]:
+    def asks(self, step: RegisterRead | RegisterWrite, now: float) -> list[str]:
         """Begin something; function 00h is answered at once."""
         sent = self.begin(step, now)
         if sent == [IDLE]:
@@ -46,7 +46,7 @@ class Box:
         return sent
 
     def hears(self, text: str, now: float) -> Reply | bool:
-        return self.box.receive(pkw.decode(bytes.fromhex(text), Layout.WORD_LE), now)
+        return self.box.receive(pkw.decode(bytes.fromhex(text), PkwLayout.WORD_LE), now)
 
 
 @pytest.fixture(name='box')
@@ -99,10 +99,10 @@ def test_responses_that_do_not_fit(box: Box, wrong: str) -> None:
     '0420074E11000906', '0420FF4E11000906',
 ])
 def test_sub_index_has_to_fit(box: Box, wrong: str) -> None:
-    assert box.begin(Read(OBJECT), 1.0) == ['0420063500000000']
+    assert box.begin(RegisterRead(OBJECT), 1.0) == ['0420063500000000']
     assert box.hears(wrong, 1.1) is False
     assert box.hears('0420063583200000', 1.2) == Answered((0x2083, 0))
-    assert box.begin(Read(OBJECT), 2.0) == ['042006B500000000']
+    assert box.begin(RegisterRead(OBJECT), 2.0) == ['042006B500000000']
     assert box.hears('042006CE11000906', 2.1) == Refused(0x06090011)
 
 
@@ -121,7 +121,7 @@ def test_low_byte_of_a_register_response_does_not_matter(box: Box) -> None:
 ])
 def test_refusals(data: str, order: str, code: int) -> None:
     box = Box(order=order)
-    box.begin(Write(REGISTER, (0x1234,)), 0.0)
+    box.begin(RegisterWrite(REGISTER, (0x1234,)), 0.0)
     box.hears(IDLE, 0.01)
     assert box.take()[-1] == 'C70100AA34120000'
     assert box.hears(f'C70100CE{data}', 0.02) == Refused(code)
@@ -173,7 +173,7 @@ def test_two_silences_in_a_row_invert_the_toggle() -> None:
 
 def test_write_is_not_sent_when_nobody_knows_the_function_byte() -> None:
     box = Box()
-    assert box.begin(Write(REGISTER, (1,)), 0.0) == [IDLE]
+    assert box.begin(RegisterWrite(REGISTER, (1,)), 0.0) == [IDLE]
     assert box.box.handle_timer(0.1) == Silence(sent=False)
     assert box.take() == []
     assert not box.box.busy
@@ -181,15 +181,16 @@ def test_write_is_not_sent_when_nobody_knows_the_function_byte() -> None:
 
 def test_blind_write_goes_at_once_with_its_own_time_out() -> None:
     box = Box()
-    assert box.begin(Write(REGISTER, (1,), blind=True, timeout=0.05), 0.0) == [
+    assert box.begin(RegisterWrite(REGISTER, (1,), blind=True, timeout=0.05), 0.0) == [
         'C70100AA01000000']
     assert box.box.deadline == 0.05
     assert box.box.handle_timer(0.05) == Silence(sent=True)
-    assert box.begin(Write(REGISTER, (1,), blind=True), 1.0) == ['C701002A01000000']
+    assert box.begin(RegisterWrite(REGISTER, (1,), blind=True), 1.0) == ['C701002A01000000']
 
 
-@pytest.mark.parametrize('step', [Write(REGISTER, (1,)), Write(REGISTER, (1,), blind=True)])
-def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
+@pytest.mark.parametrize('step', [RegisterWrite(REGISTER, (1,)),
+                                  RegisterWrite(REGISTER, (1,), blind=True)])
+def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: RegisterWrite) -> None:
     assert box.begin(step, 1.0) == ['C701002A01000000']
     box.left(False, 1.0)
     if not step.blind:
@@ -206,7 +207,7 @@ def test_write_that_the_bus_refuses_was_not_sent(box: Box, step: Write) -> None:
 
 
 def test_refused_write_that_has_to_make_room_ends(box: Box) -> None:
-    box.begin(Write(REGISTER, (1,), blind=True), 1.0)
+    box.begin(RegisterWrite(REGISTER, (1,), blind=True), 1.0)
     box.left(False, 1.0)
     box.box.abandon(1.05)
     assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)
@@ -244,14 +245,14 @@ def test_one_exchange_at_a_time(box: Box) -> None:
 # -- late answers to what was given up, which have the toggle of the last but one -----------------
 
 
-def blind(value: int, register: Address = REGISTER) -> Write:
-    return Write(register, (value,), blind=True, timeout=0.05)
+def blind(value: int, register: Address = REGISTER) -> RegisterWrite:
+    return RegisterWrite(register, (value,), blind=True, timeout=0.05)
 
 
 @pytest.fixture(name='told')
 def _told(box: Box) -> Box:
     """Return a mailbox that gave up on 1 with toggle 0, then on 0 with 1, and waits for 0."""
-    assert box.begin(Write(REGISTER, (1,)), 1.0) == ['C701002A01000000']
+    assert box.begin(RegisterWrite(REGISTER, (1,)), 1.0) == ['C701002A01000000']
     box.box.abandon(1.05)
     assert box.box.handle_timer(1.05) == Silence(sent=True)
     assert box.begin(blind(0), 1.05) == ['C70100AA00000000']
@@ -320,7 +321,7 @@ def test_what_has_to_make_room_is_not_sent_again(told: Box) -> None:
 def test_what_must_not_be_executed_twice_is_sent_once(told: Box) -> None:
     """Function 00h has been answered before: an answer to what is older cannot come any more."""
     assert told.box.handle_timer(1.16) == Silence(sent=True)
-    write = Write(REGISTER, (7,))
+    write = RegisterWrite(REGISTER, (7,))
     assert told.asks(write, 1.2) == [IDLE, 'C70100AA07000000']
     assert told.hears('C70100AA00000000', 1.22) == Answered((0, 0))
     assert told.take() == []
@@ -329,7 +330,7 @@ def test_what_must_not_be_executed_twice_is_sent_once(told: Box) -> None:
 # -- late answers to what must not be executed twice: the device may answer others meanwhile ------
 
 
-def gives_up(box: Box, write: Write, now: float) -> str:
+def gives_up(box: Box, write: RegisterWrite, now: float) -> str:
     """Have a write sent that nobody answers; return what was sent."""
     sent = box.asks(write, now)
     assert box.box.handle_timer(now + 0.5) == Silence(sent=True)
@@ -343,7 +344,7 @@ def reads(box: Box, now: float) -> str:
     return sent[-1]
 
 
-FIRST, SECOND = Write(Address(652), (44,)), Write(Address(652), (33,))
+FIRST, SECOND = RegisterWrite(Address(652), (44,)), RegisterWrite(Address(652), (33,))
 
 
 def test_write_has_not_the_toggle_of_one_that_was_given_up(box: Box) -> None:
@@ -376,10 +377,10 @@ def test_the_toggle_is_free_when_no_late_answer_can_come_any_more(
 
 
 @pytest.mark.parametrize('write, sent', [
-    (Write(Address(653), (33,)), '8D02002A21000000'),
-    (Write(Address(0x2007, 0x03), (33,)), '0720033A21000000'),
+    (RegisterWrite(Address(653), (33,)), '8D02002A21000000'),
+    (RegisterWrite(Address(0x2007, 0x03), (33,)), '0720033A21000000'),
 ])
-def test_another_address_is_not_mistaken(box: Box, write: Write, sent: str) -> None:
+def test_another_address_is_not_mistaken(box: Box, write: RegisterWrite, sent: str) -> None:
     gives_up(box, FIRST, 1.0)
     reads(box, 1.51)
     assert box.begin(write, 1.52) == [sent]
@@ -389,7 +390,7 @@ def test_two_registers_may_be_refused_by_the_late_answer_of_one(box: Box) -> Non
     """A refusal does not say which function is refused."""
     gives_up(box, FIRST, 1.0)
     reads(box, 1.51)
-    assert box.begin(Write(Address(652), (33, 34)), 1.52) == [IDLE]
+    assert box.begin(RegisterWrite(Address(652), (33, 34)), 1.52) == [IDLE]
 
 
 def test_where_both_toggles_are_taken_the_first_answer_is_not_believed(box: Box) -> None:
@@ -490,14 +491,15 @@ def test_what_was_cut_short_may_be_answered_late_too(box: Box) -> None:
 
 
 def test_what_stops_a_drive_waits_for_no_toggle(box: Box) -> None:
-    assert gives_up(box, Write(REGISTER, (1,)), 1.0) == 'C701002A01000000'
+    assert gives_up(box, RegisterWrite(REGISTER, (1,)), 1.0) == 'C701002A01000000'
     reads(box, 1.51)
     assert box.begin(blind(0), 1.52) == ['C701002A00000000']
 
 
 @pytest.mark.parametrize('refused, following', [
-    (Write(REGISTER, (1,)), blind(0)), (FIRST, SECOND)])
-def test_what_the_bus_refused_takes_no_toggle(box: Box, refused: Write, following: Write) -> None:
+    (RegisterWrite(REGISTER, (1,)), blind(0)), (FIRST, SECOND)])
+def test_what_the_bus_refused_takes_no_toggle(box: Box, refused: RegisterWrite,
+                                              following: RegisterWrite) -> None:
     sent, = box.begin(refused, 1.0)
     box.left(False, 1.0)
     assert box.box.handle_timer(1.0) == Silence(sent=False, refused=True)

@@ -32,8 +32,8 @@ def data(row: dict[str, Any]) -> bytes:
     return bytes.fromhex(row['data_hex'])
 
 
-def layout(row: dict[str, Any]) -> pkw.Layout:
-    return pkw.Layout(row['layout'])
+def layout(row: dict[str, Any]) -> pkw.PkwLayout:
+    return pkw.PkwLayout(row['layout'])
 
 
 def address(row: dict[str, Any]) -> pkw.Address:
@@ -51,12 +51,12 @@ def test_all_vectors_are_run() -> None:
     for name in used - {'none', 'error'}:
         directions = {row['direction'] for row in VECTORS if row.get('function') == name}
         assert directions == {'request', 'response'}
-    assert {row['layout'] for row in VECTORS} == {entry.value for entry in pkw.Layout}
+    assert {row['layout'] for row in VECTORS} == {entry.value for entry in pkw.PkwLayout}
 
 
 @pytest.mark.parametrize('row', rows('reject'))
-@pytest.mark.parametrize('any_layout', pkw.Layout)
-def test_rejects(row: dict[str, Any], any_layout: pkw.Layout) -> None:
+@pytest.mark.parametrize('any_layout', pkw.PkwLayout)
+def test_rejects(row: dict[str, Any], any_layout: pkw.PkwLayout) -> None:
     with pytest.raises(RemoteProtocolError, match=f'{len(data(row))} data bytes'):
         pkw.decode(data(row), any_layout)
 

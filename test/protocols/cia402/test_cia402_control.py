@@ -13,7 +13,7 @@ from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.profile import FaultTable
-from drive_can_bridge.protocols.cia402.states import State
+from drive_can_bridge.protocols.cia402.states import ServoState
 
 ENABLE, DISABLE, QUICK_STOP = (
     ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
@@ -148,7 +148,7 @@ class TestWhatKeepsItFromEnabling:
         axis.live(0.1)
         assert axis.session.services.control_refusal(ENABLE) == says('bridge_missed')
         assert axis.asks(ControlAction.RESET_FAULT) == [
-            ('reset_fault', True, State.READY_TO_SWITCH_ON.value)]
+            ('reset_fault', True, ServoState.READY_TO_SWITCH_ON.value)]
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
 
 
@@ -170,7 +170,7 @@ class TestQuickStop:
         axis.live(0.1)
         assert axis.words() == ['0200', '0600']
         assert [(success, message) for _, success, message in axis.talk.control_outcomes()] == [
-            (True, State.SWITCH_ON_DISABLED.value)]
+            (True, ServoState.SWITCH_ON_DISABLED.value)]
 
     def test_one_that_takes_longer_than_people_wait(self) -> None:
         axis = Axis(control_timeout=0.5).enabled()
@@ -195,11 +195,12 @@ class TestQuickStop:
             assert axis.talk.control_outcomes() == []
         axis.live(0.1)
         assert axis.talk.control_outcomes() == [
-            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
+            ('quick_stop', True,
+             says('quick_stop_holds', state=ServoState.QUICK_STOP_ACTIVE.value))]
         axis.live(5.0)
         assert axis.words() == ['0200']
         assert axis.session.control.holds == says(
-            'quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value)
+            'quick_stop_holds', state=ServoState.QUICK_STOP_ACTIVE.value)
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
 
@@ -219,7 +220,8 @@ class TestQuickStop:
         axis.live(0.2)
         assert 'then holds' in axis.session.facts()['stops_by']
         assert axis.asks(QUICK_STOP, 0.6) == [
-            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
+            ('quick_stop', True,
+             says('quick_stop_holds', state=ServoState.QUICK_STOP_ACTIVE.value))]
         axis.take()
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
@@ -231,7 +233,8 @@ class TestQuickStop:
         axis.deliver(axis.talk.submits(write((option, 6)), axis.now))
         axis.live(0.5)
         assert axis.asks(QUICK_STOP, 0.6) == [
-            ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))]
+            ('quick_stop', True,
+             says('quick_stop_holds', state=ServoState.QUICK_STOP_ACTIVE.value))]
 
     def test_an_old_status_is_none_behind_a_quick_stop(self) -> None:
         """The mode shows in 6061h when 0002h has left, and no status behind that has come."""
@@ -267,7 +270,7 @@ class TestQuickStop:
 
     def test_of_a_drive_that_is_not_enabled(self) -> None:
         axis = Axis().online()
-        assert axis.asks(QUICK_STOP) == [('quick_stop', True, State.READY_TO_SWITCH_ON.value)]
+        assert axis.asks(QUICK_STOP) == [('quick_stop', True, ServoState.READY_TO_SWITCH_ON.value)]
         assert axis.words() == ['0600']
 
     def test_one_that_the_drive_began_by_itself(self) -> None:
@@ -322,7 +325,7 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
         axis = self.braking(since)
         assert axis.asks(DISABLE) == [('disable', True, UNTOLD)]
         assert axis.words() == ['0000', '0600']
-        assert axis.asks(DISABLE) == [('disable', True, State.READY_TO_SWITCH_ON.value)]
+        assert axis.asks(DISABLE) == [('disable', True, ServoState.READY_TO_SWITCH_ON.value)]
         axis = self.braking(since)
         assert axis.asks(ENABLE) == [('enable', True, UNTOLD)]
         assert axis.words() == ['0000', '0600', '0700', '0F00']
@@ -346,7 +349,7 @@ class TestOneThatHoldsAndDoesNotTellWhetherItStands:
             axis.live(0.2)
             assert axis.words() == ['0200', '0000', '0600']
             assert axis.talk.control_outcomes()[-1] == ('disable', True, UNTOLD)
-            assert axis.asks(ENABLE) == [('enable', True, State.OPERATION_ENABLED.value)]
+            assert axis.asks(ENABLE) == [('enable', True, ServoState.OPERATION_ENABLED.value)]
 
     def test_a_quick_stop_is_answered_as_holding_when_it_is_asked_for_again(self) -> None:
         axis = self.braking(0.6)

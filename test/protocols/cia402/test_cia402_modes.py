@@ -18,7 +18,7 @@ from drive_can_bridge.core.fault_watch import FaultWatch
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.profile import FaultTable
 from drive_can_bridge.core.setpoints import CommandOutcome
-from drive_can_bridge.protocols.cia402.states import State
+from drive_can_bridge.protocols.cia402.states import ServoState
 
 #: how far it is with homing while it moves
 AWAY = 'on its way'
@@ -304,7 +304,7 @@ class TestHoming:
         home(axis, 0.2)
         outcomes = axis.asks(ControlAction.DISABLE, 0.5)
         assert ('home', False, says('homing_stopped', step=AWAY)) in outcomes
-        assert ('disable', True, State.READY_TO_SWITCH_ON.value) in outcomes
+        assert ('disable', True, ServoState.READY_TO_SWITCH_ON.value) in outcomes
         assert drive.number(0x6060) == number
         assert axis.session.busy == ''
         assert axis.asks(ControlAction.ENABLE) == [('enable', True, 'operation enabled')]

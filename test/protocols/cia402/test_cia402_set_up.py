@@ -13,7 +13,7 @@ from drive_can_bridge.core.events import DriveState, MappingDiffered, Noted
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.protocols.canopen.sdo import describe
 from drive_can_bridge.protocols.cia402.bring_up import interpolation_time
-from drive_can_bridge.protocols.cia402.states import State
+from drive_can_bridge.protocols.cia402.states import ServoState
 
 RPDO, TPDO = (0x1400, 1), (0x1800, 1)
 
@@ -246,7 +246,7 @@ class TestFaultReaction:
         told = axis.take()
         assert told.count('605#4041600000000000') > 10
         assert not [text for text in told if text.startswith(('000#', '605#2', '205#'))]
-        assert notes(axis) == [says('found_braking', state=State.FAULT_REACTION.value)]
+        assert notes(axis) == [says('found_braking', state=ServoState.FAULT_REACTION.value)]
         axis.drive.state = axis.drive.FAULT
         axis.drive.objects[0x6041, 0] = self.FAULT
         axis.live(0.5)

@@ -10,11 +10,11 @@ from servo_builders import Axis, OBJECTS, POSITION, TARGET
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.protocols.cia402.standing import Band, Standing
-from drive_can_bridge.protocols.cia402.states import State
+from drive_can_bridge.protocols.cia402.states import ServoState
 
 ENABLE, DISABLE, QUICK_STOP = (
     ControlAction.ENABLE, ControlAction.DISABLE, ControlAction.QUICK_STOP)
-HOLDS = ('quick_stop', True, says('quick_stop_holds', state=State.QUICK_STOP_ACTIVE.value))
+HOLDS = ('quick_stop', True, says('quick_stop_holds', state=ServoState.QUICK_STOP_ACTIVE.value))
 STAYING = [LelyServo, CanopenNodeServo]
 
 
@@ -100,7 +100,7 @@ class TestDrivesThatStayInQuickStopWhatever605AhSays:
         assert '605#2B40600000000000' not in axis.take()
         assert not axis.session.online
         told = [note.text for note in axis.talk.events(Noted)]
-        braking = says('found_braking', state=State.QUICK_STOP_ACTIVE.value)
+        braking = says('found_braking', state=ServoState.QUICK_STOP_ACTIVE.value)
         assert told == [braking, says('may_still_be_running', why=braking)]
         drive.braking = 1
         axis.live(5.0)
@@ -114,7 +114,7 @@ def test_one_that_is_lost_right_behind_its_own_quick_stop_goes_on_braking() -> N
     drive.brakes = 10_000
     drive.becomes(drive.QUICK_STOP)
     axis.take()
-    while axis.session.control.state != State.QUICK_STOP_ACTIVE.value:
+    while axis.session.control.state != ServoState.QUICK_STOP_ACTIVE.value:
         axis.live(0.0005)
     axis.deliver(axis.talk.bus_down(axis.now))
     axis.deliver(axis.talk.bus_up(axis.now))

@@ -81,7 +81,7 @@ def test_pdo_identifier(row: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(('name', 'mask', 'value'), FILE['states'])
 def test_states(name: str, mask: str, value: str) -> None:
-    state = states.State(name)
+    state = states.ServoState(name)
     assert states.PATTERNS[state] == (int(mask, 16), int(value, 16))
     # of all words those that the table says, whatever other bits are set
     assert [word & int(mask, 16) for word in range(0x10000)
@@ -91,7 +91,7 @@ def test_states(name: str, mask: str, value: str) -> None:
 
 @pytest.mark.parametrize('row', FILE['states_seen'], ids=lambda row: str(row['word']))
 def test_states_of_real_drives(row: dict[str, Any]) -> None:
-    assert states.state_of(int(row['word'], 16)) is states.State(row['state'])
+    assert states.state_of(int(row['word'], 16)) is states.ServoState(row['state'])
 
 
 def test_control_words() -> None:

@@ -10,7 +10,7 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterTransactor, Procedure, Read, Words, Write)
+    ParameterRead, ParameterTransactor, ParameterWrite, Procedure, Words)
 
 
 def nobody(sent: bool, now: float) -> None:
@@ -62,7 +62,7 @@ class Line:
     def reading(numbers: tuple[int, ...]) -> Procedure:
         found: list[Words | None] = []
         for number in numbers:
-            found.append((yield Read(number)))
+            found.append((yield ParameterRead(number)))
         return found
 
     def writes(self, *steps: tuple[int, bool], priority: Priority = Priority.OWN, now: float = 1.0,
@@ -73,7 +73,7 @@ class Line:
     @staticmethod
     def writing(steps: tuple[tuple[int, bool], ...]) -> Procedure:
         for number, eeprom in steps:
-            yield Write(number, (1,), eeprom)
+            yield ParameterWrite(number, (1,), eeprom)
         return 'done'
 
     def answer(self, word: int, now: float) -> list[str]:
@@ -114,8 +114,10 @@ def test_write_first_overtakes_and_replaces() -> None:
     line = Line()
     done: list[str] = []
     line.reads(1, 2, priority=Priority.USERS)
-    line.transactor.write_first(Write(52, (1,), False), lambda *_: done.append('one'), 1.01)
-    line.transactor.write_first(Write(53, (0,), False), lambda *_: done.append('two'), 1.02)
+    line.transactor.write_first(ParameterWrite(52, (1,), False), lambda *_: done.append('one'),
+                                1.01)
+    line.transactor.write_first(ParameterWrite(53, (0,), False), lambda *_: done.append('two'),
+                                1.02)
     assert line.sent() == []
     assert line.answer(0, 1.03) == ['53!']
     assert done == ['two']
@@ -125,7 +127,7 @@ def test_write_first_overtakes_and_replaces() -> None:
 def test_write_first_waits_for_its_eeprom() -> None:
     line = Line()
     line.writes((30, True))
-    line.transactor.write_first(Write(52, (1,), True), nobody, 1.001)
+    line.transactor.write_first(ParameterWrite(52, (1,), True), nobody, 1.001)
     assert line.channel.due == pytest.approx(1.02)
     assert line.at(1.0199) == []
     assert line.at(1.0201) == ['52!']
@@ -135,8 +137,8 @@ def test_what_stops_a_drive_waits_for_spacing_only() -> None:
     line = Line()
     assert line.reads(1) == ['1?']          # not answered yet
     line.channel.hold(5.0)
-    line.transactor.write_now(Write(52, (0,), False), nobody, 1.01)
-    line.transactor.write_now(Write(50, (0,), False), nobody, 1.01)
+    line.transactor.write_now(ParameterWrite(52, (0,), False), nobody, 1.01)
+    line.transactor.write_now(ParameterWrite(50, (0,), False), nobody, 1.01)
     assert line.sent() == ['52!']
     assert line.channel.due == pytest.approx(1.011)
     assert line.at(1.0111) == ['50!']
@@ -148,7 +150,7 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
         gap: float, left_at: float) -> None:
     line = Line(gap=gap)
     line.writes((30, True))
-    line.transactor.write_now(Write(52, (0,), True), nobody, 1.005)
+    line.transactor.write_now(ParameterWrite(52, (0,), True), nobody, 1.005)
     assert line.at(left_at - 0.0001) == []
     assert line.at(left_at + 0.0001) == ['52!']
 
@@ -156,8 +158,8 @@ def test_what_stops_a_drive_waits_for_its_eeprom_but_not_for_long(
 def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
     line = Line()
     assert line.reads(1) == ['1?']
-    line.transactor.write_first(Write(52, (1,), False), nobody, 1.001)
-    line.transactor.write_now(Write(52, (0,), False), nobody, 1.002)
+    line.transactor.write_first(ParameterWrite(52, (1,), False), nobody, 1.001)
+    line.transactor.write_now(ParameterWrite(52, (0,), False), nobody, 1.002)
     assert line.sent() == ['52!']
     assert line.answer(0, 1.01) == []
 
@@ -165,8 +167,8 @@ def test_what_stops_a_drive_makes_a_word_that_waits_outdated() -> None:
 def test_what_stops_a_drive_makes_a_stop_of_the_same_parameter_outdated() -> None:
     line = Line()
     for word in (9, 2, 0):
-        line.transactor.write_now(Write(52, (word,), False), nobody, 1.0)
-    line.transactor.write_now(Write(50, (0,), False), nobody, 1.0)
+        line.transactor.write_now(ParameterWrite(52, (word,), False), nobody, 1.0)
+    line.transactor.write_now(ParameterWrite(50, (0,), False), nobody, 1.0)
     left = []
     for now in (1.0, 1.001, 1.002, 1.003):
         line.channel.advance(now)
@@ -181,7 +183,7 @@ def test_clear_forgets_everything_but_the_eeprom() -> None:
     line.reads(1, priority=Priority.USERS)
     line.reads(2, priority=Priority.USERS)
     line.reads(3)
-    line.transactor.write_first(Write(52, (1,), False), lambda: None, 1.0)
+    line.transactor.write_first(ParameterWrite(52, (1,), False), lambda: None, 1.0)
     assert line.channel.waiting_users == 1
     line.channel.clear()
     assert line.channel.due == math.inf
@@ -244,9 +246,9 @@ def test_users_are_owed_a_step_after_each_round() -> None:
 def test_writes_that_go_first_do_not_wait_for_answers() -> None:
     line = Line(quarantine=0.1)
     line.reads(1)
-    line.transactor.write_first(Write(52, (1,), False), nobody, 1.01)
+    line.transactor.write_first(ParameterWrite(52, (1,), False), nobody, 1.01)
     assert line.sent() == ['52!']
-    line.transactor.write_first(Write(52, (0,), False), nobody, 1.0105)
+    line.transactor.write_first(ParameterWrite(52, (0,), False), nobody, 1.0105)
     assert line.channel.due == pytest.approx(1.011)
     assert line.at(1.011) == ['52!']
     assert line.transactor.outstanding is not None

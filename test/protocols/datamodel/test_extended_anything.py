@@ -43,14 +43,14 @@ def test_acyclic_telegrams(station: int, window: tuple[int, list[int]]) -> None:
     number, words = window
     asked = extended.encode_read_request(station, number, len(words))
     answer = extended.encode_answer(asked.identifier, words)
-    assert extended.decode(asked) == extended.ReadRequest(number, len(words))
+    assert extended.decode(asked) == extended.ReadTelegram(number, len(words))
     assert extended.decode(answer) == extended.ReadResponse(number, tuple(words))
     assert answer.identifier == asked.identifier + 0x10000000
     assert extended.station_of(asked.identifier) == station
     assert asked.data == bytes(8)
     if number != 0xFFFF:
         written = extended.encode_write(station, number, words)
-        assert extended.decode(written) == extended.Write(number, tuple(words))
+        assert extended.decode(written) == extended.WriteTelegram(number, tuple(words))
         assert written.identifier == asked.identifier + 0x100000
 
 
@@ -72,7 +72,7 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
     assert extended.station_of(identifier) == identifier >> 21 & 0x7F
     if identifier & 0xF:
         assert (identifier >> 4 & 0xFFFF) + (identifier & 0xF) <= 0x10000
-    if not isinstance(telegram, extended.ReadRequest):
+    if not isinstance(telegram, extended.ReadTelegram):
         assert len(data) >= 2 * len(telegram.words)
         assert len(data) == 8 or not strict
 

@@ -25,7 +25,7 @@ from drive_can_bridge.core.events import ProcessDataReceived, StationFound, Stat
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.datamodel import standard
-from drive_can_bridge.protocols.datamodel.extended import ReadRequest, Write
+from drive_can_bridge.protocols.datamodel.extended import ReadTelegram, WriteTelegram
 from drive_can_bridge.protocols.families import FAMILIES
 
 TIMEOUT = 0.1
@@ -54,11 +54,11 @@ WORDS = st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=4)
 def test_telegrams(identifier: int, number: int, count: int, word: int, words: list[int]) -> None:
     written = standard.encode_write(identifier, number, word)
     assert written.data == bytes([6, number & 255, number >> 8, word & 255, word >> 8, 0, 0, 0])
-    assert standard.decode_request(written) == Write(number, (word,))
+    assert standard.decode_request(written) == WriteTelegram(number, (word,))
     if number + count <= 0x10000:
         asked = standard.encode_read_request(identifier, number, count)
         assert asked.data == bytes([3, number & 255, number >> 8, count, 0, 0, 0, 0])
-        assert standard.decode_request(asked) == ReadRequest(number, count)
+        assert standard.decode_request(asked) == ReadTelegram(number, count)
     answer = standard.encode_read_response(identifier, words)
     assert (answer.identifier, len(answer.data), answer.extended) == (identifier, 8, False)
     for wanted in range(1, len(words) + 1):
@@ -80,8 +80,8 @@ def test_anything(identifier: int, data: bytes, is_extended: bool, count: int,
     else:
         assert not is_extended
         assert len(data) == 8
-        assert data[0] == (6 if isinstance(request, Write) else 3)
-        assert isinstance(request, Write) or data[3] == request.count
+        assert data[0] == (6 if isinstance(request, WriteTelegram) else 3)
+        assert isinstance(request, WriteTelegram) or data[3] == request.count
     try:
         words = standard.decode_read_response(heard, count, strict=strict)
     except RemoteProtocolError as error:
