@@ -21,15 +21,13 @@ from drive_can_bridge.protocols.cannord.identifiers import MessageObject
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     LENGTH, NUMBER_MAX, ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.cannord.process_data import (
-    EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH,
-)
+    EXTRA_LENGTH, LONG_LENGTH, MAIN_VALUES, SHORT_LENGTH)
 from drive_can_bridge.protocols.cannord.states import (
-    ENABLE_OPERATION, FAULT_RESET, NO_DISABLE_VOLTAGE, NO_QUICK_STOP, STATUS_BITS, SWITCH_ON,
-)
+    ENABLE_OPERATION, FAULT_RESET, NO_DISABLE_VOLTAGE, NO_QUICK_STOP, STATUS_BITS, SWITCH_ON)
 from drive_can_bridge.simulation import quantities
-from drive_can_bridge.simulation.control import (
-    FAULTS, Machine, MachineState, OperatingState, RUNNING, Transition)
 from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
+from drive_can_bridge.simulation.drive_machine import (
+    FAULTS, Machine, MachineState, OperatingState, RUNNING, Transition)
 from drive_can_bridge.simulation.motor import MotorPlant, WARNING_TEMPERATURE
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw, Quantity
 from drive_can_bridge.simulation.registers import (

@@ -27,9 +27,9 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import BLOCKS, object_of, 
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, WORD_MAX
 from drive_can_bridge.simulation.canopen.node import CanopenNode, Contents
 from drive_can_bridge.simulation.canopen.sdo import checked_length, CODES
-from drive_can_bridge.simulation.control import (
-    FAULTS, Machine, MachineState, MachineStatus, OperatingState, StatusWord, Transition)
 from drive_can_bridge.simulation.drive import IgnoredFrame, SimulatedDrive
+from drive_can_bridge.simulation.drive_machine import (
+    FAULTS, Machine, MachineState, MachineStatus, OperatingState, StatusWord, Transition)
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.quantities import clamp, plausible
 from drive_can_bridge.simulation.registers import (

@@ -23,11 +23,10 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.simulation import quantities
 from drive_can_bridge.simulation.canopen.pdos import Checks, PdoHabits
 from drive_can_bridge.simulation.canopen.sdo import Place
-from drive_can_bridge.simulation.control import FAULTS, Machine, MachineState, OperatingState
+from drive_can_bridge.simulation.drive_machine import FAULTS, Machine, MachineState, OperatingState
 from drive_can_bridge.simulation.motor import (
     COAST_TIME, FRICTION_TORQUE, INERTIA_TORQUE, LOAD_TORQUE, Motor, Rates, SINKING_SPEED, Travel,
-    WARNING_TEMPERATURE,
-)
+    WARNING_TEMPERATURE)
 from drive_can_bridge.simulation.registers import Mechanics, Registers, WriteRefusal
 
 _TYPES = {'u8': ParameterType.UINT8, 'i8': ParameterType.INT8, 'u16': ParameterType.UINT16,

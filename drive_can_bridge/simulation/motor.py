@@ -27,7 +27,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.continuous import steps_of
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.simulation import quantities
-from drive_can_bridge.simulation.control import (
+from drive_can_bridge.simulation.drive_machine import (
     ENDS, machine_of, MachineStatus, OperatingState, StatusWord)
 from drive_can_bridge.simulation.quantities import Quantity, RampParameter, RampUse
 from drive_can_bridge.simulation.registers import Mechanics, Registers, WriteRefusal

@@ -16,7 +16,7 @@ from typing import Protocol
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
-from drive_can_bridge.simulation.control import OperatingState
+from drive_can_bridge.simulation.drive_machine import OperatingState
 from drive_can_bridge.simulation.faults import Fault, FaultKind
 from drive_can_bridge.simulation.quantities import clamp, nearest_raw
 

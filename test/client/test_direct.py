@@ -20,7 +20,7 @@ from drive_can_bridge.client.direct import LISTEN
 from drive_can_bridge.client.drive import Drives, Enabled
 from drive_can_bridge.core.errors import BusUnavailable, DriveCanError
 from drive_can_bridge.core.roles import Role
-from drive_can_bridge.exchange.one_master import InUse
+from drive_can_bridge.exchange.one_master import AnotherMaster, InUse
 
 pytestmark = pytest.mark.usefixtures('bench')
 

@@ -16,8 +16,8 @@ from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.requests import ReadRequest, RetryPolicy, WriteRequest
 from drive_can_bridge.protocols.channel import Channel, Priority
-from drive_can_bridge.protocols.cia402.channel import SdoTransactor, Transfer
-from drive_can_bridge.protocols.datamodel.channel import ParameterRead, ParameterTransactor
+from drive_can_bridge.protocols.cia402.transactor import SdoTransactor, Transfer
+from drive_can_bridge.protocols.datamodel.transactor import ParameterRead, ParameterTransactor
 from drive_can_bridge.protocols.families import FAMILIES
 
 STATUS = parameter('system_status_1', 455, access=RO)

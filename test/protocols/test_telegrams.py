@@ -61,7 +61,7 @@ def rejects(call: Callable[..., object], *arguments: Any) -> bool:
 
 
 def check_sdo(module: Any) -> None:
-    kinds = {kind.name.lower(): kind for kind in module.Kind}
+    kinds = {kind.name.lower(): kind for kind in module.SdoCommand}
     vectors = [row for row in CIA402['vectors'] if row['kind'] in kinds]
     exchanges = set()
     for before, row in zip([{'frame': ''}, *vectors], vectors):
@@ -69,7 +69,7 @@ def check_sdo(module: Any) -> None:
         direction = REQUEST if row['frame'].startswith('6') else RESPONSE
         assert identifier & ~0x7F == (
             module.REQUEST_BASE if direction is REQUEST else module.RESPONSE_BASE)
-        expected = module.Message(
+        expected = module.SdoMessage(
             kinds[row['kind']], (int(row['index'], 16), row['subindex']) if 'index' in row else
             None, bytes.fromhex(row.get('content', '')),
             int(row['code'], 16) if 'code' in row else row.get('size', 0),
@@ -90,7 +90,7 @@ def check_sdo(module: Any) -> None:
         for head in range(0x100):
             fitting = [kind for way, kind, bits, _ in CIA402['heads']
                        if way == direction.value and fits(head, bits)]
-            rows = [kind for kind in module.Kind if kind.value.is_sent_by(direction)
+            rows = [kind for kind in module.SdoCommand if kind.value.is_sent_by(direction)
                     and head & kind.value.mask == kind.value.code]
             assert [kind.name.lower() for kind in rows] == fitting
             for kind in rows:
@@ -164,20 +164,20 @@ def check_pkw(module: Any) -> None:
     assert set(codes.values()) == set(map(int, module.Function))
     assert (module.Function.NONE, module.Function.ERROR) == (codes['none'], codes['error'])
     for name, row in PKW['functions'].items():
-        meaning = module.Message(0, codes[name], True).meaning
+        meaning = module.PkwMessage(0, codes[name], True).meaning
         assert meaning == (None if row['addressing'] is None else module.Meaning(
             row['addressing'] == 'canopen', row['write'], row['words']))
-        assert f'{module.Message(0, codes[name], True).function_byte:02X}' == row['toggled']
+        assert f'{module.PkwMessage(0, codes[name], True).function_byte:02X}' == row['toggled']
     for row in PKW['vectors']:
         if row['use'] == 'reject':
             continue
-        message = module.Message(row['word_1'], codes[row['function']], row['toggle'] == 1,
+        message = module.PkwMessage(row['word_1'], codes[row['function']], row['toggle'] == 1,
                                  row['low_byte'], tuple(row['data_words']))
-        layout = module.Layout(row['layout'])
+        layout = module.PkwLayout(row['layout'])
         assert module.decode(octets(row), layout) == message
         if row['use'] == 'both':
             assert module.encode(message, layout) == octets(row)
-    read, default = module.read_request(module.Address(455), 1, False), module.Layout('word_le')
+    read, default = module.read_request(module.Address(455), 1, False), module.PkwLayout('word_le')
     told = [step.partition('#')[2] for row in PKW['exchanges'] for step in row['frames']
             if step.startswith('<')]
     assert {text for text in told if module.answers(
@@ -241,9 +241,9 @@ def check_parameter_frames(module: Any) -> None:
             assert layout.encode(*(row[name] for name in ('code', 'number', 'index', 'value'))
                                  ) == octets(row)
     doubles = [2, 5]        # PWE1 and PWE2 are one value
-    assert [int(each) for each in module.Response] == [0, 1, 2, 4, 5, 6, 7]
-    assert [int(each) for each in module.Response if each.double] == doubles
-    assert [int(each) for each in module.Response if each.array] == [4, 5]
+    assert [int(each) for each in module.ResponseId] == [0, 1, 2, 4, 5, 6, 7]
+    assert [int(each) for each in module.ResponseId if each.double] == doubles
+    assert [int(each) for each in module.ResponseId if each.array] == [4, 5]
     none = {'task': 0, 'answers': [0], 'array': False}
     assert [int(task) for task in module.Task] == [0, *(row['task'] for row in CANNORD['tasks'])]
     for row in [none, *CANNORD['tasks']]:
@@ -261,7 +261,7 @@ def check_parameter_frames(module: Any) -> None:
 
 def check_extended(module: Any) -> None:
     kinds = {'cyclic_request': module.CyclicRequest, 'cyclic_response': module.CyclicResponse,
-             'acyclic_write': module.Write, 'read_request': module.ReadRequest,
+             'acyclic_write': module.WriteTelegram, 'read_request': module.ReadTelegram,
              'read_response': module.ReadResponse}
     for row in DATAMODEL['vectors']:
         fields = row['fields']

@@ -22,6 +22,7 @@ from drive_can_bridge.core.configuration import BusConfiguration, DriveConfigura
 from drive_can_bridge.core.errors import TransportError
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import AccessMode
+from drive_can_bridge.exchange.one_master import AnotherMaster
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.scanner import Finding
 from drive_can_bridge.resources import config_file

@@ -2,7 +2,7 @@
 """
 Reading and writing parameters of an inverter, in words that users understand.
 
-Every generator here is for :class:`.channel.TaskChannel`.
+Every generator here is for :class:`.transactor.TaskChannel`.
 """
 
 from collections.abc import Generator, Iterable, Sequence
@@ -14,10 +14,10 @@ from drive_can_bridge.core.requests import (
     Failure, FailureKind, NOT_SENT, Outcome, Outcomes, ReadValue, RetryPolicy, Written)
 from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess, read_back
-from drive_can_bridge.protocols.cannord.channel import ParameterTask, TaskChannel, TaskResult
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, ResponseId, Task, WRITE_TASKS)
 from drive_can_bridge.protocols.cannord.process_data import Samples
+from drive_can_bridge.protocols.cannord.transactor import ParameterTask, TaskChannel, TaskResult
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = sentences.process_data_only()

@@ -35,7 +35,6 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cannord import procedures
-from drive_can_bridge.protocols.cannord.channel import TaskChannel, TaskTransactor
 from drive_can_bridge.protocols.cannord.control import make_control
 from drive_can_bridge.protocols.cannord.group import Group, GroupMember
 from drive_can_bridge.protocols.cannord.identifiers import broadcasts, identifier, MessageObject
@@ -44,6 +43,7 @@ from drive_can_bridge.protocols.cannord.parameter_frame import ParameterLayout
 from drive_can_bridge.protocols.cannord.process_data import decode_main, EXTRA_LENGTH, Samples
 from drive_can_bridge.protocols.cannord.states import (
     CONTROL_PARAMETER, is_faulted, STATUS_PARAMETER)
+from drive_can_bridge.protocols.cannord.transactor import TaskChannel, TaskTransactor
 
 _SILENCE = 'no answer to process data'
 _ADVICE = 'drive silent, wrong station, bit rate or identifier format, or P509 not set to CAN'

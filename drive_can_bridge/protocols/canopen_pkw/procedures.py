@@ -2,7 +2,7 @@
 """
 What takes more than one request: parameters of users, and the safe stop.
 
-Every generator here is for :class:`.mailbox.MailboxChannel`.
+Every generator here is for :class:`.transactor.MailboxChannel`.
 """
 
 from collections.abc import Generator, Hashable, Sequence
@@ -13,9 +13,9 @@ from drive_can_bridge.core.requests import NOT_SENT, Outcome, Outcomes, Written
 from drive_can_bridge.core.stop_duty import Happened, StopDuty
 from drive_can_bridge.protocols.access import Found, Item, ParameterAccess
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
+from drive_can_bridge.protocols.canopen_pkw.transactor import (
+    Answered, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
 NOT_TOGETHER = sentences.not_in_one_frame(

@@ -54,9 +54,9 @@ from drive_can_bridge.protocols.canopen.node import (
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
 from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    MailboxChannel, MailboxTransactor, Procedure, Refused, RegisterRead, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout, PkwMessage
+from drive_can_bridge.protocols.canopen_pkw.transactor import (
+    MailboxChannel, MailboxTransactor, Procedure, Refused, RegisterRead, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script

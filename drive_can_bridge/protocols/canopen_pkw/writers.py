@@ -31,9 +31,9 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.stop_duty import CONTROL_WORD
 from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutput
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxChannel, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
+from drive_can_bridge.protocols.canopen_pkw.transactor import (
+    Answered, MailboxChannel, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
 from drive_can_bridge.protocols.polled_exchange import TOLERANCE
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain

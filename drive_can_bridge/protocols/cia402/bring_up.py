@@ -27,7 +27,6 @@ from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import START_PAUSE, WatchedNode
 from drive_can_bridge.protocols.cia402 import pdo, states
 from drive_can_bridge.protocols.cia402.beat import Beat
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
@@ -36,6 +35,7 @@ from drive_can_bridge.protocols.cia402.objects import (
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
+from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.watch import BridgeWatch
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019

@@ -32,9 +32,9 @@ from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, place_of, STILL
+from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
 
 _DONE = states.BIT_12 | states.TARGET_REACHED
 #: 6098h: the present position becomes the reference, and nothing moves

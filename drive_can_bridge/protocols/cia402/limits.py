@@ -22,8 +22,8 @@ from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.mapped import named
+from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
 
 #: s that a drive may take to show what it was sent
 LIMIT_TIME = 0.5

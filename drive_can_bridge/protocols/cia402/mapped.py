@@ -15,9 +15,9 @@ from drive_can_bridge.core.messages import Sentence, together
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import Pdo
+from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
 
 
 def named(parameter: Parameter) -> str:

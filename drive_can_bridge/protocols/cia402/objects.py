@@ -14,7 +14,7 @@ from typing import Any
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
 
 Procedure = Generator[Transfer, TransferResult, Any]
 

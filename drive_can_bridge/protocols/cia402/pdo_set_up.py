@@ -8,9 +8,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos, same_mapping
+from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
 
 
 class PdoSetUp:

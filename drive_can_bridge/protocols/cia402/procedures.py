@@ -2,7 +2,7 @@
 """
 Parameters of users by SDO.
 
-Every generator here is for :class:`.channel.SdoChannel`. What is written goes to the drive's RAM;
+Every generator here is for :class:`.transactor.SdoChannel`. What is written goes to the RAM;
 it is acknowledged, and not read back. No parameter has more than four bytes, so that no download
 takes segments; an object that is longer, which a raw name may find, is refused in words.
 """
@@ -18,9 +18,9 @@ from drive_can_bridge.core.roles import Cells
 from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAccess
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import is_map, width
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
+from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
 
 NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')

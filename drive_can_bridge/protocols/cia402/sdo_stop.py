@@ -17,9 +17,10 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import WatchedNode
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, SILENT, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import width
 from drive_can_bridge.protocols.cia402.procedures import refused
+from drive_can_bridge.protocols.cia402.transactor import (
+    SdoChannel, SILENT, Transfer, TransferResult)
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS, StopWrite
 
 #: s between two NMT commands to a node that may be stopped, and for which they are repeated

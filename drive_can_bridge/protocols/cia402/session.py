@@ -45,8 +45,6 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.beat import (
     Beat, BridgeHeartbeat, EventTimer, FreeSync, smallest, Turn)
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
-from drive_can_bridge.protocols.cia402.channel import (
-    SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
 from drive_can_bridge.protocols.cia402.homing import Homing
@@ -58,6 +56,8 @@ from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
+from drive_can_bridge.protocols.cia402.transactor import (
+    SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cia402.watch import WATCH_INTERVALS
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script

@@ -27,9 +27,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.channel import SdoChannel, Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
 from drive_can_bridge.protocols.cia402.states import ServoState, state_of
+from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
 
 #: s for which nothing may say that the axis moves
 STILL = 0.5

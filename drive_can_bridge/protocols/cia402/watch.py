@@ -15,9 +15,9 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo, states
-from drive_can_bridge.protocols.cia402.channel import Transfer, TransferResult
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
 from drive_can_bridge.protocols.cia402.pdo import request_pdos
+from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
 
 CONSUMER, GUARD_TIME, LIFE_FACTOR = 0x1016, 0x100C, 0x100D
 #: the bridge's heartbeat may be late by so many intervals

@@ -23,13 +23,13 @@ from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput, Judged
 from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.datamodel import procedures
-from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, AcyclicCodec, ParameterRead, ParameterTransactor, ParameterWrite, Reply, Step,
-    STOP_EEPROM_WAIT, Words)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD, SLOTS
 from drive_can_bridge.protocols.datamodel.options import DataModelOptions
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.datamodel.setpoint_writer import ControlByNumber
+from drive_can_bridge.protocols.datamodel.transactor import (
+    AcyclicChannel, AcyclicCodec, ParameterRead, ParameterTransactor, ParameterWrite, Reply, Step,
+    STOP_EEPROM_WAIT, Words)
 from drive_can_bridge.protocols.exchange_book import stop_spacing
 from drive_can_bridge.protocols.safe_stop import (
     SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)

@@ -49,9 +49,9 @@ from drive_can_bridge.protocols.answers import CycleAnswers
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange
 from drive_can_bridge.protocols.datamodel import extended, procedures
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.options import differences, effective
 from drive_can_bridge.protocols.datamodel.process_words import CyclicCodec
+from drive_can_bridge.protocols.datamodel.transactor import Procedure
 from drive_can_bridge.protocols.life import Life, Script
 
 #: direction and station of an identifier

@@ -6,7 +6,7 @@ Numbers in a profile are those of the drive's manual. What goes over the wire, i
 telegrams and map entries, is ``number + parameter_offset``; a few drives count from 0 on one side
 and from 1 on the other.
 
-Every generator here is for :class:`.channel.AcyclicChannel`.
+Every generator here is for :class:`.transactor.AcyclicChannel`.
 """
 
 from collections.abc import Container, Generator, Iterable, Sequence
@@ -20,10 +20,10 @@ from drive_can_bridge.core.requests import (
     Failure, FailureKind, NOT_SENT, Outcome, Outcomes, RetryPolicy, Written)
 from drive_can_bridge.protocols.access import (
     Found, Item, ParameterAccess, ParameterPlacement, read_back)
-from drive_can_bridge.protocols.datamodel.channel import (
-    AcyclicChannel, ParameterRead, ParameterWrite, Reply, Step, Words)
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.options import effective, padded
+from drive_can_bridge.protocols.datamodel.transactor import (
+    AcyclicChannel, ParameterRead, ParameterWrite, Reply, Step, Words)
 from drive_can_bridge.protocols.polled_exchange import Chunk, plan_reads
 
 

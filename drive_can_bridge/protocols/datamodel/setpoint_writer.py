@@ -23,9 +23,9 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import CONTROL_WORD, Happened
 from drive_can_bridge.protocols.acyclic_output import AcyclicOutput
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterTransactor, ParameterWrite, Procedure, Reply, Step)
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
+from drive_can_bridge.protocols.datamodel.transactor import (
+    ParameterTransactor, ParameterWrite, Procedure, Reply, Step)
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.polled_exchange import PolledExchange
 

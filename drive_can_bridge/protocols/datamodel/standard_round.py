@@ -8,10 +8,10 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import worst_bits
 from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.process_image import control_word, status_word
-from drive_can_bridge.protocols.datamodel.channel import (
-    ParameterRead, ParameterTransactor, Procedure)
 from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
+from drive_can_bridge.protocols.datamodel.transactor import (
+    ParameterRead, ParameterTransactor, Procedure)
 from drive_can_bridge.protocols.polled_exchange import Chunk, round_time
 
 FRAME_BITS = worst_bits(PAYLOAD, extended=False)

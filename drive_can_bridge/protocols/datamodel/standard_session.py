@@ -21,9 +21,9 @@ from drive_can_bridge.core.session import Session, Stage
 from drive_can_bridge.core.stop_duty import Do, Happened
 from drive_can_bridge.protocols.datamodel import standard
 from drive_can_bridge.protocols.datamodel.acyclic_side import AcyclicSide, map_cells
-from drive_can_bridge.protocols.datamodel.channel import Procedure
 from drive_can_bridge.protocols.datamodel.setpoint_writer import SetpointWriter
 from drive_can_bridge.protocols.datamodel.standard_round import StandardRound
+from drive_can_bridge.protocols.datamodel.transactor import Procedure
 from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 

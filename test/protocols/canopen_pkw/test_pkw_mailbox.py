@@ -6,9 +6,9 @@ import pytest
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.canopen_pkw import pkw
-from drive_can_bridge.protocols.canopen_pkw.mailbox import (
-    Answered, MailboxTransactor, Refused, RegisterRead, RegisterWrite, Reply, Silence)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout
+from drive_can_bridge.protocols.canopen_pkw.transactor import (
+    Answered, MailboxTransactor, Refused, RegisterRead, RegisterWrite, Reply, Silence)
 
 REGISTER = Address(455)
 OBJECT = Address(0x2004, 0x06)

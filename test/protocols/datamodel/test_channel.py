@@ -9,7 +9,7 @@ from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Outbox
 from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.channel import Channel, Priority
-from drive_can_bridge.protocols.datamodel.channel import (
+from drive_can_bridge.protocols.datamodel.transactor import (
     ParameterRead, ParameterTransactor, ParameterWrite, Procedure, Words)
 
 
