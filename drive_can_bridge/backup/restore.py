@@ -25,7 +25,7 @@ from drive_can_bridge.backup.document import (
     Backup, Head, in_order, is_command, is_setting, is_whole, mode_bits, ModeBits, modes_of,
     raw_in_file)
 from drive_can_bridge.client.drive import Drive, Enabled, ReadOutcome, WriteOutcome
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import command_sentences, sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import RestoreStep
@@ -531,8 +531,8 @@ class Restorer:
             if self._lost and end is None:
                 end = self._clock() + PATIENCE
                 with suppress(OSError):
-                    self._hint(f'{self._drive.name}: answers no more; waiting up to '
-                               f'{PATIENCE:g} s for it, so that {self._aim}')
+                    self._hint(command_sentences.waiting_for_drive(
+                        drive=self._drive.name, patience=PATIENCE, aim=self._aim))
             del failed[already:]
             self._wait(_PATIENCE_STEP)
 

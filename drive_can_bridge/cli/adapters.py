@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from drive_can_bridge.cli.command import complain, print_json, say
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.found_adapters import ask_libraries, FoundAdapter, of_host
 from drive_can_bridge.transport.known_adapters import NOT_ON_LINUX, Row, ROWS
@@ -90,11 +91,9 @@ def run(args: Namespace) -> int:
             for line in _lines(each):
                 say(line)
     for interface in silent:
-        complain(f'drive_can adapters: {interface}: its library does not come back')
+        complain(command_sentences.library_hangs(interface=interface))
     if not found:
-        complain('drive_can adapters: none found: no CAN interface of the kernel, no serial port, '
-                 'nothing that the libraries of makers know; a gateway that does not announce '
-                 'itself is not found (docs/adapters.md)')
+        complain(command_sentences.no_adapters())
     return 0
 
 

@@ -14,6 +14,7 @@ from drive_can_bridge.cli.drives import (
     add_words, by_short_names, chosen, complete_drives, opened, read_all, source_of, unread)
 from drive_can_bridge.cli.output import may_overwrite, write_atomically
 from drive_can_bridge.client.drive import Drive
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
@@ -87,14 +88,14 @@ def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
         folder, files = path, {name: path / f'{name}{SUFFIX}' for name in names}
         above = folder.parent if not folder.exists() else folder
     elif len(names) > 1:
-        raise WrongUsage(f'{len(names)} drives ({", ".join(names)}) do not go into one file: '
-                         f'write -o {wanted}/')
+        raise WrongUsage(command_sentences.one_file_for_several(
+            count=len(names), names=', '.join(names), wanted=wanted))
     else:
         above, files = path.parent, {names[0]: path}
     if not above.is_dir():
-        raise DriveCanError(f'{above}: no such directory')
+        raise DriveCanError(command_sentences.no_directory_above(above=above))
     if not os.access(above, os.W_OK):
-        raise DriveCanError(f'{above}: cannot be written to')
+        raise DriveCanError(command_sentences.not_writable(above=above))
     return files
 
 
@@ -122,28 +123,29 @@ def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any
         if low <= raw <= high:
             settings.append((parameter, raw))
         else:   # it could not be written back
-            useless.append((name, f'the drive has {outcome.value}, the profile allows '
-                                  f'{parameter.range_text}'))
+            useless.append((name, command_sentences.beyond_profile(
+                value=outcome.value, allowed=parameter.range_text)))
     for name, reason in useless:
-        complain(f'warning: {drive.name}: {name} is left out: {reason}')
+        complain(command_sentences.setting_left_out(drive=drive.name, name=name, reason=reason))
     for line in unread(drive, [each for each in outcomes.values() if not each.absent]):
         complain(line)
     if absent:
         named = ', '.join(absent[:NAMED_MAX]) + ', …' * (len(absent) > NAMED_MAX)
         in_profile = counted(len(names), 'setting')
-        have_not = (f'{drive.name}: does not have {len(absent)} of the {in_profile} of '
-                    f'{printable(drive.facts.profile)} ({named})')
+        have_not = (command_sentences.drive_has_not_all(
+            drive=drive.name, absent=len(absent), settings=in_profile,
+            profile=printable(drive.facts.profile), named=named))
         if 2 * len(absent) > len(names):
-            complain(f'{have_not}: is this its profile? No file was written')
+            complain(command_sentences.other_profile(have_not=have_not))
             return None
         complain(f'{have_not}: left out')
     if missing and not args.partial:
         advice = ('' if not settings else '; --partial writes one without '
                   f'{"it" if len(missing) == 1 else "them"}')
-        complain(f'{drive.name}: no file was written{advice}')
+        complain(command_sentences.no_file_written(drive=drive.name, advice=advice))
         return None
     if not settings:
-        complain(f'{drive.name}: has no settings that could be written to a file')
+        complain(command_sentences.no_settings(drive=drive.name))
         return None
     left_out = [*missing, *useless]
     made_at = datetime.fromtimestamp(1e-9 * args.clock.stamp(), timezone.utc)

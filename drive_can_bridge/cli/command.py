@@ -20,6 +20,7 @@ from typing import NoReturn, TYPE_CHECKING, TypeVar
 
 from drive_can_bridge.cli.saying import (
     FAILED as FAILED, print_json as print_json, say as say)
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.text import is_ros_name, printable
 
@@ -71,7 +72,8 @@ def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:
     :raises WrongUsage: it cannot.
     """
     if not (yes or sys.stdin.isatty()):
-        raise WrongUsage(f'{otherwise}: nobody can be asked here; --yes {yes_means}')
+        raise WrongUsage(command_sentences.nobody_can_be_asked(
+            otherwise=otherwise, yes_means=yes_means))
 
 
 def agreed(question: str, *, yes: bool, otherwise: str, yes_means: str) -> bool:
@@ -98,9 +100,9 @@ def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise WrongUsage(f'{who} needs --yes where nobody can be asked')
+        raise WrongUsage(command_sentences.needs_yes(who=who))
     if not answered(question):
-        raise WrongUsage('nothing was sent')
+        raise WrongUsage(command_sentences.nothing_was_sent())
 
 
 def answered(question: str) -> bool:
@@ -119,7 +121,7 @@ def above_zero(text: str) -> float:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise ArgumentTypeError(f'{text}: allowed is a number above 0')
+        raise ArgumentTypeError(command_sentences.number_above_zero(text=text))
     return value
 
 
@@ -128,7 +130,7 @@ def bitrate(text: str) -> int:
     found = re.fullmatch(r'([0-9]+(?:\.[0-9]+)?)([kKmM]?)(?:bit/s)?', text.strip())
     value = float(found[1]) * {'': 1.0, 'k': 1e3, 'm': 1e6}[found[2].lower()] if found else 0.0
     if not 1000 <= value <= 8e6:
-        raise ArgumentTypeError(f'{text}: allowed are 1000 to 8000000 bit/s, also as 500k')
+        raise ArgumentTypeError(command_sentences.bitrate_wanted(text=text))
     return round(value)
 
 
@@ -136,7 +138,8 @@ def whole(low: int, high: int) -> Callable[[str], int]:
     """Return what reads an integer within limits."""
     def read(text: str) -> int:
         if not (text.isdecimal() and low <= int(text) <= high):
-            raise ArgumentTypeError(f'{text}: allowed are {low} to {high}')
+            raise ArgumentTypeError(command_sentences.number_between(
+                text=text, low=low, high=high))
         return int(text)
     return read
 
@@ -144,7 +147,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 def output(text: str) -> str:
     """Read the name of a file, or directory, that is written; its last slash matters to some."""
     if text in ('', '-'):
-        raise ArgumentTypeError(f'{text!r} names no file')
+        raise ArgumentTypeError(command_sentences.names_no_file(text=repr(text)))
     if text == '/dev/stdout':   # descriptor 1 is not ours where libraries write to it
         return f'/dev/fd/{sys.stdout.fileno()}'
     return text
@@ -159,7 +162,7 @@ def namespace(text: str) -> str:
     """Read ``/cell1``, or ``cell1``; '' for the root."""
     name = f'/{text.strip("/")}'
     if name != '/' and not is_ros_name(name):
-        raise ArgumentTypeError(f'{text!r} is no namespace, write /cell1')
+        raise ArgumentTypeError(command_sentences.no_namespace(text=repr(text)))
     return name if name != '/' else ''
 
 
@@ -204,7 +207,7 @@ def only_through_a_bridge(args: Namespace) -> None:
     :raises WrongUsage: there is one.
     """
     if args.params_file is not None:
-        raise WrongUsage('goes through the running bridge: leave --params-file away')
+        raise WrongUsage(command_sentences.through_bridge_only())
 
 
 def add_seconds(parser: ArgumentParser) -> None:
@@ -224,10 +227,11 @@ def of_drive(option: str, text: str, configuration: 'BridgeConfiguration',
     """
     name, found, rest = text.partition(sign)
     if not found:
-        raise WrongUsage(f'{option} {text}: write {_EXAMPLES[option]}')
+        raise WrongUsage(command_sentences.option_written_so(
+            option=option, text=text, example=_EXAMPLES[option]))
     if name not in configuration.drives:
-        raise WrongUsage(f"{option} {text}: no drive '{name}'; drives: "
-                         f"{', '.join(configuration.drives) or 'none'}")
+        raise WrongUsage(command_sentences.option_names_no_drive(
+            option=option, text=text, name=name, drives=', '.join(configuration.drives) or 'none'))
     try:
         return name, parse(rest)
     except ValueRefused as error:

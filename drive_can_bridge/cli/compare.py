@@ -19,6 +19,7 @@ from drive_can_bridge.cli.output import print_table
 from drive_can_bridge.client.drive import Drive, Drives, ReadOutcome
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.profiles import ProfileStore
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import ConfigurationError, DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import Profile
@@ -165,8 +166,8 @@ def run(args: Namespace) -> int:
         first.settings.keys() & second.settings.keys() or args.json)
     few = min(counts) <= _FEW
     if alien:
-        say(f'{" and ".join(args.words)} have no setting in common ({counts[0]} and {counts[1]}): '
-            'they are of different drive types'
+        say(command_sentences.nothing_in_common(
+                words=' and '.join(args.words), one=counts[0], other=counts[1])
             + (', or all names of one are misspelt' if few else ''))
     if few or not alien:
         _show(args, found)
@@ -176,7 +177,7 @@ def run(args: Namespace) -> int:
 def _sides_of(args: Namespace) -> list[Side]:
     words = args.words
     if len(words) != 2:
-        raise WrongUsage(f'{" ".join(words)}: allowed are two, A and B')
+        raise WrongUsage(command_sentences.two_wanted(words=' '.join(words)))
     for place, word in enumerate(words):
         if _is_drive(args, word):
             words[place:place + 1] = by_short_names(args, [word])
@@ -196,8 +197,8 @@ def _sides_of(args: Namespace) -> list[Side]:
         if side.left_out:
             names = ', '.join(side.left_out[:_NAMED_MAX])
             more = ', …' if len(side.left_out) > _NAMED_MAX else ''
-            complain(f'{word}: left out, because no settings: {len(side.left_out)} '
-                     f'values ({names}{more})')
+            complain(command_sentences.no_settings_left_out(
+                word=word, count=len(side.left_out), names=names, more=more))
     return sides
 
 
@@ -259,9 +260,9 @@ def _file_alone(backup: Backup, profile: Profile | None) -> Side:
 def _tell_profile(backup: Backup, drive: Drive) -> None:
     head = backup.head
     if head.profile_sha256 and head.profile_sha256 != drive.facts.profile_sha256:
-        complain(f'warning: {backup.file} was made with another profile '
-                 f'({printable(head.profile)}) than the one of {drive.name} '
-                 f'({drive.facts.profile})')
+        complain(command_sentences.backup_of_other_profile(
+            file=backup.file, profile=printable(head.profile), drive=drive.name,
+            its=drive.facts.profile))
 
 
 def _show(args: Namespace, found: Sequence[Difference]) -> None:

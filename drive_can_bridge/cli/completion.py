@@ -8,6 +8,7 @@ The shell starts the command with what has been typed so far in the environment.
 from argparse import ArgumentParser, Namespace
 import os
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 
 SHELLS = ('bash', 'zsh', 'fish', 'tcsh')
@@ -31,8 +32,7 @@ def run(args: Namespace) -> int:
     try:
         import argcomplete
     except ImportError:
-        raise DriveCanError('the Python module argcomplete is not installed: python3-argcomplete, '
-                            "or the extra 'completion' of this package") from None
+        raise DriveCanError(command_sentences.argcomplete_missing()) from None
     print(argcomplete.shellcode(['drive_can'], shell=args.shell))
     return 0
 

@@ -13,6 +13,7 @@ from typing import Any
 from drive_can_bridge.cli.command import (
     add_words_for_a_bridge, complain, only_through_a_bridge, WrongUsage)
 from drive_can_bridge.cli.stopping import answers, show
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.bridges import chosen_drives, UnknownDrive
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern
@@ -124,7 +125,7 @@ def _check(args: Namespace) -> None:
     if args.subcommand in ('enable', 'reset'):
         for word in args.words:
             if is_pattern(word):
-                raise WrongUsage(f'{word!r}: takes full names, no patterns')
+                raise WrongUsage(command_sentences.full_names_only(word=repr(word)))
 
 
 def _stop(args: Namespace) -> int:

@@ -13,6 +13,7 @@ import sys
 from drive_can_bridge.cli.command import add_params_file, add_seconds, complain, FAILED, WrongUsage
 from drive_can_bridge.cli.record import Taps
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import Record
@@ -82,20 +83,19 @@ def run(args: Namespace) -> int:
         args.file = args.plot.pop()
         args.plot = args.plot or None
     if (args.file is None) is not args.live or args.plot == []:
-        raise WrongUsage('give a trace file, or --live')
+        raise WrongUsage(command_sentences.trace_or_live())
     configuration = configuration_from_file(args.params_file)
     unknown = [name for name in args.drive
                if not is_pattern(name) and name not in configuration.drives]
     if unknown:
-        raise WrongUsage(f'--drive {unknown[0]}: no such drive; drives: '
-                         f'{", ".join(configuration.drives) or "none"}')
+        raise WrongUsage(command_sentences.filter_names_no_drive(
+            drive=unknown[0], drives=', '.join(configuration.drives) or 'none'))
     meant = _meant(args, configuration)
     taken = _written_over(args)
     if taken is not None:
-        raise WrongUsage(f'{taken}: is read, and would be written over, choose another name')
+        raise WrongUsage(command_sentences.would_write_over(file=taken))
     if args.plot and not Path(args.plot[0]).suffix:
-        raise WrongUsage(f'--plot {args.plot[0]}: its suffix says what is written: .png, .svg, '
-                         '.pdf, …')
+        raise WrongUsage(command_sentences.plot_suffix(plot=args.plot[0]))
     if not args.live and args.file != '-':      # before a file is replaced
         try:
             check_readable(Path(args.file))
@@ -107,7 +107,7 @@ def run(args: Namespace) -> int:
     first = next(records, None)
     if first is None and not args.live:
         complaints.conclude()
-        complain(f'{args.file}: there is no frame in it')
+        complain(command_sentences.trace_empty(file=args.file))
         return FAILED
     channels = Channels(list(configuration.buses.values()), meant, complain)
     if args.file is not None and Path(args.file).is_file():     # a pipe is read only once
@@ -128,7 +128,7 @@ def run(args: Namespace) -> int:
                     take(record)
             complaints.conclude()
             for each in channels.missing():
-                complain(f'--bus {each}: the trace has no such channel')
+                complain(command_sentences.no_such_channel(bus=each))
         tracer.finish()
         for ending in endings:
             ending()
@@ -142,18 +142,18 @@ def _meant(args: Namespace, configuration: BridgeConfiguration) -> dict[str, str
     :raises WrongUsage: of no bus, of one twice, one for two, or of no trace.
     """
     if args.bus and args.live:
-        raise WrongUsage('--bus: of a trace only')
+        raise WrongUsage(command_sentences.bus_of_trace_only())
     found: dict[str, str] = {}
     for given in args.bus:
         name, sign, channel = given.partition('=')
         if not (sign and channel):
-            raise WrongUsage(f'--bus {given}: give NAME=CHANNEL')
+            raise WrongUsage(command_sentences.bus_and_channel(given=given))
         if name not in configuration.buses:
-            raise WrongUsage(f'--bus {given}: no such bus; buses: '
-                             f'{", ".join(configuration.buses)}')
+            raise WrongUsage(command_sentences.no_such_bus(
+                given=given, buses=', '.join(configuration.buses)))
         if name in found or channel in found.values():
-            raise WrongUsage(f'--bus {given}: this {"bus" if name in found else "channel"} is '
-                             'given twice')
+            raise WrongUsage(command_sentences.bus_given_twice(
+                given=given, what='bus' if name in found else 'channel'))
         found[name] = channel
     return found
 
@@ -233,13 +233,13 @@ def _draw(plotter: Plotter, path: str) -> None:
     try:
         plotter.draw(path)
     except ImportError:
-        raise DriveCanError('drive_can decode: --plot needs the Python module matplotlib (package '
-                            f"python3-matplotlib, or {command_that_brings('plot')})") from None
+        raise DriveCanError(command_sentences.matplotlib_missing(
+            command=command_that_brings('plot'))) from None
     except OSError as error:
         error.filename = path
         raise
     except ValueError as error:     # a suffix that matplotlib does not know
-        raise DriveCanError(f'drive_can decode: --plot {path}: {error}') from None
+        raise DriveCanError(command_sentences.plot_failed(path=path, error=error)) from None
 
 
 def _summarise(tracer: Tracer, wanted: Callable[[str], bool], *, as_json: bool) -> None:
@@ -270,12 +270,13 @@ class _Complaints:
     def conclude(self) -> None:
         """Tell how many more there were."""
         if self._more:
-            complain(f'{self._name}: {self._more} more like that')
+            complain(command_sentences.more_like_that(name=self._name, count=self._more))
 
 
 def _only(text: str) -> set[Only]:
     known = {only.value: only for only in Only}
     wrong = [word for word in text.split(',') if word not in known]
     if wrong:
-        raise ArgumentTypeError(f'{wrong[0]!r} is unknown; known are {", ".join(known)}')
+        raise ArgumentTypeError(command_sentences.word_unknown(
+            word=repr(wrong[0]), known=', '.join(known)))
     return {known[word] for word in text.split(',')}

@@ -22,6 +22,7 @@ from threading import Event
 
 from drive_can_bridge.cli.command import above_zero, of_drive, whole, WrongUsage
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.demo.child import Child
@@ -198,7 +199,7 @@ class Demo:
             if watcher.wait(_LOOK_PERIOD / 4) is not None:
                 return False
             if self._drives.code is not None or self._clock.now() > deadline:
-                raise DriveCanError(f'{TITLE}: the simulated drives did not start')
+                raise DriveCanError(command_sentences.drives_not_started(title=TITLE))
         self._bridge = self._start('the bridge', 'drive_can_bridge', '--ros-args',
                                    '--params-file', str(file))
         if args.drive:
@@ -248,7 +249,8 @@ class Demo:
             if process is not None:
                 process.ask_to_end(signum)
                 if not process.wait(patience):
-                    self._say(f'{process.what} did not end in {patience:g} s and was killed')
+                    self._say(command_sentences.process_killed(
+                        what=process.what, patience=patience))
         if view is not None and not view.ends(_VIEW_PATIENCE):
             view.ask_to_end()
         for child in self._children:
@@ -287,10 +289,9 @@ class Demo:
             if self._live:
                 sys.stdout.write(_RESTORE)
                 sys.stdout.flush()
-            self._say(f'the view has ended ({child.end}); bridge and drives run on until Ctrl-C, '
-                      f'and drive_can monitor shows them')
+            self._say(command_sentences.view_ended(end=child.end))
         elif not (self._live and self._view is not None and self._view.code is None):
-            self._say(f'{child.what} has ended ({child.end}); the others run on until Ctrl-C')
+            self._say(command_sentences.process_ended(what=child.what, end=child.end))
 
     def _say(self, text: str) -> None:
         print(f'{TITLE}: {text}', file=sys.stderr, flush=True)

@@ -17,6 +17,7 @@ from drive_can_bridge.cli.output import counting, waiting
 from drive_can_bridge.client import find_source
 from drive_can_bridge.client.drive import Drive, Drives, DriveSource, ReadOutcome
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.resources import what_is_missing
 
@@ -54,9 +55,9 @@ def source_of(args: Namespace) -> Iterator[DriveSource]:
     :raises DriveCanError: the file is wrong, no bridge, no ROS.
     """
     if args.params_file is not None and args.namespace is not None:
-        raise WrongUsage('--namespace is of a running bridge, --params-file goes without one')
+        raise WrongUsage(command_sentences.namespace_with_file())
     if args.params_file is None and args.nmt_start:
-        raise WrongUsage('--nmt-start goes with --params-file: a bridge starts its nodes itself')
+        raise WrongUsage(command_sentences.nmt_start_with_bridge())
     try:
         source = find_source(
             args.params_file, namespace=args.namespace, nmt_start=args.nmt_start,
@@ -89,8 +90,8 @@ def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
             with suppress(ArgumentTypeError):   # else it is none, which is said with all there are
                 where = namespace(place)
                 if args.namespace not in (None, where):
-                    raise WrongUsage(f'{word}: is not in namespace {args.namespace or "/"}, and '
-                                     'one bridge is asked at a time')
+                    raise WrongUsage(command_sentences.other_namespace(
+                        word=word, namespace=args.namespace or '/'))
                 args.namespace, word = where, name
         found.append(word)
     return found
@@ -111,7 +112,8 @@ def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], 
         return matching(names, words[0]), list(words[1:])
     if len(names) != 1:
         said = f'{words[0]!r} is none. ' if words else ''
-        raise WrongUsage(f'which drive? {said}There are: {", ".join(names) or "none"}')
+        raise WrongUsage(command_sentences.which_drive(
+            said=said, there=', '.join(names) or 'none'))
     return list(names), list(words)
 
 
@@ -124,11 +126,11 @@ def chosen(names: Sequence[str], words: Sequence[str]) -> list[str]:
     there = f'there are: {", ".join(names) or "none"}'
     if not words:
         if len(names) != 1:
-            raise WrongUsage(f"which drive? '*' means all; {there}")
+            raise WrongUsage(command_sentences.which_drives(there=there))
         return list(names)
     for word in words:
         if not matching(names, word):
-            raise WrongUsage(f'no drive {word!r}; {there}')
+            raise WrongUsage(command_sentences.no_drive_of_word(word=repr(word), there=there))
     return [name for name in names if any(name in matching(names, word) for word in words)]
 
 
@@ -140,7 +142,7 @@ def chosen_one(names: Sequence[str], word: str) -> str:
     """
     found = chosen(names, [word])
     if len(found) > 1:
-        raise WrongUsage(f'{word!r} names several drives: {", ".join(found)}')
+        raise WrongUsage(command_sentences.names_several(word=repr(word), found=', '.join(found)))
     return found[0]
 
 
@@ -161,8 +163,8 @@ def unread(drive: Drive, outcomes: Iterable[ReadOutcome]) -> list[str]:
     found = list(outcomes)
     wrong = [outcome for outcome in found if not outcome.ok]
     if 1 < len(wrong) == len(found) and len({outcome.reason for outcome in wrong}) == 1:
-        return [f'{drive.name}: nothing could be read: {wrong[0].reason}']
-    return [f'{drive.name}: {outcome.name} could not be read: {outcome.reason}'
+        return [command_sentences.nothing_read_from(drive=drive.name, reason=wrong[0].reason)]
+    return [command_sentences.not_read(drive=drive.name, name=outcome.name, reason=outcome.reason)
             for outcome in wrong]
 
 

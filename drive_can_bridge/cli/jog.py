@@ -12,6 +12,7 @@ from drive_can_bridge.cli.command import (
     above_zero, add_words_for_a_bridge, agreed, complain, FAILED, must_be_answerable,
     only_through_a_bridge, print_json, say, WrongUsage)
 from drive_can_bridge.cli.output import waiting
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError, WhichBridge
 from drive_can_bridge.core.text import is_pattern, printable
 from drive_can_bridge.process.signals import Interruption, NOT_SUSPENDED, postponed
@@ -46,7 +47,7 @@ def define(parser: ArgumentParser) -> None:
 def _seconds(text: str) -> float:
     value = above_zero(text)
     if value > _LONGEST:
-        raise ArgumentTypeError(f'{text}: allowed are up to {_LONGEST:g} s')
+        raise ArgumentTypeError(command_sentences.seconds_at_most(text=text, most=_LONGEST))
     return value
 
 
@@ -92,15 +93,15 @@ def _understood(args: Namespace) -> tuple[str, str | None, str]:
     """
     only_through_a_bridge(args)
     if len(args.words) not in (2, 3):
-        raise WrongUsage('write DRIVE VALUE, or DRIVE NAME VALUE')
+        raise WrongUsage(command_sentences.jog_words())
     drive, value = args.words[0], args.words[-1]
     if is_pattern(drive):
-        raise WrongUsage(f'{drive!r}: takes a full name, no patterns')
+        raise WrongUsage(command_sentences.full_name_only(drive=repr(drive)))
     if value.lower() not in ('true', 'false'):
         try:
             float(value)
         except ValueError:
-            raise WrongUsage(f'{value!r} is no value: write a number, or true or false') from None
+            raise WrongUsage(command_sentences.no_number_or_bool(value=repr(value))) from None
     return drive, args.words[1] if len(args.words) == 3 else None, value
 
 

@@ -22,6 +22,7 @@ from drive_can_bridge import __version__
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import nearest
 from drive_can_bridge.process.beginning import (
@@ -205,11 +206,11 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
         complain(f'{prefix}: {place}{error.strerror or error}')
         return failed
     except ImportError as error:
-        complain(f'{prefix}: this needs a Python module that is not installed: '
-                 f'{error.name or error}')
+        complain(command_sentences.module_missing(command=prefix, module=error.name or error))
         return failed
     except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
-        complain(f'{prefix}: internal error, please report it: {type(error).__name__}: {error}')
+        complain(command_sentences.internal_error_of_command(
+            command=prefix, kind=type(error).__name__, text=error))
         return failed
     finally:
         if argv is None and endless:  # all is done; Python takes a moment to leave
@@ -259,7 +260,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     complete(parser)
     if arguments[:1] == [wanted] and wanted not in parsers:
         near = nearest(wanted, SUBCOMMANDS)
-        parser.error(f'there is no subcommand {wanted!r}'
+        parser.error(command_sentences.no_subcommand(word=repr(wanted))
                      + (f', did you mean {near}?' if near else ''))
     args, rest = parser.parse_known_args(arguments)
     # answers every question, also where none is asked

@@ -11,6 +11,7 @@ import socket
 import sys
 
 from drive_can_bridge.cli.command import namespace, whole
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.process import environment
@@ -70,8 +71,8 @@ def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
         from drive_can_bridge.panel.pages import application, PanelSetting
         from drive_can_bridge.panel.server import address, listen, serve
     except ImportError as error:
-        raise DriveCanError(f'{COMMAND}: the Python module {error.name} is not installed: '
-                            f"{command_that_brings('panel')}") from error
+        raise DriveCanError(command_sentences.extra_missing(
+            command=COMMAND, module=error.name, how=command_that_brings('panel'))) from error
     if ended():
         return False
     listener = listen(args.host, args.port)

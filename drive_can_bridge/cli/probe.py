@@ -12,6 +12,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.drives import chosen, split_words
 from drive_can_bridge.cli.output import print_table, waiting
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration,
@@ -103,7 +104,8 @@ class Asker:
                 if frame is not None and question.answers(frame):
                     return frame
         if refusal is not None:
-            raise TransportError(f'bus {self._bus.name}: {refusal}: no other node acknowledges')
+            raise TransportError(command_sentences.probe_unacknowledged(
+                bus=self._bus.name, error=refusal))
         if question.quiet:
             self.listen(question.quiet)
         return None

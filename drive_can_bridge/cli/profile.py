@@ -15,6 +15,7 @@ from drive_can_bridge.cli.command import (
 from drive_can_bridge.cli.output import differs, print_table, write_atomically
 from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.profiles.catalogue import (
     available, build_profile, Built, check, Checked, description, find, ImportFailed,
@@ -270,8 +271,7 @@ def _import(args: Namespace) -> int:
     except WrongColumns as error:
         raise WrongUsage(str(error)) from None
     if args.json and args.output is None:
-        raise WrongUsage('--json says on standard output what became of the file: say where the '
-                         'profile goes with -o FILE')
+        raise WrongUsage(command_sentences.json_wants_file())
     if not args.json:
         for each in (*(f' {note}' for note in built.notes), *built.left_out):
             complain(f'{args.file}:{each}')
@@ -299,10 +299,10 @@ def _protocols(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(',') if name.strip())
     for name in names:
         if name not in FAMILIES:
-            raise WrongUsage(f"--protocols: '{name}' is unknown, there are: "
-                             f'{", ".join(FAMILIES)}')
+            raise WrongUsage(command_sentences.protocol_unknown(
+                word=name, there=', '.join(FAMILIES)))
     if len(set(names)) < len(names):
-        raise WrongUsage('--protocols: one of them stands twice')
+        raise WrongUsage(command_sentences.protocol_twice())
     return names
 
 
@@ -337,8 +337,8 @@ def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
         if kind == 'eds' or kind != 'csv' and _EDS_HEAD.search(text):
             found = read_eds(text, protocols, axis=axis, force=force)
         elif axis is not None or force:
-            raise WrongUsage(f'{"--force" if axis is None else "--axis"} is for EDS and DCF '
-                             f'files, and {path} is none')
+            raise WrongUsage(command_sentences.option_of_eds(
+                option='--force' if axis is None else '--axis', file=path))
         else:
             found = read_table(text, columns, sign, protocols)
         return build_profile(found, path.name, description=description, protocols=protocols)
@@ -360,13 +360,11 @@ def columns_from_option(text: str) -> dict[str, str]:
     for part in parts:
         column, sign, heading = (each.strip() for each in part.partition('='))
         if column not in COLUMNS:
-            raise WrongUsage(f"--columns: '{column}' is no column, there are: "
-                             f'{", ".join(COLUMNS)}')
+            raise WrongUsage(command_sentences.no_column(word=column, there=', '.join(COLUMNS)))
         if not sign:
-            raise WrongUsage(f'--columns: {column} has no heading, allowed is '
-                             f'{column}=HEADING')
+            raise WrongUsage(command_sentences.column_without_heading(column=column))
         if column in found:
-            raise WrongUsage(f'--columns: {column} stands twice')
+            raise WrongUsage(command_sentences.column_twice(column=column))
         found[column] = heading
     return found
 
@@ -388,9 +386,9 @@ def _decoded(data: bytes) -> str:
         text = data.decode(encoding or 'utf-8')
     except UnicodeDecodeError as error:
         if encoding:
-            raise ImportFailed(f'begins like {encoding} text and is none: byte {error.start} '
-                               f'({error.reason})') from None
+            raise ImportFailed(command_sentences.no_such_text(
+                encoding=encoding, byte=error.start, reason=error.reason)) from None
         text = ''.join(bytes((byte,)).decode('cp1252', 'ignore') or chr(byte) for byte in data)
     if '\0' in text:
-        raise ImportFailed('is no text: it contains NUL characters')
+        raise ImportFailed(command_sentences.no_text())
     return text.replace('\r\n', '\n').replace('\r', '\n')

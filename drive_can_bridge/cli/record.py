@@ -14,6 +14,7 @@ from drive_can_bridge.cli.command import (
     WrongUsage)
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, Record, RecordKind, STUFFING
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -74,8 +75,7 @@ class Taps:
         for tap in self.taps:
             tap.close()
             if tap.lost:
-                complain(f'bus {tap.bus.name}: {tap.lost} frames lost: this machine is too slow '
-                         f'for the traffic')
+                complain(command_sentences.record_lost(bus=tap.bus.name, lost=tap.lost))
         self._ownership.release()
 
 
@@ -123,11 +123,11 @@ def run(args: Namespace) -> int:
     except UnknownFormat as error:
         raise WrongUsage(str(error)) from None
     if args.wireshark and args.output.suffix.lower() != '.log':
-        raise WrongUsage(f'--wireshark: for .log, not {args.output.suffix}')
+        raise WrongUsage(command_sentences.wireshark_for_log(suffix=args.output.suffix))
     if args.wireshark:
-        complain('warning: --wireshark does not keep directions')
+        complain(command_sentences.wireshark_loses())
     for loss in LOSSES.get(args.output.suffix.lower(), ()):
-        complain(f'warning: {args.output.suffix} does not keep {loss}; .log does')
+        complain(command_sentences.suffix_loses(suffix=args.output.suffix, loss=loss))
     status = _Status(sys.stderr)
     with closing(Taps(configuration, args.clock)) as taps:      # before a file is replaced
         channels = labels(buses)

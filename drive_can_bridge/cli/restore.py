@@ -16,7 +16,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, DriveSource, Enabled, NOT_CONFIRMED
 from drive_can_bridge.clock import Clock
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import command_sentences, sentences
 from drive_can_bridge.core.codes import code_of
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.text import counted, printable, value_text
@@ -63,7 +63,7 @@ def run(args: Namespace) -> int:
     :raises OSError: the file cannot be read.
     """
     if len(args.words) > 2:
-        raise WrongUsage(f'{" ".join(args.words)}: allowed is FILE [DRIVE]')
+        raise WrongUsage(command_sentences.file_and_drive(words=' '.join(args.words)))
     file, word = [*args.words, None][:2]
     backup = read_backup(Path(file))
     if not args.dry_run:
@@ -90,8 +90,8 @@ def _target(backup: Backup, word: str | None, source: DriveSource) -> str:
         return source.names[0]
     of = (f'is of drive {printable(backup.drive)}, which is not here' if backup.drive
           else 'names no drive')
-    raise WrongUsage(f'{backup.file} {of}: say which one is meant; there are: '
-                     f'{", ".join(source.names) or "none"}')
+    raise WrongUsage(command_sentences.say_which_drive(
+        file=backup.file, of=of, there=', '.join(source.names) or 'none'))
 
 
 def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
@@ -107,14 +107,14 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
     if args.dry_run or not plan.changes:
         return FAILED if plan.absent and not args.dry_run else 0
     if drive.enabled() is Enabled.UNKNOWN:
-        complain(f'{drive.name}: whether it is enabled is not known; it should stand still')
+        complain(command_sentences.enabled_unknown(drive=drive.name))
     count = counted(len(plan.changes), 'setting')
     if not agreed(f'Write {count} to {drive.name}?', yes=args.yes,
                   otherwise=_NOTHING, yes_means='writes without asking'):
         return FAILED
     if drive.enabled() is Enabled.YES:      # since it was asked
         return _is_enabled(drive)
-    with postponed(lambda: complain(f'{drive.name}: ending after the write under way')) \
+    with postponed(lambda: complain(command_sentences.ending_after_write(drive=drive.name))) \
             as interrupted:
         with counting(f'writing {drive.name}', len(plan.changes), args.clock.now) as step:
             result = Restorer(drive, plan, stopped=lambda: bool(interrupted),
@@ -135,7 +135,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
     problems = problems_in(backup, drive)
     if problems:
         other = other_type(backup, drive)
-        complain(f'{backup.file}: of another drive type: {other}' if other else
+        complain(command_sentences.of_other_type(file=backup.file, other=other) if other else
                  '\n'.join(problems))
         return False
     identity = _identity(backup, drive, args.clock)
@@ -144,21 +144,20 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         for asked in read_all(drive, names_to_read(backup, drive)[:1],
                               args.clock).values():
             if asked.unheard:
-                complain(f'{drive.name}: nothing could be read: {asked.reason}\n{_NOTHING}.')
+                complain(command_sentences.nothing_read(
+                    drive=drive.name, reason=asked.reason, nothing=_NOTHING))
                 return False
     differing = strangers(backup, drive, identity)
     for text in differing:
         complain(f'{backup.file}: {text}')
     if differing and not (args.force or args.dry_run):
-        complain(f'{_NOTHING}; --force restores it all the same.')
+        complain(command_sentences.force_restores(nothing=_NOTHING))
         return False
     if says_nothing(backup.head):
-        complain(f'{backup.file}: does not say of which profile it is: whether it suits '
-                 f'{drive.name} is not checked')
+        complain(command_sentences.profile_not_said(file=backup.file, drive=drive.name))
     if drive.facts.restore is None and not args.force:
         complain(
-            f'{drive.name}: the bridge does not tell in which mode the drive takes settings; '
-            f'{_NOTHING.lower()}. --params-file goes without it, --force does not ask')
+            command_sentences.mode_not_told(drive=drive.name, nothing=_NOTHING.lower()))
         return False
     if drive.enabled() is Enabled.YES and not args.dry_run:
         _is_enabled(drive)
@@ -177,8 +176,7 @@ def _identity(backup: Backup, drive: Drive, clock: Clock) -> str:
 
 
 def _is_enabled(drive: Drive) -> int:
-    complain(f'{drive.name}: is enabled: settings are not written while it may move. Disable it '
-             f'first. {_NOTHING}.')
+    complain(command_sentences.restore_while_enabled(drive=drive.name, nothing=_NOTHING))
     return FAILED
 
 
@@ -208,13 +206,14 @@ def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> N
     for name in backup.values:
         why = why_left_alone(drive, name, include_protected=True)
         if why is not None and not is_setting(drive, name):
-            complain(f'{drive.name}: {name} is left alone: {why.text}')
+            complain(command_sentences.setting_left_alone(
+                drive=drive.name, name=name, why=why.text))
     if backup.without_value:
-        complain(f'{backup.file}: no value in it, left alone: '
-                 f'{_list(backup.without_value)}')
+        complain(command_sentences.no_value_in_backup(
+            file=backup.file, names=_list(backup.without_value)))
     if not plan.changes and not args.json:
-        say(f'{drive.name}: nothing to restore, {len(plan.same)} settings are as in '
-            f'{backup.file}')
+        say(command_sentences.nothing_to_restore(
+                drive=drive.name, same=len(plan.same), file=backup.file))
 
 
 def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreResult,
@@ -242,21 +241,24 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
                 if change.name in result.written and _is_volatile(drive, change.parameter)]
     stores = [step for step in result.steps if step.kind is StepKind.STORE]
     if volatile and not result.stored and not any(step.unknown for step in stores):
-        complain(f'{drive.name}: gone when it loses power: {_list(volatile)} '
-                 f'({_WHY_VOLATILE[drive.facts.persist_writes]})')
+        complain(command_sentences.gone_without_power(
+            drive=drive.name, names=_list(volatile),
+            why=_WHY_VOLATILE[drive.facts.persist_writes]))
     if result.trouble is not None:
         complain(f'{drive.name}: {result.trouble}')
     for name in result.unconfirmed:
         complain(f'{drive.name}: {name}: {NOT_CONFIRMED}')
     if result.stopped is not None:
         complain(
-            f'{drive.name}: {why}. Written: {_list(result.written)}. Not written: '
-            f'{_list(result.stopped)}. {"Disable it, then repeat" if result.enabled else "Repeat"}'
-            ' the command to go on')
+            command_sentences.restore_interrupted(
+                drive=drive.name, why=why, written=_list(result.written),
+                not_written=_list(result.stopped),
+                again='Disable it, then repeat' if result.enabled else 'Repeat'))
         return FAILED if result.enabled else interrupted.exit_code
     if wrong:
         confirmed = [name for name in result.written if name not in wrong]
-        complain(f'{drive.name}: confirmed: {_list(confirmed)}; not as in the file:')
+        complain(command_sentences.restore_incomplete(
+            drive=drive.name, confirmed=_list(confirmed)))
         for each in result.wrong:
             found = ('not there' if each in plan.absent else 'unknown' if each.found is None
                      else _with_unit(drive, each.name, each.found))
@@ -271,8 +273,9 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
         modes = [change.name for change in (*plan.changes, *plan.kept) if change.not_all
                  and change.wanted is not None and change.left_alone in (None, LeftAlone.MODE)]
         count = counted(len(plan.changes), 'setting')
-        say(f'{drive.name}: {count} written, {len(plan.words)} read '
-            f'back: as in the file{f", but for the mode in {_list(modes)}" if modes else ""}')
+        say(command_sentences.restored(
+                drive=drive.name, count=count, read=len(plan.words),
+                modes=f', but for the mode in {_list(modes)}' if modes else ''))
     return 0
 
 

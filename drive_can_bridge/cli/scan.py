@@ -25,6 +25,7 @@ from drive_can_bridge.cli.output import may_overwrite, waiting, write_atomically
 from drive_can_bridge.configuration.load import (
     configuration_from_file, configuration_from_overrides)
 from drive_can_bridge.configuration.scalars import read_scalar
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import (
     BusUnavailable, ConfigurationError, DriveCanError, TransportError)
@@ -137,7 +138,7 @@ class Survey:
             except (TransportError, BusUnavailable) as error:
                 refused += 1
                 if refused >= _REFUSED_MAX:
-                    self.trouble = f'{error}: no other node acknowledges'
+                    self.trouble = command_sentences.scan_unacknowledged(error=error)
 
     def _pause(self, frame: Frame) -> float:
         """Return s from a question to the next: both it and its answer count."""
@@ -321,13 +322,12 @@ def run(args: Namespace) -> int:
     bus = _bus(args)
     if args.bitrates:
         if args.output is not None:
-            raise WrongUsage('--bitrates only counts frames, there is nothing to write: leave -o '
-                             'away')
+            raise WrongUsage(command_sentences.bitrates_write_nothing())
         return _compare_bitrates(args, bus)
     if args.output is not None and args.output.is_dir():
-        raise DriveCanError(f'{args.output}: is a directory')
+        raise DriveCanError(command_sentences.is_a_directory(file=args.output))
     if args.output is not None and not args.output.parent.is_dir():
-        raise DriveCanError(f'{args.output.parent}: no such directory')
+        raise DriveCanError(command_sentences.no_directory_above(above=args.output.parent))
     if args.output is not None and not may_overwrite(
             (args.output, *tables_beside(args.output)), yes=args.yes,
             otherwise='Nothing was sent or written'):
@@ -349,7 +349,7 @@ def _bus(args: Namespace) -> BusConfiguration:
     keys = {'interface': args.interface, 'channel': args.channel, 'bitrate': args.bitrate}
     wrong = next((key for key in options if key in keys), None)
     if wrong is not None:
-        raise WrongUsage(f'--option {wrong}: there is --{wrong}')
+        raise WrongUsage(command_sentences.option_of_its_own(wrong=wrong, option=wrong))
     try:
         found = configuration_from_overrides(
             {f'buses.main.{key}': value for key, value in {**keys, **options}.items()},
@@ -377,12 +377,12 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
         finally:
             port.close()
     if survey.master:
-        complain(f'there is another master ({survey.master}): only listening')
+        complain(command_sentences.only_listening(master=survey.master))
     _tell_trouble(survey, port, asked=not args.passive)
     _show(args, survey)
     _tell_left_out(args, survey, asked)
     if args.output is not None and not survey.sightings:
-        complain(f'{args.output}: not written, no drive was found')
+        complain(command_sentences.no_file_without_drives(output=args.output))
     elif args.output is not None:
         for path in write_parameter_file(
                 args.output, bus, survey.sightings,
@@ -404,9 +404,8 @@ def _ask(args: Namespace, survey: Survey) -> list[str]:
             asked.append(name)
             survey.ask(name)
         if survey.forbidden(survey.scanners[name]):
-            complain(f'{name} is not asked: there is a CANopen node '
-                     f'({", ".join(map(str, survey.nodes))}), which might take its reads for '
-                     'process data')
+            complain(command_sentences.not_asked_beside_canopen(
+                name=name, nodes=', '.join(map(str, survey.nodes))))
     return asked
 
 
@@ -450,7 +449,7 @@ def _show(args: Namespace, survey: Survey) -> None:
     if rows:
         print('\n'.join(column_lines(_COLUMNS, rows, numbers=('station',))))
     else:
-        print(f'no drive found, {survey.frames} frames heard')
+        print(command_sentences.no_drive_found(frames=survey.frames))
 
 
 def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
@@ -458,11 +457,11 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
     if port.error_frames:
         error = port.last_error
         told = f': {error.text}; {error.advice}' if error is not None else ''
-        complain(f'{port.error_frames} error frames{told}')
+        complain(command_sentences.error_frames_seen(count=port.error_frames, told=told))
     if port.controller:
-        complain(f'the controller of this adapter is {port.controller}')
+        complain(command_sentences.controller_state(controller=port.controller))
     if survey.trouble:
-        complain(f'{survey.trouble}: check power, cable, termination and bit rate')
+        complain(command_sentences.scan_trouble(trouble=survey.trouble))
     elif not survey.frames and not port.error_frames:
         complain('nothing was heard: ' + (
             'no drive answers at this bit rate; check power, cable and termination, try '
@@ -472,8 +471,7 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
 
 def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
     if 'listen_only' not in (adapter_keywords(bus.interface) or ()):
-        raise WrongUsage(f'--bitrates: {bus.interface} has no listen-only mode here, and trying '
-                         'bit rates without it would disturb the bus')
+        raise WrongUsage(command_sentences.bitrates_need_listening(interface=bus.interface))
     heard = 0
     for rate in args.bitrates:
         with Ownership([(bus, ())], 'drive_can scan', END_FIRST):
@@ -489,8 +487,7 @@ def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:
               + ('' if not survey.sightings else ': ' + ', '.join(
                   f'{each.protocol} {each.station}' for each in survey.sightings)))
     if not heard:
-        complain('nothing was heard at any of these; drives speak when they are asked, so a '
-                 'master has to be running')
+        complain(command_sentences.nothing_at_any_rate())
     return 0 if heard else FAILED
 
 
@@ -498,15 +495,15 @@ def _protocols(text: str) -> list[str]:
     names = text.split(',')
     wrong: Sequence[str] = [name for name in names if name not in _NAMED]
     if wrong:
-        raise ArgumentTypeError(f'{wrong[0]!r}: allowed are {", ".join(_NAMED)}; the others are '
-                                'asked anyway')
+        raise ArgumentTypeError(command_sentences.scan_protocols(
+            word=repr(wrong[0]), allowed=', '.join(_NAMED)))
     return names
 
 
 def _option(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition('=')
     if not equals or re.fullmatch('[a-zA-Z_]+', key) is None:
-        raise ArgumentTypeError(f'{text!r}: allowed is KEY=VALUE')
+        raise ArgumentTypeError(command_sentences.key_and_value(text=repr(text)))
     return key, read_scalar(value)
 
 
@@ -514,5 +511,4 @@ def _bitrates(text: str) -> list[int]:
     try:
         return [bitrate(rate) for rate in text.split(',')]
     except ArgumentTypeError:
-        raise ArgumentTypeError(f'{text}: allowed are bit rates separated by commas, 1000 and '
-                                'above, also as 500k') from None
+        raise ArgumentTypeError(command_sentences.bitrates_wanted(text=text)) from None

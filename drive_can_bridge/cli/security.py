@@ -25,6 +25,7 @@ from xml.etree import ElementTree
 from drive_can_bridge.cli.command import namespace, output_path, whole
 from drive_can_bridge.cli.output import write_atomically
 from drive_can_bridge.configuration.load import configuration_from_file
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, DriveConfiguration
 from drive_can_bridge.process.fast_dds import MARK
 from drive_can_bridge.protocols.families import FAMILIES
@@ -285,4 +286,4 @@ def _address(text: str) -> str:
     try:
         return str(ipaddress.IPv4Address(text))
     except ValueError:
-        raise ArgumentTypeError(f'{text}: an IPv4 address is wanted') from None
+        raise ArgumentTypeError(command_sentences.ipv4_wanted(text=text)) from None

@@ -21,6 +21,7 @@ from typing import TextIO
 
 from drive_can_bridge.cli.command import add_params_file, bitrate, FAILED, of_drive, WrongUsage
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
@@ -68,8 +69,8 @@ class Console:
             for drive in self._drives.values():
                 told += describe(drive)[:1 if words == ['list'] else 2]
         elif words[0] not in self._drives:
-            self._complain(f"no drive '{words[0]}'; drives: {', '.join(self._drives)}; "
-                           f"also: status, list, help")
+            self._complain(command_sentences.no_simulated_drive(
+                word=words[0], drives=', '.join(self._drives)))
         elif len(words) == 1:
             told = describe(self._drives[words[0]])
         else:
@@ -189,7 +190,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         pty = args.pty or args.pty_link is not None
         if pty and (args.interface or args.channel):
-            raise WrongUsage('--pty and --interface/--channel exclude each other')
+            raise WrongUsage(command_sentences.pty_or_interface())
         unusable = check_interface(args.interface) if args.interface else None
         if unusable is not None:    # before the bus is announced
             raise BusMisconfigured(f'--interface: {unusable}')
@@ -292,8 +293,8 @@ def _servos(configuration: BridgeConfiguration, without: list[str], habit: list[
         for name in names:
             protocol = configuration.drives[name].protocol
             if protocol != CIA402:
-                raise WrongUsage(f'{option} {name}: it is a drive of {protocol}, '
-                                 f'allowed are those of {CIA402}')
+                raise WrongUsage(command_sentences.option_of_other_family(
+                    option=option, name=name, protocol=protocol, allowed=CIA402))
     return Servos(taken, habits)
 
 
@@ -307,10 +308,10 @@ def _objects(text: str) -> frozenset[tuple[int, int | None]]:
     for part in text.split(','):
         match = _OBJECT.fullmatch(part.strip())
         if match is None:
-            raise ValueRefused(f"'{part.strip()}' is no object; write 6007h or 1800h.05h")
+            raise ValueRefused(command_sentences.no_object_written(part=part.strip()))
         index, subindex = int(match[1], 16), int(match[2], 16) if match[2] else None
         if index in (CONTROL_WORD, STATUS_WORD):
-            raise ValueRefused(f'{index:04X}h: without it there is no drive')
+            raise ValueRefused(command_sentences.no_drive_without(index=index))
         found.add((index, subindex))
     return frozenset(found)
 
@@ -376,8 +377,7 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel
     if len({bus.wire for bus in buses.values()}) < len(apart):
         given = ' '.join(option for option, value in (('--interface', interface),
                                                       ('--channel', channel)) if value is not None)
-        raise WrongUsage(f'{given} puts the buses {", ".join(buses)} on one: use --pty, or a '
-                         f'parameter file with one bus')
+        raise WrongUsage(command_sentences.buses_on_one(given=given, buses=', '.join(buses)))
     return replace(configuration, buses=buses)
 
 

@@ -13,6 +13,7 @@ from drive_can_bridge.cli.drives import (
 from drive_can_bridge.cli.output import counting, print_table
 from drive_can_bridge.client.drive import Drive, Drives, ENDED_BEFORE, WriteOutcome
 from drive_can_bridge.configuration.scalars import read_scalar
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import NoAnswer
 from drive_can_bridge.core.parameters import Parameter, Storage, Value, ValueKind
 from drive_can_bridge.core.requests import FailureKind
@@ -21,7 +22,7 @@ from drive_can_bridge.protocols.storing import STORING
 _HEADINGS = ('drive', 'name', 'value', 'unit', 'number', 'storage', 'result')
 #: of the names that a value may have
 _NAMES_SHOWN = 12
-_OTHER_REFUSED = 'another value of this command is refused'
+_OTHER_REFUSED = command_sentences.other_value_refused()
 #: octal to parameter files, and decimal to most people
 _AMBIGUOUS = re.compile(r'\s*[+-]?0[0-9]')
 
@@ -71,12 +72,12 @@ def _assignments(words: Sequence[str]) -> dict[str, str]:
     for word in words:
         name, separator, text = word.partition('=')
         if not separator or not name or not text:
-            raise WrongUsage(f'{word!r}: allowed is NAME=VALUE; nothing was written')
+            raise WrongUsage(command_sentences.name_and_value(word=repr(word)))
         if name in wanted:
-            raise WrongUsage(f'{name} stands twice; nothing was written')
+            raise WrongUsage(command_sentences.name_twice(name=name))
         wanted[name] = text
     if not wanted:
-        raise WrongUsage('what is to be written? NAME=VALUE is missing')
+        raise WrongUsage(command_sentences.value_missing())
     return wanted
 
 

@@ -4,12 +4,14 @@
 from types import ModuleType
 
 from drive_can_bridge.core import (
-    bus_sentences, complaints, frame_sentences, host_sentences, messages, sentences)
+    bus_sentences, command_sentences, complaints, frame_sentences, host_sentences, messages,
+    sentences)
 from drive_can_bridge.core.messages import Sentence, Text
 
-#: the modules of rows, by what they are about; a code stands once in each of these parts
+#: the modules of rows, by what they are about; a code stands once, and may be one of files, too
 MODULES: dict[str, tuple[ModuleType, ...]] = {
     'drives and buses': (sentences, bus_sentences, frame_sentences, host_sentences),
+    'commands': (command_sentences,),
     'files': (complaints,),
 }
 CODES: dict[str, dict[str, Text]] = {

@@ -19,6 +19,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from drive_can_bridge.clock import Clock, SteadyClock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import (
     ends_before_stop, may_still_be_running, profiles_not_read, profiles_not_there,
@@ -78,8 +79,8 @@ def _code_of(work: Callable[[], int]) -> int:
     except ImportError as error:
         return _complain(what_is_missing('drive_can_bridge', error))
     except Exception as error:  # noqa: BLE001  no traceback ever reaches a user
-        return _complain('drive_can_bridge: internal error, please report it: '
-                         f'{type(error).__name__}: {error}')
+        return _complain(command_sentences.internal_error_of_bridge(
+            kind=type(error).__name__, text=error))
 
 
 def _complain(text: str) -> int:

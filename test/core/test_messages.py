@@ -114,9 +114,9 @@ def test_every_row_has_words_and_advice_and_stands_once(module: ModuleType) -> N
 
 
 def test_a_code_stands_in_one_module() -> None:
-    for modules in MODULES.values():
-        codes = [code for module in modules for code in module.CODES]
-        assert len(codes) == len(set(codes))
+    codes = [code for about, modules in MODULES.items() if about != 'files'
+             for module in modules for code in module.CODES]
+    assert sorted(codes) == sorted(set(codes))
 
 
 @cache

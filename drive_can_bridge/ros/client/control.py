@@ -15,7 +15,7 @@ from rclpy.type_support import check_is_valid_srv_type
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from drive_can_bridge.core import host_sentences
+from drive_can_bridge.core import command_sentences, host_sentences
 from drive_can_bridge.core.bridges import is_some
 from drive_can_bridge.process.local_stop import (
     Answer, does_not_answer, may_match, stop_answer, STOP_TIMEOUT, twins)
@@ -82,8 +82,8 @@ class _Stopping:
             if self._online is not None:
                 self.answer = stop_answer(self.node, True, said, self._online)
             elif now - self._since > _ONLINE_TIMEOUT:
-                self.answer = Answer(self.node, False, f'{said or "stopped"}; nobody says whether '
-                                                       'it is online')
+                self.answer = Answer(self.node, False, command_sentences.online_unknown(
+                    said=said or 'stopped'))
 
     def _take_online(self, message: Bool) -> None:
         self._online = message.data
