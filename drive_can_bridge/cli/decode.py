@@ -127,6 +127,8 @@ def run(args: Namespace) -> int:
                 for record in chain((first,), records):
                     take(record)
             complaints.conclude()
+            for line in channels.left_over():
+                complain(line)
             for each in channels.missing():
                 complain(command_sentences.no_such_channel(bus=each))
         tracer.finish()

@@ -126,6 +126,23 @@ class Channels:
         self._known |= self._adopted is None
         return named or self._at(channel)
 
+    def left_over(self) -> list[str]:
+        """
+        Return what is to be said of channels with names that are those of no bus.
+
+        At the end: a bus whose channel comes later is none that could be meant.
+        """
+        free = [bus.name for bus in self._buses
+                if bus.name not in self._meant and bus not in self._found.values()]
+        return [self._no_bus(channel, free) for channel, bus in self._found.items()
+                if free and bus is None and channel and isinstance(channel, str)]
+
+    @staticmethod
+    def _no_bus(channel: str | int, names: Iterable[str]) -> str:
+        shown = printable(str(channel))
+        return (f'channel {shown}: no bus of the parameter file; if it is one, give '
+                + ' or '.join(f'--bus {name}={shown}' for name in names))
+
     def missing(self) -> list[str]:
         """Return what the user meant that is not in the trace, as it was given."""
         found = {str(channel) for channel in self._found}
@@ -156,8 +173,7 @@ class Channels:
                 self._tell(f'channel {channel}: bus {bus.name}')
                 return bus
         if others:
-            self._tell(f'channel {channel}: no bus of the parameter file; if it is one, give '
-                       + ' or '.join(f'--bus {bus.name}={channel}' for bus in others))
+            self._tell(self._no_bus(channel, (bus.name for bus in others)))
         return None
 
     def _ambiguous(self, channels: Iterable[str | int]) -> DriveCanError:

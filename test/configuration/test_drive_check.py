@@ -69,9 +69,9 @@ KEYS = [
     ('period: 0.02', 'period: 0.004', 'period',
      says('period_too_fast', period=0.004, least=0.005)),
     ('period: 0.02', 'period: 0.0001', 'period',
-     says('out_of_range', value=0.0001, allowed='a number of 0.001 to 60')),
+     says('out_of_range', value=0.0001, allowed='a number of 0.001 to 65.535')),
     ('period: 0.02', 'period: .inf', 'period',
-     says('not_finite', value=math.inf, allowed='a number of 0.001 to 60')),
+     says('not_finite', value=math.inf, allowed='a number of 0.001 to 65.535')),
     ('rearm: neutral', 'zzz: 1', 'zzz',
      says('unknown_key',
           hint=says('allowed', words=(

@@ -60,7 +60,7 @@ def test_good(good: dict[str, Any]) -> None:
     ('drives.conveyor.station', b'\x01',
      [at('drives.conveyor.station', 'wrong_kind', kind='a bytes', allowed='an integer')]),
     ('drives.conveyor.period', float('nan'),
-     [at('drives.conveyor.period', 'not_finite', allowed='a number of 0.001 to 60')]),
+     [at('drives.conveyor.period', 'not_finite', allowed='a number of 0.001 to 65.535')]),
     *[('memory_limit_mb', value, [at('memory_limit_mb', code, **{
         'allowed': 'an integer of 128 to 1048576, or 0 for no limit', **fields})])
       for value, code, fields in (

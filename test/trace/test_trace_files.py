@@ -598,6 +598,25 @@ def test_what_the_user_says_of_channels(
     assert channels.missing() == missing
 
 
+@pytest.mark.parametrize(('meant', 'trace', 'told'), [
+    ({}, ['can7'], ['channel can7: no bus of the parameter file; if it is one, give '
+                    '--bus main=can7 or --bus aux=can7']),
+    # whose channel comes later is not meant
+    ({}, ['can7', 'can1', ''], ['channel can7: no bus of the parameter file; if it is one, give '
+                                '--bus main=can7']),
+    ({'main': 'can2'}, ['can7', 'can2'], [
+        'channel can7: no bus of the parameter file; if it is one, give --bus aux=can7']),
+    ({}, ['can0', 'can7', 'can1'], []),     # every bus is another one
+    ({}, ['can0', 'can1'], []),
+])
+def test_a_name_that_is_left_over(
+        meant: dict[str, str], trace: list[str], told: list[str]) -> None:
+    channels = Channels([bus('main', 'can0'), bus('aux', 'can1')], meant)
+    for each in trace:
+        channels.find(each)
+    assert channels.left_over() == told
+
+
 def test_what_the_user_says_of_the_one_bus() -> None:
     channels = Channels([MAIN], {'main': '3'})
     channels.look_ahead([1, 2, 3])
