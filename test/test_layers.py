@@ -48,7 +48,7 @@ INTERNAL: dict[str, set[str]] = {
     'ros.client': {'', 'clock', 'core', 'process', 'ros.rcl', 'ros.recognition'},
     'ros.rcl': {'', 'core'},
     'ros.monitor': {
-        '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.recognition'},
+        '', 'core', 'monitor', 'ros.client', 'ros.messages', 'ros.rcl', 'ros.recognition'},
     'ros.demo': {
         '', 'core', 'configuration', 'process', 'simulation', 'monitor', 'ros', 'ros.monitor',
         'ros.rcl'},
@@ -60,7 +60,7 @@ INTERNAL: dict[str, set[str]] = {
     'client.bridge': {'', 'core', 'client.drive', 'client.way'},
     'client.jog': {
         '', 'core', 'client.bridge', 'client.ros_way', 'ros.client', 'ros.messages',
-        'ros.recognition'},
+        'ros.rcl', 'ros.recognition'},
     'client': {
         '', 'clock', 'core', 'configuration', 'protocols', 'transport', 'exchange', 'process',
         'client.bridge', 'client.drive', 'client.local', 'client.ros_way'},

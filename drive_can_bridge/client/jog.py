@@ -27,9 +27,10 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.parameters import Parameter, Value, ValueKind
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.ros.client.calls import (
-    Inbox, latched_quality, NewestPublisher, NodeCalls, undemanding_quality)
+    Inbox, NewestPublisher, NodeCalls, undemanding_quality)
 from drive_can_bridge.ros.client.search import find_drives, Graph
 from drive_can_bridge.ros.messages import drive_value, value_of
+from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import namespace_of
 
 #: commands a second, and how many of them at least within ``command_timeout``

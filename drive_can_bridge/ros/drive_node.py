@@ -35,10 +35,11 @@ from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
 from drive_can_bridge.ros.log import FEW, Log
-from drive_can_bridge.ros.middleware import latched_quality, publisher, quality_overrides
+from drive_can_bridge.ros.middleware import publisher, quality_overrides
 from drive_can_bridge.ros.parameter_services import ParameterServices
 from drive_can_bridge.ros.polled_topics import PolledTopics
 from drive_can_bridge.ros.rcl.extension import GONE
+from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import (

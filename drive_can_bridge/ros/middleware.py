@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.parameter import Parameter as NodeParameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from drive_can_bridge.ros.rcl.nodes import overrides
@@ -21,12 +21,6 @@ _OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIAB
 def state_quality() -> QoSProfile:
     """Return what suits values once per exchange: reliable, a short history."""
     return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-
-
-def latched_quality() -> QoSProfile:
-    """Return what suits values published on change: late joiners get the last one."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def command_quality() -> QoSProfile:

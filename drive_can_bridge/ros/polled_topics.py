@@ -34,7 +34,7 @@ from drive_can_bridge.ros.rcl.incoming import Incoming, subscribe
 
 #: messages that are taken at once where everything is kept, and that are thrown away at once: more
 #: than any middleware keeps (Fast DDS: 5000), since what is left would pass for fresh
-DEPTH_UNBOUNDED, KEPT_MAX = 1000, 100_000
+DEPTH_UNBOUNDED, WAITING_MAX = 1000, 100_000
 #: bytes of a message that are looked at: a JointState of a thousand joints with long names
 LENGTH_MAX = 1 << 20
 #: bytes in front of every message: how the rest is encoded
@@ -85,7 +85,7 @@ class CommandTopic:
         quality = subscription.qos_profile
         bounded = quality.history is HistoryPolicy.KEEP_LAST
         self._depth = (quality.depth if bounded else DEPTH_UNBOUNDED) or 1
-        self._waiting_max = self._depth if bounded else KEPT_MAX
+        self._waiting_max = self._depth if bounded else WAITING_MAX
         self._use, self._old = use, old
         self._aged = aged
         self._unreadable = unreadable

@@ -22,9 +22,9 @@ from drive_can_bridge.core.continuous import ContinuousPosition
 from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.sentences import position_began_again
-from drive_can_bridge.ros.middleware import (
-    Audience, COUNT_PERIOD, latched_quality, publisher, state_quality)
+from drive_can_bridge.ros.middleware import Audience, COUNT_PERIOD, publisher, state_quality
 from drive_can_bridge.ros.prepared import NUMBER_CODES, PreparedMessage
+from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.stamps import Stamp, Stamps
 from drive_can_bridge.ros.values import parameter_value, TOPIC_TYPES, VALUE_FIELDS
 

@@ -171,9 +171,9 @@ def test_never_the_value_again_after_a_standstill(bridge: StartBridge, run: Run,
             stalled.append(len(published))
             found._published_at -= 5.0
         judge(found, now)
-    judge, send = jog.Jog._judge, jog.Outbox.publish
+    judge, send = jog.Jog._judge, jog.NewestPublisher.publish
     monkeypatch.setattr(jog.Jog, '_judge', stall)
-    monkeypatch.setattr(jog.Outbox, 'publish', publish)
+    monkeypatch.setattr(jog.NewestPublisher, 'publish', publish)
     code, _, errors = run('jog', 'lift', '300', '--yes')
     assert code == 1 and 'this process stood still for 5.' in errors
     assert set(published[stalled[0]:]) == {0.0} and 300.0 in published

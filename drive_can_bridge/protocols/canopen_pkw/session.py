@@ -427,9 +427,8 @@ class PkwSession(Session):
 
     @property
     def offline_advice(self) -> Sentence:
-        advice = super().offline_advice
-        return advice if self.defect else self._heard.instead_of(
-            advice, self._node, self._channel.now)
+        return self.defect or self._heard.instead_of(
+            self.report.advice, self._node, self._channel.now)
 
     # -- timer ------------------------------------------------------------------------------------
 

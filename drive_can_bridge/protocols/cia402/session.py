@@ -456,9 +456,8 @@ class Cia402Session(Session):
 
     @property
     def offline_advice(self) -> Sentence:
-        advice = super().offline_advice
-        return advice if self.defect else self._heard.instead_of(
-            advice, self._node, self._channel.now)
+        return self.defect or self._heard.instead_of(
+            self.report.advice, self._node, self._channel.now)
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
         """Take one PDO of a set. The fast path of the reader."""

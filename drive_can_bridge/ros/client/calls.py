@@ -438,12 +438,6 @@ def newest_quality() -> QoSProfile:
     return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def latched_quality() -> QoSProfile:
-    """Return what suits states that are published on change."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
 def log_quality() -> QoSProfile:
     """Return what suits ``/rosout``: what was said shortly before we came, too."""
     return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.RELIABLE,

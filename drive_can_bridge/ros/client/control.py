@@ -22,11 +22,10 @@ from drive_can_bridge.process.local_stop import (
 from drive_can_bridge.process.local_way import meant
 from drive_can_bridge.process.orders import CONTROL_TIMEOUT, SERVICES, unanswered, unoffered
 from drive_can_bridge.process.presence import Present, short
-from drive_can_bridge.ros.client.calls import (
-    HasEnd, Inbox, latched_quality, NodeCalls, OFFER_TIMEOUT, Service)
+from drive_can_bridge.ros.client.calls import HasEnd, Inbox, NodeCalls, OFFER_TIMEOUT, Service
 from drive_can_bridge.ros.client.foreign import why_not
-from drive_can_bridge.ros.client.search import (
-    find_bridges, find_drives, Graph, Search, Seeing)
+from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph, Search, Seeing
+from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
 #: s after which a drive is told to stop once more: DDS may lose an answer

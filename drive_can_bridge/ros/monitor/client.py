@@ -29,12 +29,12 @@ from drive_can_bridge.monitor.model import Model
 from drive_can_bridge.monitor.snapshot import OperationOutcome, Place, Status, StopAction
 from drive_can_bridge.monitor.values import BUDGET, ParameterInfo, SamplingPlan
 from drive_can_bridge.ros.client.calls import (
-    ClientNode, HasEnd, Inbox, latched_quality, log_quality, newest_quality, NodeCalls, Service,
-)
+    ClientNode, HasEnd, Inbox, log_quality, newest_quality, NodeCalls, Service)
 from drive_can_bridge.ros.client.control import CONTROL_TIMEOUT, STOP_AGAIN, STOP_TIMEOUT
 from drive_can_bridge.ros.client.foreign import why_not
 from drive_can_bridge.ros.messages import (
     drive_value, facts_of, limits_of, parameter_message, plain)
+from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import bridges_among, drives_among
 
 _KINDS = {ParameterType.PARAMETER_BOOL: ValueKind.BOOL,

@@ -88,11 +88,29 @@ class PublicEnd:
         self._node.destroy_node()
 
 
+class _Arrivals:
+    """What has come and waits to be taken, the oldest first; with ``kept`` so many at most."""
+
+    def __init__(self, end: PublicEnd, kept: int | None = None) -> None:
+        self._end = end
+        self._waiting: deque[Any] = deque(maxlen=kept)
+
+    def add(self, found: Any) -> None:
+        self._end.came()
+        self._waiting.append(found)
+
+    def take(self) -> Any:
+        if not self._waiting:
+            self._end.spin()
+        return self._waiting.popleft() if self._waiting else None
+
+
 class _PublicAsking:
     def __init__(self, end: PublicEnd, node: Node, client: Client) -> None:
-        self._end, self._node, self._client = end, node, client
+        self._node, self._client = node, client
         self._number = 0
-        self._answers: deque[tuple[int, Any]] = deque()
+        self._answers = _Arrivals(end)
+        self.take = self._answers.take
 
     @property
     def ready(self) -> bool:
@@ -103,15 +121,9 @@ class _PublicAsking:
         number = self._number
 
         def done(future: Future) -> None:
-            self._end.came()
-            self._answers.append((number, future.result()))
+            self._answers.add((number, future.result()))
         self._client.call_async(request).add_done_callback(done)
         return number
-
-    def take(self) -> tuple[int, Any] | None:
-        if not self._answers:
-            self._end.spin()
-        return self._answers.popleft() if self._answers else None
 
     def close(self) -> None:
         self._node.destroy_client(self._client)
@@ -120,19 +132,11 @@ class _PublicAsking:
 class _PublicReading:
     def __init__(self, end: PublicEnd, node: Node, kind: Any, topic: str,
                  quality: QoSProfile) -> None:
-        self._end, self._node = end, node
-        self._came: deque[Any] = deque(maxlen=quality.depth or None)
+        self._node = node
+        messages = _Arrivals(end, quality.depth or None)
+        self.take = messages.take
         self._subscription: Subscription = node.create_subscription(
-            kind, topic, self._take, quality)
-
-    def _take(self, message: Any) -> None:
-        self._end.came()
-        self._came.append(message)
-
-    def take(self) -> Any:
-        if not self._came:
-            self._end.spin()
-        return self._came.popleft() if self._came else None
+            kind, topic, messages.add, quality)
 
     def close(self) -> None:
         self._node.destroy_subscription(self._subscription)
