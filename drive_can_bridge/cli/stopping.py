@@ -82,7 +82,7 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
                    bridge=True)
             for each in local.unheard
             if each.domain != local.domain or each.name not in heard] + local.answers()
-    named = {answer.name for answer in told if answer.bridge}
+    named = {answer.name for answer in told if answer.bridge} | local.spared
     told += [answer for answer in through.answers(local.present)
              if not answer.bridge or short(answer.name) not in named]
     known = {*local.known, *through.seen}

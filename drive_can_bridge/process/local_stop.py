@@ -301,11 +301,21 @@ class LocalStop:
     @property
     def unheard(self) -> list[Present]:
         """The bridges of this host that have not said who they are, and may be meant."""
+        return [present for present in self._silent() if self._may_be_meant(present)]
+
+    @property
+    def spared(self) -> set[str]:
+        """Names of those of which others know that they have no drive that is meant."""
+        return {present.name for present in self._silent()
+                if present.domain == self.domain and not self._may_be_meant(present)}
+
+    def _silent(self) -> list[Present]:
+        return [each.present for each in self._told if not each.here]
+
+    def _may_be_meant(self, present: Present) -> bool:
         known = set(self.drives)
-        around = [node for each in self.known.values() for node in each.around
-                  if node not in known]
-        return [each.present for each in self._told
-                if not each.here and may_match(each.present, around, self._words)]
+        return may_match(present, [node for each in self.known.values() for node in each.around
+                                   if node not in known], self._words)
 
     def answers(self) -> list[Answer]:
         """Return what became of drives, and of bridges that others see."""

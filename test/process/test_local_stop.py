@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from drive_can_bridge.cli.stopping import answers, WithoutRos
 from drive_can_bridge.process import local_stop
-from drive_can_bridge.process.local_stop import LocalStop
+from drive_can_bridge.process.local_stop import Answer, LocalStop
 from drive_can_bridge.process.presence import Present
 
 BRIDGE = Present(1, 0, '/bridge', 1)
@@ -217,3 +218,31 @@ def test_one_that_dies_in_the_answer_has_stopped_what_it_said(
     assert stop.look(0.0)
     assert [(answer.name, answer.ok, answer.text) for answer in stop.answers()] == [
         ('/lift', True, 'ready'), ('/hoist', False, 'no answer: may still be running')]
+
+
+@pytest.mark.parametrize(('word', 'named'), [('/lift', False), ('/drive1', True), ('/d*', True)])
+def test_one_that_hangs_is_named_where_a_drive_of_it_may_be_meant(
+        monkeypatch: pytest.MonkeyPatch, word: str, named: bool) -> None:
+    """What others know of it counts, whatever ROS has found out until then."""
+    other = BRIDGE._replace(process=2, name='/other', locks=2)
+    said = [['drives', '/lift'], ['around', '/drive1', '/drive3'],
+            ['bridge', '/bridge', '0', '/bridge', '/other'], ['end']]
+    host = Host(monkeypatch, lambda _: said)
+    monkeypatch.setattr(local_stop, 'bridges', lambda: [BRIDGE, other])
+
+    def line(present: Present) -> Any:
+        found = Line(host)
+        if present == other:
+            found.ask = lambda *_: None     # type: ignore[method-assign]
+        return found
+    monkeypatch.setattr(local_stop, 'Line', line)
+
+    class Ros(WithoutRos):
+        seen = ('/other',)
+
+        def answers(self, present: object = ()) -> list[Answer]:
+            return [Answer('/other', False, 'it does not answer', bridge=True)]
+    stop = LocalStop(None, [word])
+    assert looked(stop, 0.1, 1.2) == [False, True]
+    found = [answer.name for answer in answers(stop, Ros(), None, [word]) if answer.bridge]
+    assert found == ['/other'] * named
