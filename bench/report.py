@@ -251,6 +251,27 @@ def busy_hand_figures(found: dict[str, Any]) -> list[Figure]:
                    max(found['done']) if not found['failed'] else math.inf, 1.0)]
 
 
+def attacked_hand_figures(found: dict[str, Any]) -> list[Figure]:
+    """Tell what others who do harm by the local way cost the exchange, and a hand."""
+    calm = found['calm']
+    figures = []
+    for kind, what in (('talk', 'nonsense by the local way, half of it of another user'),
+                       ('call', '200 callers at once for a stop, and 200 of another user')):
+        each = found[kind]
+        failed = f', {each["failed"]} failed' if each['failed'] else ''
+        figures += [
+            Figure(f'period error under {what}, p99', f'{1e3 * p99(each["period_errors"]):.3f} ms',
+                   f'the same processes compute: {1e3 * p99(calm["period_errors"]):.3f} ms',
+                   p99(each['period_errors']) / p99(calm['period_errors']), 1.25),
+            Figure('the same: exchanges missed', f'{each["missed"]} of {each["exchanges"]}',
+                   f'{calm["missed"]} of {calm["exchanges"]}; {each["said"]} things were said',
+                   each['missed'] / each['exchanges'] - calm['missed'] / calm['exchanges'], 0.001),
+            Figure('the same: `drive_can stop` to its end', f'{_spread(each["stops"])}{failed}',
+                   _spread(calm['stops']), math.inf if failed else (
+                       median(each['stops']) / median(calm['stops'])), 1.5)]
+    return figures
+
+
 def backup_figures(found: dict[str, Any]) -> list[Figure]:
     """How long a backup takes, and what a bridge misses while one is made through it."""
     runs = sorted(found['backups'], key=lambda each: each['elapsed'] / each['spent'])
@@ -412,6 +433,7 @@ FIGURES: dict[str, Callable[[Any], list[Figure]]] = {
     'latency': latency_figures, 'service': service_figures,
     'flood': flood_figures, 'stop': stop_figures, 'gateway': gateway_figures,
     'hand': hand_figures, 'hand hung': hung_hand_figures, 'hand busy': busy_hand_figures,
+    'hand attacked': attacked_hand_figures,
     'monitor': monitor_figures,
     'alone': alone_figures, 'panel': panel_figures, 'backup': backup_figures,
     'drives': drives_figures, 'builds': builds_figures, 'decode': decode_figures,

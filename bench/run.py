@@ -85,6 +85,8 @@ def plan(options: argparse.Namespace) -> dict[str, Callable[[], Any]]:
             Load(8, 0.01, subscribed=False, control=True), pace.commands)),
         'hand busy': lambda: own_network.run(lambda: scenarios.busy_hand(
             Load(8, 0.01, subscribed=False, control=True), 3 * pace.commands, pace.loops)),
+        'hand attacked': lambda: own_network.run(lambda: scenarios.attacked_hand(
+            Load(8, 0.01, subscribed=False, control=True), duration / 3, pace.rounds)),
         'backup': lambda: scenarios.backup(
             Load(8, 0.01, subscribed=False, settings=119), pace.backups),
         'drives': lambda: {number: scenarios.exchange(

@@ -28,6 +28,8 @@ from viewer import Viewer
 SETTLE = 2.0
 #: the program that a user types
 DRIVE_CAN = (sys.executable, '-m', 'drive_can_bridge.cli.start')
+#: a user whom no bridge trusts
+NOBODY = 65534
 #: a process that computes, until who started it has ended
 COMPUTES = 'import os; own = os.getppid()\nwhile os.getppid() == own: pass'
 REQUESTS = 'speed_setpoint, torque_limit, position_setpoint, digital_outputs'
@@ -599,6 +601,46 @@ def busy_hand(load: Load, commands: int, loops: int) -> dict[str, Any]:
             code, _ = typed(['nice', '-n', '10', *DRIVE_CAN, 'stop'])
             found['done'].append(time.monotonic() - begun)
             found['failed'] += code != 0
+    return found
+
+
+def attacked_hand(load: Load, duration: float, rounds: int) -> dict[str, Any]:
+    """
+    Measure the exchange while others do harm by the local way, and stops that a person types.
+
+    Without harm the same processes compute: in turn, so that the machine is the same.
+    """
+    found: dict[str, Any] = {kind: {'period_errors': [], 'missed': 0, 'exchanges': 0, 'stops': [],
+                                    'failed': 0, 'said': 0, 'answered': 0}
+                             for kind in ('calm', 'talk', 'call')}
+    with ExitStack() as stack:
+        bus = Bus(stack, load)
+        typed = Typed(stack)
+        with (bridge_under(load, bus) as bridge, child('attacker.py') as ours,
+              child('attacker.py', NOBODY) as strange):
+            typed([*DRIVE_CAN, 'stop'])     # compiles modules
+            for number in range(3 * rounds):
+                kind = list(found)[number % 3]
+                each = found[kind]
+                for attacker in (ours, strange):
+                    attacker.ask(kind)
+                bridge.clear()
+                until = time.monotonic() + duration
+                while time.monotonic() < until:
+                    begun = time.monotonic()
+                    code, _ = typed([*DRIVE_CAN, 'stop'])
+                    each['stops'].append(time.monotonic() - begun)
+                    each['failed'] += code != 0
+                    time.sleep(0.2)
+                result = bridge.result()
+                each['period_errors'] += result['period_errors']
+                each['missed'] += result['missed']
+                each['exchanges'] += result['exchanges']
+                for attacker in (ours, strange):
+                    said, answered = attacker.ask('calm')
+                    each['said'] += said
+                    each['answered'] += answered
+                time.sleep(1.0)
     return found
 
 
