@@ -72,6 +72,7 @@ def _take(browser: 'Browser', base: str, token: str, path: Path, address: str,  
     if patience > 30.0:     # the chart is full then
         browser.click('.chart-buttons button', '30 s')
     time.sleep(min(patience, care.wait))
+    browser.shows(r'lift\s+online\s+enabled')   # a busy machine may have lost it meanwhile
     browser.picture(path)
     browser.close()
 

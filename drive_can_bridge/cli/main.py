@@ -266,11 +266,20 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     # answers every question, also where none is asked
     rest = [word for word in rest if word != '--yes']
     if hasattr(args, 'words'):  # argparse takes positional arguments in one piece only
-        args.words += [word for word in rest if not word.startswith('-')]
-        rest = [word for word in rest if word.startswith('-')]
+        args.words += [word for word in rest if not _is_option(word)]
+        rest = [word for word in rest if _is_option(word)]
     if rest:
         parsers.get(wanted, parser).error(f'unrecognized arguments: {" ".join(rest)}')
     return module, args
+
+
+def _is_option(word: str) -> bool:
+    """Tell an option from a word; argparse takes ``-1e3`` and ``-inf`` for one."""
+    try:
+        float(word)
+    except ValueError:
+        return word.startswith('-')
+    return False
 
 
 def _run(arguments: list[str], clock: Clock, *, alone: bool) -> int:

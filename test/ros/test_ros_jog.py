@@ -9,6 +9,7 @@ from typing import Any
 from bridges import CONVEYOR, LIFT, parameters, StartBridge
 from clients import Client
 import pytest
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from drive_can_bridge.cli.main import main
@@ -83,6 +84,15 @@ def test_json(bridge: StartBridge, run: Run) -> None:
     (('crane', '300', '--yes'), 2, "no drive 'crane'; there are: lift"),
     (('lift', 'speed', '300', '--yes'), 1, 'speed cannot be commanded; there are: speed_setpoint'),
     (('lift', 'inf', '--yes'), 1, 'inf is not a finite number'),
+    (('lift', '-inf', '--yes'), 1, '-inf is not a finite number'),
+    (('lift', 'nan', '--yes'), 1, 'nan is not a finite number'),
+    (('lift', '-3001', '--yes'), 1, '-3001 is out of range: -3000 to 3000 rpm'),
+    (('lift', '-1e4', '--yes'), 1, '-10000 is out of range: -3000 to 3000 rpm'),
+    (('--yes', 'lift', '-1e4'), 1, '-10000 is out of range: -3000 to 3000 rpm'),
+    (('lift', '-x', '--yes'), 2, 'unrecognized arguments: -x'),
+    (('lift', '', '--yes'), 2, "'' is no value"),
+    (('lift', '300', '--yes', '--for', 'inf'), 2, 'inf: allowed is a number above 0'),
+    (('lift', '300', '--yes', '--for', 'long'), 2, 'long: allowed is a number above 0'),
     (('lift', '3001', '--yes'), 1, '3001 is out of range: -3000 to 3000 rpm'),
     (('lift', 'true', '--yes'), 1, 'True is a bool, not a number'),
 ])
@@ -112,6 +122,38 @@ def test_what_jog_must_not_move(bridge: StartBridge, run: Run, keys: dict[str, A
     one.online()
     code, lines, errors = run('jog', 'conveyor', *words, '--yes')
     assert (code, lines) == (1, []) and said in errors
+
+
+def test_a_position_is_not_for_jog(bridge: StartBridge, run: Run) -> None:
+    axis = {'bus': 'main', 'protocol': 'datamodel_extended', 'station': 1,
+            'profile': 'datamodel_axis_example', 'cyclic_request': ['position_setpoint'],
+            'cyclic_response': ['actual_position', 'status_word'], 'command_timeout': 2.0,
+            'missed_limit': 100, 'parameter_timeout': 2.0, 'control_timeout': 20.0}
+    one = bridge(parameters(axis=axis))
+    one.online()
+    assert run('enable', 'axis')[0] == 0
+    where = one.played['axis'].value('actual_position')
+    code, lines, errors = run('jog', 'axis', 'position_setpoint', '5', '--yes')
+    assert (code, lines) == (1, []) and errors.count('\n') == 1
+    assert 'position_setpoint is a position, and where it would go' in errors
+    assert '/axis/command/position_setpoint' in errors
+    assert one.played['axis'].value('actual_position') == where
+
+
+def test_a_drive_that_is_not_there_is_refused(bridge: StartBridge, run: Run) -> None:
+    bridge(parameters(lift=DRIVE), simulated=False)
+    code, lines, errors = run('jog', 'lift', '300', '--yes')
+    assert (code, lines) == (1, []) and 'is offline' in errors
+
+
+def test_somebody_who_commands_all_joints(bridge: StartBridge, client: Client, run: Run) -> None:
+    joint = {'name': 'lift', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint'}
+    enabled(bridge, run, joint=joint)
+    for topic in ('/lift/joint_command', '/drive_can_bridge/joint_commands'):
+        publisher = client.node.create_publisher(JointState, topic, 1)
+        code, lines, errors = run('jog', 'lift', '300', '--yes')
+        assert (code, lines) == (1, []) and topic in errors, errors
+        client.node.destroy_publisher(publisher)
 
 
 def test_somebody_else_commands_already(bridge: StartBridge, client: Client, run: Run) -> None:
