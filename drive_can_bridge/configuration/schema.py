@@ -30,6 +30,7 @@ from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.core.text import describe_type, value_text
+from drive_can_bridge.protocols.cia402.states import MODES
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 
@@ -96,7 +97,14 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
             # Called once per missing key, with all keys each time: name only this one.
             if f"'{key}'" in error.message:
                 option = error.schema.get('properties', {}).get(key)
-                yield here, complaints.missing(allowed=allowed(option)), here
+                theirs = complaints.called_otherwise(key, (
+                    str(each) for each in error.instance
+                    if each not in error.schema.get('properties', {})))
+                # where others are known, an unknown key says itself what it should be
+                plain = theirs is None or error.schema.get('additionalProperties') is False
+                yield here, complaints.missing(allowed=allowed(option)) if plain else (
+                    complaints.missing_called(allowed=allowed(option), theirs=theirs, ours=key)
+                ), here
     elif error.validator == 'additionalProperties':
         known = error.schema.get('properties', {})
         patterns = error.schema.get('patternProperties', ())
@@ -116,6 +124,10 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
         yield path, _message(error), path
 
 
+def _key_of(error: ValidationError) -> object:
+    return error.absolute_path[-1] if error.absolute_path else None
+
+
 def _message(error: ValidationError) -> Sentence:
     value, schema = error.instance, error.schema
     if error.validator == 'not' and 'errorMessage' in schema:
@@ -133,13 +145,24 @@ def _message(error: ValidationError) -> Sentence:
         if number is not None:
             return complaints.number_in_words(value=value, kind=kind, allowed=allowed(schema),
                                               number=value_text(number))
+        if isinstance(value, str) and re.fullmatch(r'[-+.0-9]+#.*', value):
+            return complaints.comment_without_space(
+                value=value, kind=kind, allowed=allowed(schema))
         if isinstance(value, (bool, int, float, str)):
             return complaints.wrong_type(value=value, kind=kind, allowed=allowed(schema))
         return complaints.wrong_kind(kind=kind, allowed=allowed(schema))
     if error.validator == 'enum':
         near = hint(value, schema['enum']) if isinstance(value, str) else NOTHING
+        numbered = _NUMBERED.get(value) if isinstance(value, int) else None
+        if numbered in schema['enum'] and _key_of(error) == 'mode':
+            near = complaints.near(word=numbered)
         return complaints.unknown_word(value=value, near=near, allowed=allowed(schema))
     if error.validator in ('minimum', 'maximum'):
+        kilo = 1000 * value
+        if (_key_of(error) == 'bitrate'
+                and schema.get('minimum', math.inf) <= kilo <= schema.get('maximum', -math.inf)):
+            return complaints.out_of_range_in_kilo(
+                value=value, allowed=allowed(schema), number=value_text(kilo))
         return complaints.out_of_range(value=value, allowed=allowed(schema))
     if error.validator == 'not':
         return complaints.useless(value=value)
@@ -153,9 +176,15 @@ def _message(error: ValidationError) -> Sentence:
         return complaints.empty_mapping()
     if error.validator == 'maxProperties':
         return complaints.too_many_entries(count=len(value), allowed=schema['maxProperties'])
+    if error.validator == 'pattern' and isinstance(value, str):
+        name = re.sub(r'[^a-z0-9]+', '_', value.lower()).strip('_')
+        if name and re.search(error.validator_value, name):
+            return complaints.wrong_name(value=value, allowed=allowed(schema), name=name)
     return complaints.wrong(value=value, allowed=allowed(schema))
 
 
+#: what 6060h calls the modes
+_NUMBERED = {mode.number: name for name, mode in MODES.items()}
 _NUMBER = re.compile(r'([0-9]+(?:\.[0-9]+)?) *([A-Za-z/]*)')
 _FACTORS = {'': 1.0, 's': 1.0, 'ms': 1e-3, 'us': 1e-6, 'bit/s': 1.0, **{
     f'{letter}{unit}': factor for letter, factor in (('k', 1e3), ('m', 1e6))

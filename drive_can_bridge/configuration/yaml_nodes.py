@@ -156,6 +156,10 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
     if 'nesting' in what:   # libyaml has a limit of its own since PyYAML 6.0.4
         return BrokenYaml(line, _TOO_DEEP)
+    if context.startswith('while scanning a quoted scalar'):
+        what += ' (a quote is not closed)'
+    elif context.startswith('while parsing a flow'):
+        what += ' (a bracket is not closed, or a comma is missing)'
     in_mapping = context.startswith('while parsing a block mapping')
     return BrokenYaml(line, complaints.indented_like_no_key(what=what) if in_mapping else
                       complaints.not_yaml(what=what))

@@ -34,6 +34,9 @@ to_be_imported = Text(
 
 # -- values and keys
 missing = Text('missing, allowed is {allowed}', do='add the key, with a value that is allowed')
+missing_called = Text(
+    'missing, allowed is {allowed}: {theirs} is called {ours} here',
+    do='call it as it is called here')
 unknown_key = Text(
     'unknown key, {hint}',
     do='write the key that is named, or leave yours out; docs/profiles.md and '
@@ -64,6 +67,15 @@ unknown_word = Text(
 out_of_range = Text(
     '{value!r} is out of range, allowed is {allowed}',
     do='write a value within the range')
+out_of_range_in_kilo = Text(
+    '{value!r} is out of range, allowed is {allowed}: it is in bit/s, {value} kbit/s are {number}',
+    do='write the bit rate in bit/s')
+comment_without_space = Text(
+    '{value!r} is {kind}, allowed is {allowed}: a comment needs a space before its #',
+    do='put a space before the #')
+wrong_name = Text(
+    '{value!r} is wrong, allowed is {allowed}: write {name}',
+    do='write a name like that')
 value_out_of_range = Text(
     '{value} is out of range, allowed is {least} to {most}{remark}',
     do='write a value within the range, or correct minimum and maximum in the profile')
@@ -709,6 +721,11 @@ _OURS: dict[str, list[str]] = {}
 for _our, _theirs in _OTHER_WORDS.items():
     for _their in _theirs.split():
         _OURS.setdefault(_their, []).append(_our)
+
+
+def called_otherwise(ours: str, written: Iterable[str]) -> str | None:
+    """Return what other stacks, or people, call what we call ``ours``, if it is there."""
+    return next((word for word in written if ours in _OURS.get(word.lower(), ())), None)
 
 
 def _meant(word: str, known: Iterable[str]) -> str | None:

@@ -57,7 +57,7 @@ CASES = [
      [at('f.yaml:6: buses.main.interface', 'word_as_bool', value=True, kind='a bool',
          allowed='a string')]),
     ('      main:\n', '      "ma in":\n',
-     [at('f.yaml:5: buses.ma in', 'wrong', value='ma in',
+     [at('f.yaml:5: buses.ma in', 'wrong_name', value='ma in', name='ma_in',
          allowed='a name of letters, digits, _ and -, at most 100 characters'),
       at('f.yaml:11: drives.conveyor.bus', 'unknown', name='main',
          hint=says('did_you_mean', word='ma in')),

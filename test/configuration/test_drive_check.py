@@ -151,13 +151,15 @@ def test_value_of_a_key(tmp_path: Path, line: str, found: says) -> None:
 
 
 # rcl cannot parse a remap rule for a node with __ in its name
-@pytest.mark.parametrize('name', ['Conveyor', 'conv__eyor', '1a', 'a\n', 'c' * 101])
-def test_name_of_a_drive(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(('name', 'meant'), [
+    ('Conveyor', 'conveyor'), ('conv__eyor', 'conv_eyor'), ('1a', ''), ('a\n', 'a'),
+    ('c' * 101, '')])
+def test_name_of_a_drive(tmp_path: Path, name: str, meant: str) -> None:
     text = changed(FILE, 'conveyor:', f'{json.dumps(name)}:')
     assert problems(tmp_path, text) == [
-        at(f'f.yaml:10: drives.{name}', 'wrong', value=name,
+        at(f'f.yaml:10: drives.{name}', 'wrong_name' if meant else 'wrong', value=name,
            allowed='a name of a-z, 0-9 and _ that begins with a letter and has no __, at most 100 '
-                   'characters')]
+                   'characters', **({'name': meant} if meant else {}))]
 
 
 def test_good_file(tmp_path: Path) -> None:

@@ -168,11 +168,12 @@ def test_problem(tmp_path: Path, tail: str, expected: list[str]) -> None:
 
 @pytest.mark.parametrize(('tail', 'line', 'what'), [
     ('    a: b: c\n', 4, 'mapping values are not allowed in this context'),
-    ('    a: "open\n    b: 1\n', 4, 'found unexpected end of stream'),
+    ('    a: "open\n    b: 1\n', 4, 'found unexpected end of stream (a quote is not closed)'),
     # where it begins, not where it is noticed
     ('    drives\n    a: 1\n', 4, "could not find expected ':'"),
     ('    a:\n      b: 1\n   c: 1\n', 6, 'did not find expected key'),
-    ('    a: [1\n    b: 1\n', 4, "did not find expected ',' or ']'"),
+    ('    a: [1\n    b: 1\n', 4,
+     "did not find expected ',' or ']' (a bracket is not closed, or a comma is missing)"),
     ('    a: @x\n', 4, 'found character that cannot start any token'),
 ])
 def test_broken_yaml(tmp_path: Path, tail: str, line: int, what: str) -> None:
