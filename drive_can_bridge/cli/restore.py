@@ -18,6 +18,7 @@ from drive_can_bridge.client.drive import Drive, DriveSource, Enabled, NOT_CONFI
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences, sentences
 from drive_can_bridge.core.codes import code_of
+from drive_can_bridge.core.messages import around
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
 from drive_can_bridge.core.text import counted, printable, value_text
 from drive_can_bridge.process.signals import Interruption, postponed
@@ -144,8 +145,9 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         for asked in read_all(drive, names_to_read(backup, drive)[:1],
                               args.clock).values():
             if asked.unheard:
-                complain(command_sentences.nothing_read(
-                    drive=drive.name, reason=asked.reason, nothing=_NOTHING))
+                complain(around(
+                    command_sentences.nothing_read_from(drive=drive.name, reason=asked.reason),
+                    behind=f'\n{_NOTHING}.'))
                 return False
     differing = strangers(backup, drive, identity)
     for text in differing:

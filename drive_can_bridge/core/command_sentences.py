@@ -220,9 +220,6 @@ setting_left_alone = Text('{drive}: {name} is left alone: {why}', do='what the r
 ending_after_write = Text(
     '{drive}: ending after the write under way',
     do='wait; it is verified first')
-nothing_read = Text(
-    '{drive}: nothing could be read: {reason}\n{nothing}.',
-    do='see diagnostics of the drive')
 nothing_read_from = Text(
     '{drive}: nothing could be read: {reason}',
     do='see diagnostics of the drive')
@@ -278,6 +275,227 @@ online_unknown = Text(
 internal_error_of_bridge = Text(
     'drive_can_bridge: internal error, please report it: {kind}: {text}',
     do='report it, with the log of the bridge')
+
+# -- traces: what is wrong with a file, and what a recorder says ----------------------------------
+trace_bytes_damaged = Text(
+    '{count} bytes are damaged',
+    do='nothing: the rest is read; record again where these matter')
+trace_object_short = Text(
+    'entry {number}: an object of type {kind} is too short',
+    do='nothing: the rest is read')
+trace_doubled = Text(
+    'frames that stand twice, going out and coming back (a capture of "any"): {count}; each is '
+    'taken once',
+    do='nothing: each counts once')
+scapy_missing = Text(
+    '{path}: {suffix} needs the Python module scapy (package python3-scapy, or pip install scapy)',
+    do='install it')
+packet_in_part = Text(
+    'entry {number}: a packet was captured in part',
+    do='record again with a larger snap length')
+times_added_up = Text(
+    'times are those since the line before (candump -t d): added up',
+    do='nothing, or record with candump -t a')
+no_time = Text('{word} is no time', do='correct that line, or record again')
+unknown_suffix = Text(
+    '{path}: no trace format has the suffix {suffix}; known are {known}, and .gz behind those of '
+    'text',
+    do='give it one of these suffixes, if it is of that format')
+trace_read_only = Text('a trace is read only')
+suffix_not_written = Text(
+    '{path}: no trace is written with the suffix {suffix}; known are {known}',
+    do='choose one of these')
+suffix_of_one_bus = Text(
+    '{path}: {suffix} does not tell buses apart, and there are {buses}; choose .log',
+    do='choose .log')
+no_candump_line = Text(
+    'neither a line of a candump log nor of its screen',
+    do='see whether it is a trace of candump')
+data_bytes_differ = Text(
+    '{found} data bytes instead of {wanted}',
+    do='correct that line, or record again')
+identifier_digits = Text(
+    'an identifier of {digits} digits',
+    do='correct that line, or record again')
+frames_not_written = Text('{count} frames are not written', do='see whether the disk is full')
+frames_in_a_line = Text('more than one frame in a line', do='correct that line, or record again')
+rest_not_unpacked = Text(
+    'the rest cannot be unpacked: {error}',
+    do='copy the file again: it is cut or damaged')
+rest_not_read = Text(
+    'the rest cannot be read: {failure}',
+    do='copy the file again: it is cut or damaged')
+no_db_entry = Text('entry {number}: no entry of a .db trace', do='nothing: the rest is read')
+recording_ended = Text('the recording has ended', do='activate the bridge')
+trace_written = Text(
+    'bus {bus}: trace of {reason}, {count} frames of the last {seconds:g} s: {path}',
+    do='read it: drive_can decode FILE')
+trace_without_frames = Text(
+    'bus {bus}: not a single frame in the last {seconds:g} s',
+    do='see whether the bus is up, and drives are on it')
+trace_too_soon = Text(
+    'one trace in {seconds:g} s at most; {other}',
+    do='wait, or use the one that it names')
+asammdf_missing = Text(
+    '{path}: .mf4 needs the Python module asammdf (pip install asammdf)',
+    do='install it')
+trc_without_columns = Text(
+    'version {version}, and no ;$COLUMNS= says where time, type, identifier and length are',
+    do="save it again by PEAK's program")
+trc_length_differs = Text(
+    'its length is {length}, and there are {found} data bytes',
+    do='nothing: the rest is read')
+trc_start_time = Text(
+    '$STARTTIME is no number of days: {value}',
+    do='correct that line, or save it again')
+nothing_to_plot = Text(
+    'nothing to plot: none of these values is in the trace',
+    do='name values that drive_can decode shows of this trace')
+plot_names_no_drive = Text("--plot {text}: no drive '{drive}'; drives: {drives}")
+plot_names_no_value = Text(
+    "--plot {text}: {drive} has no '{name}'",
+    do='use a name of cyclic_request or cyclic_response of that drive')
+time_goes_back = Text(
+    'goes back by {seconds:.6f} s: the clock was set, or two traces are in one',
+    do='nothing: times count from there')
+error_of_frame = Text('error of the frame {frame}', do='check cable, termination and bit rate')
+
+# -- drive_can panel: what it refuses -------------------------------------------------------------
+panel_full = Text(
+    'too many connections are open already: try again in a while',
+    do='close other pages of the panel')
+panel_too_much = Text('too much at once: at most {most} bytes', do='upload a backup of one drive')
+panel_other_name = Text(
+    'this panel does not answer to that name: use the address that drive_can panel has printed',
+    do='use that address, or start it with --host and that name')
+panel_no_token = Text(
+    'no valid token: open the address that drive_can panel has printed when it started, with its '
+    'token',
+    do='copy the whole address from the terminal in which drive_can panel runs')
+panel_other_origin = Text(
+    'another page has sent this (Origin): refused',
+    do='open the panel itself; behind a proxy, pass Host and Origin on')
+panel_other_site = Text(
+    'another page has sent this (Sec-Fetch-Site): refused',
+    do='open the panel by its own address, not by a link of another page')
+panel_without_writes = Text(
+    'this panel was started without --allow-writes',
+    do='start it with --allow-writes, or write by drive_can write')
+panel_busy = Text('others are at it already: try again in a moment', do='try again in a moment')
+panel_needs_operator = Text(
+    "{what} needs the operator's token; this browser came with the viewer's",
+    do='open the address of the operator that drive_can panel has printed')
+panel_wrong_kind = Text('say it in {kind}', do='reload the page')
+panel_no_json = Text('that is no JSON object', do='reload the page')
+panel_no_parameter = Text(
+    '{drive} has no such parameter',
+    do='reload the page: the profile is another one')
+panel_no_value = Text(
+    '{name}: no value, allowed is a string: what a person types',
+    do='reload the page')
+panel_no_drive = Text('no drive {name} here', do='reload the page; see whether its bridge runs')
+panel_knows_no_parameters = Text(
+    '{drive} has not told of its parameters yet',
+    do='wait until its bridge has answered')
+panel_too_late = Text(
+    'not done after {seconds:.0f} s: ended',
+    do='see diagnostics of the drive, then look at its parameters')
+panel_command_failed = Text('drive_can {command} failed', do='see what the lines below it say')
+no_word_to_disable = Text(
+    'no control word: only quick stop stops it',
+    do='use quick stop, or ~/enable false where its profile has a control section')
+
+# -- drive_can profile import: what is wrong with a file ------------------------------------------
+profile_too_large = Text(
+    'the profile of its {entries} entries would be larger than {most} MiB, which no bridge reads',
+    do='name fewer columns or objects; leave out what is not needed')
+no_directory = Text('{directory} is no directory')
+no_file = Text('{name}: no such file')
+cell_unknown = Text(
+    "{what} '{text}' is none of those that are known here",
+    do='write it as docs/profiles.md has it')
+quote_open = Text('in line {line} a quote opens that is never closed', do='correct that line')
+no_table_column = Text("no column '{word}': the table has {width}")
+limits_fit_no_type = Text(
+    'the limits fit no type of 16 or 32 bits',
+    do='name the type in a column of its own')
+bits_form = Text("bits '{text}' are not of the form 0=ready, 3=fault")
+elements_from_one = Text("'{text}': elements in brackets are counted from 1")
+cells_not_split = Text(
+    'line {line}: cannot be split into cells: {error}',
+    do='correct that line, or export the table again')
+no_number_column = Text(
+    'no column with parameter numbers was found; {what}; say which one it is: --columns '
+    'number=HEADING,name=HEADING,... (or their places: number=1)')
+cell_too_long = Text(
+    'a cell over several lines holds as much as a row: is a quote missing?',
+    do='close the quote that opens there')
+row_without_number = Text('has no number', do='nothing, or write its number')
+limits_exchanged = Text(
+    'minimum {low:g} is above maximum {high:g}',
+    do='exchange them, or correct them by the manual')
+no_canopen_index = Text(
+    "'{index}' is no index of CANopen, which begin at 1000h; if it is a number, say --columns "
+    'number=HEADING,index=')
+address_out_of_range = Text(
+    '{key} {found} is out of range, allowed is 0 to {most}',
+    do='correct it by the manual')
+limit_in_other_unit = Text(
+    "{key} '{number:g} {unit}' is not in {own}",
+    do='write the limit in the unit of the parameter')
+no_eds = Text(
+    'is no EDS or DCF file: it has no section of an object, like [1000]',
+    do='ask the maker of the drive for its EDS file')
+no_number = Text("'{text}' is no number", do='correct it by the manual')
+octal_or_not = Text(
+    "'{text}' may be {value} or, octal, {octal}",
+    do='write it without leading zeros, or as 0x…')
+no_scale = Text("'{text}' is no scale", do='correct it by the manual')
+canopen_missing = Text(
+    'needs the Python library canopen, which is not installed: {how}',
+    do='run that command')
+data_type_empty = Text('DataType is empty', do='correct it by the manual')
+data_type_missing = Text('DataType is missing', do='correct it by the manual')
+data_type_of_other_width = Text(
+    'data type {code:04X}h is {width}',
+    do='nothing: no bridge exchanges such a value')
+no_object_but_type = Text('describes a type of data, and is no object', do='nothing')
+compact_out_of_range = Text('CompactSubObj {count} is out of range', do='correct it by the manual')
+no_subindices = Text('has no sub-indices in the file', do='ask the maker for a whole file')
+section_missing = Text('section [{section:04X}] is missing', do='ask the maker for a whole file')
+same_address = Text('the same address as in line {first}', do='nothing: the first one counts')
+no_object_section = Text('is no section of an object', do='nothing')
+object_not_understood = Text('is no object that can be understood', do='correct it by the manual')
+decimal_or_grouping = Text("'{text}' may be {one:g} or {other}: say which with --decimal")
+no_range = Text("'{text}' is no range", do='write it as LOW..HIGH')
+scale_zero = Text("'{text}' is no scale: 0", do='correct it by the manual')
+divides_by_zero = Text("'{text}' divides by zero", do='correct it by the manual')
+
+# -- traces and imports: which channel, which column, which axis ----------------------------------
+channel_of_no_bus = Text(
+    'channel {channel}: no bus of the parameter file; if it is one, give {options: or }',
+    do='give that option, if it is that bus')
+which_channel = Text(
+    'the trace has the channels {channels:, }; which of them is bus {bus} of the parameter file? '
+    'Give {options: or }',
+    do='give one of these options')
+panel_not_there = Text('drive_can panel: {host}, port {port}: {why}{advice}')
+other_port = Text('; --port chooses another')
+other_host = Text(': no address of this machine, --host chooses another')
+no_such_headings = Text('no row has the headings {missing:, }; there are: {there:, }')
+no_entry_usable = Text(
+    'no entry can be used; the first reason, in line {reason}',
+    'no entry can be used: there is none',
+    do='see the reasons above; compare the table with docs/profiles.md')
+no_such_axis = Text(
+    'has no axis {wanted}, it has {axes:, }',
+    'has no axis {wanted}, it has none: there is no control word, 6040h')
+device_is_no_drive = Text(
+    'is no drive: its device type (1000h) is {kind:08X}h, profile {profile}{what}, and it has no '
+    'control word, 6040h; --force imports it all the same')
+head_missing = Text(
+    'section [{index:04X}] is missing; what is imported are its sub-indices', do='nothing')
+cell_empty = Text('it is empty', do='correct it by the manual')
 
 #: all of them, by their codes
 CODES = catalogue(

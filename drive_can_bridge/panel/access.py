@@ -24,6 +24,7 @@ from urllib.parse import parse_qs
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.monitor.snapshot import StopAction
 
 #: with colours as in panel.css, which who is not let in does not get
@@ -113,8 +114,7 @@ class PanelAccess:
         address = _host_address(name)
         if name in self._names or address and (self._anywhere or address == self._own):
             return None
-        return AccessRefusal(403, 'this panel does not answer to that name: use the address that '
-                            'drive_can panel has printed')
+        return AccessRefusal(403, command_sentences.panel_other_name())
 
     def _judge_token(self, fields: Mapping[str, list[str]], scope_type: str, method: str,
                      query: bytes) -> Entry | AccessRefusal:
@@ -130,8 +130,7 @@ class PanelAccess:
             if role is not None:
                 return Entry(role)
         return AccessRefusal(401,
-                             'no valid token: open the address that drive_can panel has printed '
-                            'when it started, with its token')
+                             command_sentences.panel_no_token())
 
     def _role(self, token: str) -> PanelRole | None:
         found = None
@@ -147,14 +146,14 @@ def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
     # https: behind somebody who adds TLS
     if len(origins) > 1 or origins and origins[0].lower() not in (
             f'http://{host}', f'https://{host}'):
-        return AccessRefusal(403, 'another page has sent this (Origin): refused')
+        return AccessRefusal(403, command_sentences.panel_other_origin())
     site = fields.get('sec-fetch-site', ['none'])[0]
     # a followed link only looks
     follows = (scope_type == 'http' and method == 'GET'
                and fields.get('sec-fetch-mode', [''])[0] == 'navigate'
                and fields.get('sec-fetch-dest', [''])[0] == 'document')
     if site not in ('same-origin', 'none') and not follows:
-        return AccessRefusal(403, 'another page has sent this (Sec-Fetch-Site): refused')
+        return AccessRefusal(403, command_sentences.panel_other_site())
     return None
 
 
@@ -220,8 +219,8 @@ _HEADERS = [
     (b'cross-origin-resource-policy', b'same-origin'),
     (b'cross-origin-opener-policy', b'same-origin'),
 ]
-_NO_PLACE = AccessRefusal(503, 'too many connections are open already: try again in a while')
-_TOO_MUCH = AccessRefusal(413, f'too much at once: at most {BODY_MAX} bytes')
+_NO_PLACE = AccessRefusal(503, command_sentences.panel_full())
+_TOO_MUCH = AccessRefusal(413, command_sentences.panel_too_much(most=BODY_MAX))
 
 
 class Gate:

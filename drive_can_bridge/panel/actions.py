@@ -25,7 +25,9 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import ValueRefused
+from drive_can_bridge.core.messages import around
 from drive_can_bridge.core.text import counted, printable
 from drive_can_bridge.monitor.snapshot import DriveSnapshot, OperationOutcome, StopAction
 from drive_can_bridge.panel.access import PanelRole, ROLE
@@ -38,7 +40,7 @@ _AT_ONCE = 2
 _TEXT_MAX = 20_000
 _DIFFERENT = 1
 _OPTION = re.compile(r'(?<!\S)--[a-z][a-z-]*')
-_BUSY = 'others are at it already: try again in a moment'
+_BUSY = command_sentences.panel_busy()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,7 @@ async def _command(arguments: Sequence[str], directory: str) -> tuple[int, str]:
     try:
         if not (await asyncio.wait([talk], timeout=TIMEOUT))[0]:
             _ask_to_end(process)
-            late = f'not done after {TIMEOUT:.0f} s: ended\n'
+            late = around(command_sentences.panel_too_late(seconds=TIMEOUT), behind='\n')
         said, _ = await talk
     except asyncio.CancelledError:      # the panel ends, and would kill what it leaves behind
         _ask_to_end(process)
@@ -88,7 +90,7 @@ def _ask_to_end(process: asyncio.subprocess.Process) -> None:
 
 
 ALL = '*'
-NO_WRITES = 'this panel was started without --allow-writes'
+NO_WRITES = command_sentences.panel_without_writes()
 
 
 class _Refused(Exception):
@@ -147,13 +149,14 @@ class Actions:
         info = next((info for info in drive.parameters if info.name == name), None)
         if not drive.parameters:
             return _said(OperationOutcome(False,
-                                          f'{drive.label} has not told of its parameters yet'))
+                                          command_sentences.panel_knows_no_parameters(
+                                              drive=drive.label)))
         if info is None:
-            raise _Refused(400, f'{drive.label} has no such parameter')
+            raise _Refused(400, command_sentences.panel_no_parameter(drive=drive.label))
         if info.refusal:
             return _said(OperationOutcome(False, f'{info.name}: {info.refusal}'))
         if not isinstance(text, str):
-            raise _Refused(400, f'{info.name}: no value, allowed is a string: what a person types')
+            raise _Refused(400, command_sentences.panel_no_value(name=info.name))
         try:
             value = info.parse(text)
         except ValueRefused as error:
@@ -212,7 +215,8 @@ class Actions:
                 if code in fine:
                     made = file.read_bytes() if backup is None else b''
                     return Done(True, text or 'nothing differs', made)
-                return Done(False, _for_a_browser(text) or f'drive_can {command[0]} failed')
+                return Done(False, _for_a_browser(text) or command_sentences.panel_command_failed(
+                    command=command[0]))
         finally:
             self._running -= 1
 
@@ -224,20 +228,19 @@ class Actions:
     def _drive(self, name: object) -> DriveSnapshot:
         drive = self._feed.drive(name) if isinstance(name, str) else None
         if drive is None:
-            raise _Refused(404, f'no drive {printable(str(name))} here')
+            raise _Refused(404, command_sentences.panel_no_drive(name=printable(str(name))))
         return drive
 
 
 def _operator(request: Request, what: str) -> None:
     if request.scope[ROLE] is not PanelRole.OPERATOR:
-        raise _Refused(403, f"{what} needs the operator's token; this browser came with the "
-                            f"viewer's")
+        raise _Refused(403, command_sentences.panel_needs_operator(what=what))
 
 
 def _of_type(request: Request, kind: str) -> None:
     # a form of another page could not say this without being asked about
     if request.headers.get('content-type', '').partition(';')[0] != kind:
-        raise _Refused(415, f'say it in {kind}')
+        raise _Refused(415, command_sentences.panel_wrong_kind(kind=kind))
 
 
 async def _fields(request: Request) -> dict[str, Any]:
@@ -247,7 +250,7 @@ async def _fields(request: Request) -> dict[str, Any]:
     except (ValueError, RecursionError):
         fields = None
     if not isinstance(fields, dict):
-        raise _Refused(400, 'that is no JSON object')
+        raise _Refused(400, command_sentences.panel_no_json())
     return fields
 
 

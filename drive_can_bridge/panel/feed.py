@@ -11,6 +11,7 @@ import logging
 from typing import TypeVar
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.parameters import Value
 from drive_can_bridge.monitor.model import CONTROL_STATE, Model
 from drive_can_bridge.monitor.snapshot import (
@@ -120,7 +121,7 @@ class Feed:
     async def stop(self, drive: DriveSnapshot, stop: StopAction) -> OperationOutcome:
         """Stop a drive; return what became of it."""
         if stop not in stops(drive):
-            return OperationOutcome(False, 'no control word: only quick stop stops it')
+            return OperationOutcome(False, command_sentences.no_word_to_disable())
         return await self._stop(drive.name, stop)
 
     async def stop_all(self) -> list[tuple[str, OperationOutcome]]:

@@ -17,6 +17,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.panel.access import ENTER, Entry, PanelAccess, PanelRole
@@ -189,10 +190,11 @@ def listen(host: str, port: int) -> socket.socket:
         listener.bind(address)
         listener.listen(128)
     except (OSError, UnicodeError) as error:    # what is no name at all
-        advice = '; --port chooses another' if getattr(error, 'errno', 0) in _OF_THE_PORT else (
-            ': no address of this machine, --host chooses another')
+        advice = (command_sentences.other_port() if getattr(error, 'errno', 0) in _OF_THE_PORT
+                  else command_sentences.other_host())
         why = getattr(error, 'strerror', '') or error
-        raise DriveCanError(f'drive_can panel: {host}, port {port}: {why}{advice}') from error
+        raise DriveCanError(
+            command_sentences.panel_not_there(host, port, why, advice)) from error
     return listener
 
 

@@ -18,6 +18,7 @@ from drive_can_bridge.configuration.problems import Problem, Tree
 from drive_can_bridge.configuration.profile_check import LoadedProfile, profile_from_tree
 from drive_can_bridge.configuration.profiles import ProfileStore, read_profile, SUFFIX
 from drive_can_bridge.configuration.yaml_nodes import SIZE_MAX
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
@@ -80,7 +81,7 @@ def available(directories: Sequence[Path]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for directory in directories:
         if not directory.is_dir():
-            raise DriveCanError(f'{directory} is no directory')
+            raise DriveCanError(command_sentences.no_directory(directory=directory))
     for directory in (*directories, profiles_directory()):
         for path in sorted(directory.glob(f'*{SUFFIX}')):
             found.setdefault(path.stem, path)
@@ -96,7 +97,7 @@ def find(name: str, directories: Sequence[Path]) -> Path:
     as_file = Path(name)
     if '/' in name or name.endswith((SUFFIX, '.yml')):
         if not as_file.is_file():
-            raise DriveCanError(f'{name}: no such file')
+            raise DriveCanError(command_sentences.no_file(name=name))
         return as_file
     found = ProfileStore([str(directory) for directory in directories]).load(name)
     if isinstance(found, str):
@@ -291,8 +292,8 @@ def build_profile(found: FileContent, source: str, *, description: str = '',
         return {name: draft for name, draft in named.items() if name not in reasons}
     named = _named(sorted(found.drafts, key=_address), taken)
     named = left(named, _doubles(named))
-    too_large = ImportFailed(f'the profile of its {len(named)} entries would be larger than '
-                             f'{SIZE_MAX} MiB, which no bridge reads')
+    too_large = ImportFailed(command_sentences.profile_too_large(
+        entries=len(named), most=SIZE_MAX))
     # before the checks, which take long
     if sum(len(draft.entry.get('description', '')) + _SHORTEST
            for draft in named.values()) > SIZE_MAX << 20:
@@ -314,8 +315,7 @@ def build_profile(found: FileContent, source: str, *, description: str = '',
         named = left(named, reasons)
     lost.sort(key=lambda each: each.line)
     if not named:
-        raise ImportFailed('no entry can be used' + (
-            f'; the first reason, in line {lost[0]}' if lost else ': there is none'))
+        raise ImportFailed(command_sentences.no_entry_usable(lost[0] if lost else None))
     if len(named) < len(found.drafts):  # names once more: of what was left out none is taken
         named = _named(list(named.values()), taken)
     sections, notes = _sections(named, found, spoken)

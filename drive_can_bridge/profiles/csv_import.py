@@ -13,6 +13,7 @@ from functools import cache
 import re
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.catalogue import Draft, FileContent, ImportFailed, LeftOut
@@ -123,7 +124,7 @@ def word_of(what: str, table: Mapping[str, str], text: str) -> str:
     for word, others in table.items():
         if plain in others.split('|'):
             return word
-    raise Unusable(f"{what} '{text}' is none of those that are known here")
+    raise Unusable(command_sentences.cell_unknown(what=what, text=text))
 
 
 @cache
@@ -177,10 +178,10 @@ def _read_rows(text: str) -> list[CsvRow]:
                                    default=0)))
             line = reader.line_num + 1
     except csv.Error as error:
-        raise ImportFailed(f'line {line}: cannot be split into cells: {error}') from None
+        raise ImportFailed(command_sentences.cells_not_split(line=line, error=error)) from None
     last = rows.pop()
     if last.cells != (_END,):
-        raise ImportFailed(f'in line {last.line} a quote opens that is never closed')
+        raise ImportFailed(command_sentences.quote_open(line=last.line))
     return [row for row in rows if any(row.cells)]
 
 
@@ -240,8 +241,7 @@ class CsvTable:
             shown = ', '.join(filter(None, self.headings))
             what = f'its headings are: {shown}' if shown else 'no row looks like headings'
             raise ImportFailed(
-                f'no column with parameter numbers was found; {what}; say which one it is: '
-                '--columns number=HEADING,name=HEADING,... (or their places: number=1)')
+                command_sentences.no_number_column(what=what))
         #: columns whose digits are hexadecimal without a mark
         self.hexadecimal = {'index', *(
             column for column in ('number', 'subindex')
@@ -274,7 +274,7 @@ class CsvTable:
         width = max((len(row.cells) for row in self.rows), default=0)
         if word.isdecimal() and word.isascii() and 1 <= int(word[:9]) <= width:
             return int(word) - 1
-        raise WrongColumns(f"no column '{word}': the table has {width}")
+        raise WrongColumns(command_sentences.no_table_column(word=word, width=width))
 
     def _mostly_numbers(self, place: int) -> bool:
         cells = [row.cell(place) for row in self.rows if row.cell(place)]
@@ -298,8 +298,8 @@ def _head(rows: Sequence[CsvRow], given: Sequence[str]) -> CsvRow | None:
             return row
     known = {cell.casefold() for row in candidates for cell in row.cells}
     missing = [word for word in given if word.casefold() not in known] or given
-    raise WrongColumns('no row has the headings ' + ', '.join(f"'{word}'" for word in missing)
-                       + '; there are: ' + ', '.join(filter(None, best.cells)))
+    raise WrongColumns(command_sentences.no_such_headings(
+        [f"'{word}'" for word in missing], list(filter(None, best.cells))))
 
 
 # -- entries --------------------------------------------------------------------------------------
@@ -359,7 +359,7 @@ class _RowReader:
         """
         cells = {column: self._table.cell(row, column) for column in COLUMNS}
         if row.inside >= max(2, len(self._table.headings) - 1):
-            raise Unusable('a cell over several lines holds as much as a row: is a quote missing?')
+            raise Unusable(command_sentences.cell_too_long())
         entry: dict[str, Any] = self._address(cells)
         remarks: list[str] = []
         title, title_unit = split_unit(cells['name'])
@@ -398,16 +398,16 @@ class _RowReader:
             found['index'] = integer(index, hexadecimal=True)
             found['subindex'] = integer(subindex or '0', hexadecimal=True)
             if found['index'] < 0x1000:
-                raise Unusable(f"'{index}' is no index of CANopen, which begin at 1000h; if it is "
-                               'a number, say --columns number=HEADING,index=')
+                raise Unusable(command_sentences.no_canopen_index(index=index))
         if not found:
-            raise Unusable('has no number')
+            raise Unusable(command_sentences.row_without_number())
         element = ''.join(_parts(cells['subindex'])) or element
         if element:
             found['subindex'] = integer(element, hexadecimal='subindex' in hexadecimal)
         for key, largest in (('number', 65535), ('index', 65535), ('subindex', 255)):
             if found.get(key, 0) > largest:
-                raise Unusable(f'{key} {found[key]} is out of range, allowed is 0 to {largest}')
+                raise Unusable(command_sentences.address_out_of_range(
+                    key=key, found=found[key], most=largest))
         return found
 
     def _scaling(self, cells: Cells, title_unit: str) -> dict[str, Any]:
@@ -446,12 +446,13 @@ class _RowReader:
                 found[column] = measure(cells[column], self._sign)
         for key, limit in found.items():
             if limit.unit and unit(limit.unit) != own_unit:
-                raise Unusable(f"{key} '{limit.number:g} {limit.unit}' is not in "
-                               f'{own_unit or "the unit of the parameter, which has none"}')
+                raise Unusable(command_sentences.limit_in_other_unit(
+                    key=key, number=limit.number, unit=limit.unit,
+                    own=own_unit or 'the unit of the parameter, which has none'))
         limits = {key: limit.number for key, limit in found.items()}
         if len(limits) == 2 and limits['minimum'] > limits['maximum']:
-            raise Unusable(f'minimum {limits["minimum"]:g} is above maximum '
-                           f'{limits["maximum"]:g}')
+            raise Unusable(command_sentences.limits_exchanged(
+                low=limits['minimum'], high=limits['maximum']))
         return limits
 
     def _type(self, told: str, entry: Mapping[str, Any], limits: dict[str, float],
@@ -471,7 +472,7 @@ class _RowReader:
                 remarks.append(f'type {fits.value}: not in the table, '
                                + ('chosen by the limits' if raws else 'the usual one'))
                 return str(fits.value)
-        raise Unusable('the limits fit no type of 16 or 32 bits')
+        raise Unusable(command_sentences.limits_fit_no_type())
 
 
 def _bits(text: str) -> dict[str, int]:
@@ -479,7 +480,7 @@ def _bits(text: str) -> dict[str, int]:
     for position, title in _BIT.findall(text):
         found.setdefault(name_of(title, position), int(position))
     if not found:
-        raise Unusable(f"bits '{text}' are not of the form 0=ready, 3=fault")
+        raise Unusable(command_sentences.bits_form(text=text))
     return found
 
 
@@ -495,5 +496,5 @@ def _parts(text: str) -> tuple[str, str]:
     if match[3] is None:
         return match[1], match[2].strip()
     if int(match[3]) == 0:
-        raise Unusable(f"'{text}': elements in brackets are counted from 1")
+        raise Unusable(command_sentences.elements_from_one(text=text))
     return match[1], hex(int(match[3]) - 1)

@@ -21,6 +21,7 @@ import re
 from types import ModuleType
 from typing import Any
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.catalogue import (
     check, Checked, Draft, FileContent, ImportFailed, LeftOut)
@@ -88,8 +89,7 @@ def canopen_library() -> ModuleType:
         from canopen.objectdictionary import eds
     except ImportError:
         raise ImportFailed(
-            'needs the Python library canopen, which is not installed: '
-            f"{command_that_brings('eds')}") from None
+            command_sentences.canopen_missing(how=command_that_brings('eds'))) from None
     # what it complains about is told here, with section and line
     logging.getLogger('canopen').setLevel(logging.CRITICAL)
     module: ModuleType = eds
@@ -172,7 +172,7 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     found = FileContent(mended=True)
     sections = _take_apart(text, found)
     if not any(map(_OBJECT.fullmatch, sections)):
-        raise ImportFailed('is no EDS or DCF file: it has no section of an object, like [1000]')
+        raise ImportFailed(command_sentences.no_eds())
     info = sections.get('deviceinfo', _NONE)
     found.description = one_line(f'{info.get("VendorName")} {info.get("ProductName")}')
     shift = _choose_axis(sections, found, axis)
@@ -187,7 +187,7 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
             listed = re.fullmatch('0x([0-9a-f]{1,4})', value.lower())
             if key.isdecimal() and listed and f'{int(listed[1], 16):04x}' not in sections:
                 found.left_out.append(sections[name].lost(
-                    f'section [{int(listed[1], 16):04X}] is missing'))
+                    command_sentences.section_missing(section=int(listed[1], 16))))
     if standard:
         _standardise(found, sections, shift or 0)
     else:
@@ -207,8 +207,7 @@ def _choose_axis(sections: Mapping[str, EdsSection], found: FileContent,
     axes = [number for number in range(1, _AXES_MAX + 1)
             if f'{_BUILT_IN[0] + len(_AXIS) * (number - 1):04x}' in sections]
     if wanted is not None and wanted not in axes:
-        raise ImportFailed(f'has no axis {wanted}, it has ' + (
-            f'{", ".join(map(str, axes))}' if axes else 'none: there is no control word, 6040h'))
+        raise ImportFailed(command_sentences.no_such_axis(wanted, axes))
     if not axes:
         return None
     axis = wanted or axes[0]
@@ -237,10 +236,8 @@ def _refuse_others(sections: Mapping[str, EdsSection]) -> None:
     profile = _NO_PROFILE if kind is None else kind & 0xFFFF
     if kind is not None and profile not in (_NO_PROFILE, _DRIVES):
         what = _DEVICES.get(profile, '')
-        raise ImportFailed(
-            f'is no drive: its device type (1000h) is {kind:08X}h, profile {profile}'
-            f'{f" ({what})" if what else ""}, and it has no control word, 6040h; --force imports '
-            'it all the same')
+        raise ImportFailed(command_sentences.device_is_no_drive(
+            kind, profile, f' ({what})' if what else ''))
 
 
 @dataclass(slots=True)
@@ -283,7 +280,7 @@ class _ObjectReader:
             first = taken.setdefault((place.index, place.subindex), place.section.line)
             try:
                 if first != place.section.line:
-                    raise Unusable(f'the same address as in line {first}')
+                    raise Unusable(command_sentences.same_address(first=first))
                 code = self._type_of(place.section)
                 counts += place.element and not place.subindex and code == 0x05
                 if not (place.element and not place.subindex and code == 0x05):
@@ -307,7 +304,8 @@ class _ObjectReader:
             match = _OBJECT.fullmatch(name)
             if match is None:
                 if section.get('ParameterName') and not _TYPE.fullmatch(name):
-                    self._found.left_out.append(section.lost('is no section of an object'))
+                    self._found.left_out.append(
+                        section.lost(command_sentences.no_object_section()))
                 continue
             index = int(match[1], 16)
             if any(index in block for block in self._found.foreign):
@@ -324,21 +322,20 @@ class _ObjectReader:
         [head] = subs.pop(-1, [_NONE])
         if index < _COMMUNICATION.start:
             self._found.left_out += [
-                section.lost('describes a type of data, and is no object')
+                section.lost(command_sentences.no_object_but_type())
                 for section in (head, *(each for some in subs.values() for each in some))
                 if section is not _NONE]
             return
         parent = one_line(head.get('ParameterName'))
         if head is _NONE:
-            self._found.notes.append(f'section [{index:04X}] is missing; what is imported are its '
-                                     'sub-indices')
+            self._found.notes.append(command_sentences.head_missing(index))
         try:
             count = _integer(head.get('CompactSubObj') or '0')
             if not 0 <= count <= 0xFE:
-                raise Unusable(f'CompactSubObj {count} is out of range')
+                raise Unusable(command_sentences.compact_out_of_range(count=count))
             kind = _integer_or(head.get('ObjectType'), 0)
             if not subs and not count and kind in (_ARRAY, _RECORD):
-                raise Unusable('has no sub-indices in the file')
+                raise Unusable(command_sentences.no_subindices())
         except Unusable as error:
             if not subs:
                 self._found.left_out.append(head.lost(
@@ -366,14 +363,15 @@ class _ObjectReader:
         """
         text = section.get('DataType')
         if not text:
-            raise Unusable('DataType is empty' if 'datatype' in section.values
-                           else 'DataType is missing')
+            raise Unusable(command_sentences.data_type_empty() if 'datatype' in section.values
+                           else command_sentences.data_type_missing())
         try:
             code = _integer(text)
         except Unusable as error:
             raise Unusable(f'DataType {error}') from None
         if code not in _TYPES and f'{code:x}sub1' not in self._sections:
-            raise Unusable(f'data type {code:04X}h is {self._width}')
+            raise Unusable(command_sentences.data_type_of_other_width(
+                code=code, width=self._width))
         return code
 
     def _understood(self, readable: Sequence[tuple[_Place, int]],
@@ -386,7 +384,7 @@ class _ObjectReader:
                 try:
                     objects = self._read([(place, code)])
                 except _ERRORS:
-                    self._lose(place, Unusable('is no object that can be understood'))
+                    self._lose(place, Unusable(command_sentences.object_not_understood()))
                 else:
                     yield place, _variable(objects, place)
             return
@@ -464,11 +462,12 @@ def _integer(text: str) -> int:
     """
     match = _NUMBER.fullmatch(_REMARK.split(text, maxsplit=1)[0].strip())
     if match is None:
-        raise Unusable(f"'{text}' is no number")
+        raise Unusable(command_sentences.no_number(text=text))
     sign, _, hexadecimal, digits = match.groups()
     value = int(hexadecimal, 16) if hexadecimal else int(digits)
     if digits and digits[0] == '0' and set(digits) <= set('01234567') and int(digits, 8) != value:
-        raise Unusable(f"'{text}' may be {value} or, octal, {int(digits, 8)}")
+        raise Unusable(command_sentences.octal_or_not(
+            text=text, value=value, octal=int(digits, 8)))
     return -value if sign == '-' else value
 
 
@@ -569,9 +568,10 @@ def _scale(text: str) -> float:
     try:
         scale = float(text)
     except ValueError:
-        raise Unusable(f"'{text}' is no number" if text else 'it is empty') from None
+        raise Unusable(command_sentences.no_number(text=text) if text
+                       else command_sentences.cell_empty()) from None
     if not 1e-12 <= abs(scale) <= 1e4:      # nan, too
-        raise Unusable(f"'{text}' is no scale")
+        raise Unusable(command_sentences.no_scale(text=text))
     return rounded(scale)
 
 

@@ -19,6 +19,7 @@ import unicodedata
 
 from drive_can_bridge.configuration.profile_check import RAW_NAME, RESERVED
 from drive_can_bridge.configuration.scalars import read_scalar
+from drive_can_bridge.core import command_sentences
 
 WIDTH = 99
 #: keys of an entry, in the order in which they are written; each group begins a line
@@ -329,13 +330,13 @@ def _sign_of(digits: str) -> str:
 def _number(digits: str, sign: str, text: str) -> float:
     own = _sign_of(digits) or sign
     if not own and len(re.findall('[.,]', digits)) == 1:
-        raise Unusable(f"'{text}' may be {float(digits.replace(',', '.')):g} or "
-                       f'{re.sub("[.,]", "", digits)}: say which with --decimal')
+        raise Unusable(command_sentences.decimal_or_grouping(
+            text=text, one=float(digits.replace(',', '.')), other=re.sub('[.,]', '', digits)))
     whole, _, fraction = digits.rpartition(own) if own and own in digits else (digits, '', '')
     if _GROUPED.fullmatch(whole):
         whole = whole.replace(_OTHER.get(own, ''), '')
     if re.search('[.,]', whole) or not digits.isascii():
-        raise Unusable(f"'{text}' is no number")
+        raise Unusable(command_sentences.no_number(text=text))
     return float(f'{whole or 0}.{fraction or 0}')
 
 
@@ -355,7 +356,7 @@ def integer(text: str, *, hexadecimal: bool = False) -> int:
     plain = re.sub(r'[.,]0+$', '', tidy)    # what a spreadsheet makes of whole numbers
     if re.fullmatch('[0-9]{1,10}', plain):
         return int(plain)
-    raise Unusable(f"'{text}' is no number")
+    raise Unusable(command_sentences.no_number(text=text))
 
 
 def is_hexadecimal_only(text: str) -> bool:
@@ -376,7 +377,7 @@ def measure(text: str, sign: str) -> Measure:
         return Measure(int(f'{marked[1]}{marked[2] or marked[3]}', 16), '')
     match = _NUMBER.fullmatch(tidy)
     if match is None:
-        raise Unusable(f"'{text}' is no number")
+        raise Unusable(command_sentences.no_number(text=text))
     number = _number(match[2], sign, text) * float(f'1{match[3]}')
     return Measure(rounded(-number if '-' in match[1] else number), match[4].strip())
 
@@ -389,7 +390,7 @@ def interval(text: str, sign: str) -> tuple[Measure, Measure]:
     """
     parts = _BETWEEN.split(_tidy(text).removeprefix('da '))
     if len(parts) != 2:
-        raise Unusable(f"'{text}' is no range")
+        raise Unusable(command_sentences.no_range(text=text))
     return measure(parts[0], sign), measure(parts[1], sign)
 
 
@@ -408,8 +409,8 @@ def factor(text: str, sign: str) -> Measure:
     else:
         below = _number(fraction[2], sign, text)
         if not below:
-            raise Unusable(f"'{text}' divides by zero")
+            raise Unusable(command_sentences.divides_by_zero(text=text))
         found = Measure(_number(fraction[1], sign, text) / below, fraction[3].strip())
     if not found.number:
-        raise Unusable(f"'{text}' is no scale: 0")
+        raise Unusable(command_sentences.scale_zero(text=text))
     return found

@@ -26,6 +26,7 @@ from struct import Struct
 from typing import BinaryIO, NamedTuple
 import zlib
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, state_record)
 
@@ -84,7 +85,7 @@ def read_blf(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
         try:
             record = _entry(found, begin + found.time, passed)
         except struct.error:
-            complain(f'entry {number}: an object of type {found.kind} is too short')
+            complain(command_sentences.trace_object_short(number=number, kind=found.kind))
             continue
         if record is not None:
             yield record
@@ -149,7 +150,7 @@ def _contained(data: bytes, complain: Complain, passed: Counter[str],
         if found < 0:
             return data[max(place, end - len(_SIGNATURE) + 1):]
         if found > place + _PADDING_MAX:
-            complain(f'{found - place} bytes are damaged')
+            complain(command_sentences.trace_bytes_damaged(count=found - place))
         if found + _OBJECT.size > end:
             return data[found:]
         _, header_size, version, size, kind = _OBJECT.unpack_from(data, found)

@@ -23,6 +23,7 @@ import struct
 from struct import unpack_from
 from typing import Any, BinaryIO, cast, NamedTuple
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind
 
@@ -77,8 +78,7 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
         from scapy.utils import RawPcapReader       # takes half a second
     except ImportError:
         raise DriveCanError(
-            f'{path}: {path.suffix} needs the Python module scapy (package python3-scapy, or pip '
-            'install scapy)') from None
+            command_sentences.scapy_missing(path=path, suffix=path.suffix)) from None
     echoes = _Echoes()
     with path.open('rb') as file:
         size = path.stat().st_size
@@ -99,7 +99,7 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
                 try:
                     record = _record(data, reader, about, interfaces, passed)
                 except (ValueError, struct.error):
-                    complain(f'entry {number}: a packet was captured in part')
+                    complain(command_sentences.packet_in_part(number=number))
                     continue
                 if record is not None and not echoes.has(record):
                     yield record
@@ -109,8 +109,7 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
         if not (whole and interfaces.ends_well(file)):
             complain(_CUT)
     if echoes.dropped:
-        complain(f'frames that stand twice, going out and coming back (a capture of "any"): '
-                 f'{echoes.dropped}; each is taken once')
+        complain(command_sentences.trace_doubled(count=echoes.dropped))
 
 
 class _Watched:

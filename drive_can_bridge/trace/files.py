@@ -35,6 +35,7 @@ import zlib
 
 import can
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import (
@@ -140,8 +141,8 @@ class Channels:
     @staticmethod
     def _no_bus(channel: str | int, names: Iterable[str]) -> str:
         shown = printable(str(channel))
-        return (f'channel {shown}: no bus of the parameter file; if it is one, give '
-                + ' or '.join(f'--bus {name}={shown}' for name in names))
+        return command_sentences.channel_of_no_bus(
+            shown, [f'--bus {name}={shown}' for name in names])
 
     def missing(self) -> list[str]:
         """Return what the user meant that is not in the trace, as it was given."""
@@ -180,9 +181,8 @@ class Channels:
         bus = self._buses[0]
         names = [printable(str(channel)) for channel in channels]
         return DriveCanError(
-            f'the trace has the channels {", ".join(names)}; which of them is bus {bus.name} of '
-            'the parameter file? Give '
-            + ' or '.join(f'--bus {bus.name}={name}' for name in names))
+            command_sentences.which_channel(
+                names, bus.name, [f'--bus {bus.name}={name}' for name in names]))
 
 
 #: s between two looks whether a database is written
@@ -250,7 +250,8 @@ class Database(can.SqliteWriter):
         super().stop()
         self.check()
         if self.num_frames < self._taken:
-            raise OSError(EIO, f'{self._taken - self.num_frames} frames are not written',
+            raise OSError(EIO, command_sentences.frames_not_written(
+                count=self._taken - self.num_frames),
                           str(self._path))
 
     def _db_writer_thread(self) -> None:
@@ -385,7 +386,7 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
             else:
                 yield from _text_records(suffix, lines, complain)
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
-            complain(f'the rest cannot be unpacked: {error}')
+            complain(command_sentences.rest_not_unpacked(error=error))
 
 
 def _begins_as(head: _Head, path: Path, complain: Complain) -> bool:
@@ -408,8 +409,8 @@ def check_readable(path: Path) -> tuple[str, bool]:
     packed = path.suffix.lower() == '.gz'
     suffix = Path(path.stem).suffix.lower() if packed else path.suffix.lower()
     if suffix not in (_TEXTS + (() if packed else _BINARY_READERS)):
-        raise UnknownFormat(f'{path}: no trace format has the suffix {suffix or "(none)"!s}; '
-                            f'known are {", ".join(READABLE)}, and .gz behind those of text')
+        raise UnknownFormat(command_sentences.unknown_suffix(
+            path=path, suffix=suffix or '(none)', known=', '.join(READABLE)))
     path.open('rb').close()
     return suffix, packed
 
@@ -457,7 +458,7 @@ def _from_differences(lines: Iterator[str], complain: Complain) -> Iterator[str]
     lines = itertools.chain(head, lines)
     if not falls or falls * _FALLS < len(times) - 1:
         return lines
-    complain('times are those since the line before (candump -t d): added up')
+    complain(command_sentences.times_added_up())
     return _added_up(lines)
 
 
@@ -498,7 +499,7 @@ class _Lines:
         return next(self, '')
 
     def write(self, _: str) -> int:
-        raise OSError('a trace is read only')
+        raise OSError(command_sentences.trace_read_only())
 
     def close(self) -> None:
         """Leave the file open: its opener closes it."""
@@ -655,13 +656,13 @@ def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
                     record = checked(Record(float(time), '', int(identifier), bytes(data or b''),
                                             bool(extended), kind))
                 except TypeError:       # a column is empty, or of another type
-                    complain(f'entry {number}: no entry of a .db trace')
+                    complain(command_sentences.no_db_entry(number=number))
                 except ValueError as failure:
                     complain(f'entry {number}: {failure}')
                 else:
                     yield record
         except sqlite3.Error as failure:
-            complain(f'the rest cannot be read: {failure}')
+            complain(command_sentences.rest_not_read(failure=failure))
 
 
 _BINARY_RECORDS: dict[str, Callable[[Path, Complain], Iterator[Record]]] = {
@@ -764,11 +765,11 @@ def check_writable(path: Path, buses: int) -> None:
     """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
-        raise UnknownFormat(f'{path}: no trace is written with the suffix {suffix or "(none)"}; '
-                            f'known are {", ".join(WRITABLE)}')
+        raise UnknownFormat(command_sentences.suffix_not_written(
+            path=path, suffix=suffix or '(none)', known=', '.join(WRITABLE)))
     if suffix in ONE_BUS and buses > 1:
-        raise UnknownFormat(f'{path}: {suffix} does not tell buses apart, and there are {buses}; '
-                            f'choose .log')
+        raise UnknownFormat(command_sentences.suffix_of_one_bus(
+            path=path, suffix=suffix, buses=buses))
 
 
 # -- the texts of candump -------------------------------------------------------------------------
@@ -844,7 +845,7 @@ def parse_line(line: str) -> Record | None:
     if len(words) > 2 and '#' in words[2] and words[0][:1] == '(':
         # what tools and people write behind a frame is no part of it, unless it is another one
         if any(mark in word for word in words[3:] for mark in '#('):
-            raise ValueError('more than one frame in a line')
+            raise ValueError(command_sentences.frames_in_a_line())
         digits, _, data = words[2].partition('#')
         return _logged(words, digits, data)
     return _shown(words)
@@ -873,14 +874,14 @@ def _shown(words: list[str]) -> Record:
                   if word[:1] == '[' and word[-1:] == ']' and word[1:-1].isdecimal()
                   or word in _LONG_LENGTHS), None)
     if place is None or place < 2:
-        raise ValueError('neither a line of a candump log nor of its screen')
+        raise ValueError(command_sentences.no_candump_line())
     before, length, after = words[:place], words[place], words[place + 1:]
     time = 0.0
     if before[0][:1] == '(':
         word = before.pop(0)
         time = _time(word) if word[-1:] == ')' else _date(f'{word} {before.pop(0)}')
         if len(before) < 2:
-            raise ValueError('neither a line of a candump log nor of its screen')
+            raise ValueError(command_sentences.no_candump_line())
     identifier = before[-1]
     sent = next((_DIRECTIONS[word] for word in before[1:-1] if word in _DIRECTIONS), None)
     number, extended = _number(identifier), len(identifier) == 8
@@ -893,7 +894,7 @@ def _shown(words: list[str]) -> Record:
         kind, number = RecordKind.ERROR, number & EXTENDED_IDENTIFIER_MAX
     content = _content(''.join(after[:size]))
     if len(content) != size:
-        raise ValueError(f'{len(content)} data bytes instead of {size}')
+        raise ValueError(command_sentences.data_bytes_differ(found=len(content), wanted=size))
     return _checked(Record(time, before[0], number, content, extended, kind, sent),
                     len(identifier))
 
@@ -916,7 +917,7 @@ def _date(words: str) -> float:
             return datetime.fromisoformat(words[1:-1]).timestamp()
     except (ValueError, OverflowError, OSError):
         pass
-    raise ValueError(f'{words.strip("()")!r} is no time')
+    raise ValueError(command_sentences.no_time(word=repr(words.strip('()'))))
 
 
 def _number(digits: str) -> int:
@@ -929,7 +930,7 @@ def _content(digits: str) -> bytes:
 
 def _checked(record: Record, digits: int) -> Record:
     if digits not in (3, 8):
-        raise ValueError(f'an identifier of {digits} digits')
+        raise ValueError(command_sentences.identifier_digits(digits=digits))
     return checked(record)
 
 

@@ -26,6 +26,7 @@ import threading
 import time
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.frame import DATA, Frame, Record, RecordKind
 from drive_can_bridge.trace.files import format_record, labels
@@ -246,7 +247,7 @@ class FlightRecorder:
                 wanted.done.append(done)
                 return
             if self._closing:   # the thread may have ended
-                refusal = 'the recording has ended'
+                refusal = command_sentences.recording_ended()
             elif wanted is None and now - found.last >= SPACING:
                 self._want(found, _Wanted(reason, _ASKED, now, now, [done]))
                 return
@@ -255,7 +256,7 @@ class FlightRecorder:
                          f'{found.last_path or "not written"}' if wanted is None else
                          f'that of {wanted.reason} follows in '
                          f'{wanted.at - now + AFTERMATH:.0f} s')
-                refusal = f'one trace in {SPACING:g} s at most; {other}'
+                refusal = command_sentences.trace_too_soon(seconds=SPACING, other=other)
         done('', f'bus {bus}: {refusal}')
 
     def close(self) -> None:
@@ -323,13 +324,14 @@ class FlightRecorder:
             if count:
                 answer = bus.last_path = str(path)
                 tell = self._say
-                text = (f'bus {name}: trace of {wanted.reason}, {count} frames of the last '
-                        f'{bus.configuration.trace_seconds:g} s: {path}')
+                text = (command_sentences.trace_written(
+                    bus=name, reason=wanted.reason, count=count,
+                    seconds=bus.configuration.trace_seconds, path=path))
             else:
                 bus.last = bus.failed = -SPACING
                 tell = None
-                text = (f'bus {name}: not a single frame in the last '
-                        f'{bus.configuration.trace_seconds:g} s')
+                text = (command_sentences.trace_without_frames(
+                    bus=name, seconds=bus.configuration.trace_seconds))
         if tell is not None:
             tell(text)
         for done in wanted.done:

@@ -25,6 +25,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.frame import (
     DATA, EXTENDED_IDENTIFIER_MAX, Record, RecordKind, STANDARD_IDENTIFIER_MAX)
@@ -66,7 +67,7 @@ def read_measured(path: Path, complain: Complain, passed: Counter[str]) -> Itera
         opener = import_module('asammdf').MDF      # takes a second
     except ImportError:
         raise DriveCanError(
-            f'{path}: .mf4 needs the Python module asammdf (pip install asammdf)') from None
+            command_sentences.asammdf_missing(path=path)) from None
     measured = _opened(opener, path)
     if measured is None:
         complain(_CUT)

@@ -21,6 +21,7 @@ from datetime import timedelta
 import re
 from typing import NamedTuple
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.frame import DATA, Record, RecordKind, state_record
 from drive_can_bridge.transport.error_frames import protocol_error
 
@@ -128,7 +129,7 @@ class _Reader:
             try:
                 self._start = timedelta(days=float(value) - _EPOCH).total_seconds()
             except (ValueError, OverflowError):
-                self._wrong(f'$STARTTIME is no number of days: {value!r}')
+                self._wrong(command_sentences.trc_start_time(value=repr(value)))
         elif keyword == 'COLUMNS':
             self._layout = _layout(value.replace(' ', '').split(','))
         else:
@@ -140,8 +141,7 @@ class _Reader:
         if self._told:
             self._passed['lines without $COLUMNS'] += 1
         else:
-            self._wrong(f'version {self._version}, and no ;$COLUMNS= says where time, type, '
-                        'identifier and length are')
+            self._wrong(command_sentences.trc_without_columns(version=self._version))
             self._told = True
 
     def _frame(self, found: re.Match[str], layout: _Layout) -> Record | None:
@@ -160,7 +160,8 @@ class _Reader:
             elif not is_fd and size <= _DLC_MAX:
                 size = min(size, _CLASSICAL_MAX)
             if size != len(content):
-                self._wrong(f'its length is {length}, and there are {len(content)} data bytes')
+                self._wrong(command_sentences.trc_length_differs(
+                    length=length, found=len(content)))
                 return None
         return Record(self._start + 1e-3 * float(time), int(bus or 1), int(number, 16), content,
                       len(number) > _STANDARD_DIGITS, record_kind,

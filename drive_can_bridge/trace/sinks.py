@@ -21,6 +21,7 @@ import json
 import math
 from typing import Any, NamedTuple, TextIO
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, DriveConfiguration, JointConfiguration)
 from drive_can_bridge.core.continuous import ContinuousPosition
@@ -464,11 +465,12 @@ class Plotter:
             drive_name, _, name = text.partition('.')
             drive = configuration.drives.get(drive_name)
             if drive is None:
-                raise DriveCanError(f"--plot {text}: no drive '{drive_name}'; drives: "
-                                    f'{", ".join(configuration.drives) or "none"}')
+                raise DriveCanError(command_sentences.plot_names_no_drive(
+                    text=text, drive=drive_name, drives=', '.join(configuration.drives) or 'none'))
             known = {**drive.profile.parameters, **{name: None for _, name, _ in columns(drive)}}
             if name not in known:
-                raise DriveCanError(f"--plot {text}: {drive_name} has no '{name}'")
+                raise DriveCanError(command_sentences.plot_names_no_value(
+                    text=text, drive=drive_name, name=name))
             self._add(drive, name)
         if not wanted:
             for drive in drives:
@@ -528,7 +530,7 @@ class Plotter:
             if curve.points()[0]:
                 panels.setdefault(curve.unit, []).append(curve)
         if not panels and not self._lanes:
-            raise DriveCanError('nothing to plot: none of these values is in the trace')
+            raise DriveCanError(command_sentences.nothing_to_plot())
         heights = [*([2.2] * len(panels)),
                    *(0.6 + 0.2 * len(lanes.bits) for lanes in self._lanes.values())]
         figure, axes = pyplot.subplots(len(heights), 1, sharex=True, squeeze=False,

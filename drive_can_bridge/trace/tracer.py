@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 import math
 from typing import Any
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.frame import bits_on_bus, Frame, Record, RecordKind, STUFFING
 from drive_can_bridge.core.statistics import Statistic
@@ -229,8 +230,8 @@ class Tracer:
 
         No answer comes before its question, and nothing would be missed until the old time.
         """
-        self._tell(bus, bus.newest, 'time', f'goes back by {bus.newest - time:.6f} s: the clock '
-                   'was set, or two traces are in one')
+        self._tell(bus, bus.newest, 'time', command_sentences.time_goes_back(
+            seconds=bus.newest - time))
         bus.shift += bus.newest - time
         return bus.newest
 
@@ -251,7 +252,8 @@ class Tracer:
             return
         if record.kind is RecordKind.DESTROYED:
             bus.error_frames += 1
-            self._tell(bus, record.time, 'error frame', f'error of the frame {_hex(record)}')
+            self._tell(bus, record.time, 'error frame', command_sentences.error_of_frame(
+                frame=_hex(record)))
             return
         if record.kind is RecordKind.STATE:
             bus.error_frames += bool(record.identifier)
