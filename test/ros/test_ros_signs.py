@@ -146,6 +146,29 @@ def test_a_bridge_lives_that_publishes_diagnostics(
     assert look_about(lambda now: None, 6.0, said_at).lives(BRIDGE) is lives
 
 
+@pytest.mark.parametrize('hangs', [True, False])
+@pytest.mark.parametrize('gap', [3.0, 4.5, 6.0])
+def test_who_stood_still_itself_has_seen_no_lack_of_signs(
+        hangs: bool, gap: float, looking: Callable[[bool], search.Search],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes diagnostics is imported first, which takes seconds on a busy computer."""
+    monkeypatch.setattr(signs, 'Inbox', Box)
+    now = [100.0]
+    looked = looking(False)
+    looked._make_signs = lambda: signs.Signs(
+        None, lambda: [Present(7, 0, BRIDGE, 1)],   # type: ignore[arg-type]
+        lambda _: 0 if hangs else int(10.0 * now[0]))
+    for step in range(400):
+        now[0] = 100.0 + 0.1 * step + (step > 11) * gap     # signs are looked for after 1 s
+        looked.look(now[0])
+        if not hangs and now[0] >= 112.0:
+            looked._calls.answer()      # type: ignore[attr-defined]
+        if looked.settled or looked.over(now[0]):
+            break
+    assert looked.found[BRIDGE].answered is not hangs
+    assert now[0] - 100.0 < 13.0
+
+
 def test_the_time_that_a_process_has_taken_is_read() -> None:
     before = signs.processor_time(os.getpid())
     assert before is not None

@@ -50,12 +50,15 @@ class Signs:
         self._used: dict[str, tuple[int | None, float]] = {}    # by name: ticks, and since when
         self._looked_at = -LOOK_PERIOD
         self._now = 0.0
+        self._began: float | None = None
         self._inbox = Inbox(client_node, DiagnosticArray, '/diagnostics',
                             QoSProfile(depth=_DIAGNOSTICS_DEPTH), self._take)
 
     def look(self, now: float) -> None:
         """Take what has arrived, and look at the processes of this host."""
         self._now = now
+        if self._began is None:
+            self._began = now
         self._inbox.look()
         if now < self._looked_at + LOOK_PERIOD:
             return
@@ -69,8 +72,15 @@ class Signs:
                 self._used[each.name] = ticks, now
 
     def lives(self, bridge: str) -> bool:
-        """Tell whether there was a sign of a bridge just now."""
+        """
+        Tell whether there was a sign of a bridge just now, or was no time yet to see any.
+
+        On a busy computer this process stands still as well: between its first look and the one
+        before there may be all the time that a bridge has to answer.
+        """
         since = self._now - RECENT
+        if self._began is None or self._began > since:
+            return True
         return (self._said.get(bridge.lstrip('/'), since) > since
                 or self._used.get(short(bridge), (None, since))[1] > since)
 
