@@ -279,8 +279,8 @@ def test_a_write_that_nobody_answers_is_in_doubt_once_it_was_sent(asked: bool) -
     def call(*_: Any) -> None:
         raise trouble
     way: Any = SimpleNamespace(set=call)
-    facts: Any = SimpleNamespace(name='lift')
-    drive = BridgedDrive(way, '/lift', facts, {RAMP.name: RAMP}, {}, 1.0, str)
+    unasked: Any = None
+    drive = BridgedDrive('lift', way, '/lift', {RAMP.name: RAMP}, {}, unasked)
     told: list[Any] = []
     with pytest.raises(search.NoAnswer):
         drive.write({RAMP.name: 1.5}, told=told.append)
@@ -325,5 +325,5 @@ def test_a_drive_counts_as_enabled_while_its_motor_may_move(
         state: str, control_state: str, enabled: Enabled) -> None:
     way: Any = SimpleNamespace(condition=lambda *_, **__: {
         'state': state, 'control_state': control_state})
-    facts: Any = SimpleNamespace(name='lift', through='/drive_can_bridge')
-    assert BridgedDrive(way, '/lift', facts, {}, {}, 1.0, str).enabled() is enabled
+    knowledge: Any = SimpleNamespace(period=lambda _: 1.0)
+    assert BridgedDrive('lift', way, '/lift', {}, {}, knowledge).enabled() is enabled
