@@ -47,8 +47,8 @@ from drive_can_bridge.transport.serial_writer import Below, watched
 _STAMP_AGE_MAX = 0.1
 # So many returns without a frame in so many s, although it was to wait: the other end has gone.
 _EARLY_MAX, _EARLY_TIME = 1000, 0.1
-# In so many, where it is known that no byte has come meanwhile: also on a busy machine.
-_EARLY_SILENCE = 1.0
+# Behind so many it is asked whether it has gone, where the kernel knows: also on a busy machine.
+_EARLY_LOOK = 100
 # So many frames may be confirmed at once: what a terminal keeps.
 _UNCONFIRMED_MAX = 4096
 # Looks at what a serial adapter has to say of the commands that opened it, and s for each.
@@ -228,10 +228,11 @@ class Port(EndPoint):
         if not self._early or heard != self._early_heard:
             self._early, self._early_since, self._early_heard = 0, now, heard
         self._early += 1
-        if self._early < _EARLY_MAX:
+        gone = (self._early % _EARLY_LOOK == 0 and self._below is not None
+                and self._below.hung_up)
+        if self._early < _EARLY_MAX and not gone:
             return
-        if now - self._early_since <= (
-                _EARLY_TIME if self._below is None else _EARLY_SILENCE):
+        if gone or now - self._early_since <= _EARLY_TIME:
             self._lost = True
             raise BusUnavailable(bus_sentences.other_end_closed())
         self._early = 0

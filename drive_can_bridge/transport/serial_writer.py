@@ -245,6 +245,17 @@ class Below:
     answers: AdapterAnswers | None
     heard: int = 0
 
+    @property
+    def hung_up(self) -> bool:
+        """The other end has gone: unplugged, or closed. False: it is there, or nobody knows."""
+        place = getattr(self.port, 'fd', None)
+        if not isinstance(place, int) or place < 0:
+            return False
+        look = select.poll()
+        look.register(place, 0)     # a hang-up is told without being asked for
+        return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL)
+                   for _, event in look.poll(0))
+
     def clear(self) -> None:
         """Throw away what the adapter has not taken, and end what it has taken a part of."""
         self.port.reset_output_buffer()

@@ -14,6 +14,7 @@ import sys
 import termios
 import time
 import tty
+from types import SimpleNamespace
 from typing import Any
 
 import can
@@ -248,13 +249,28 @@ def test_adapter_that_does_not_wait_has_lost_its_other_end() -> None:
         early.looks(1)
 
 
-def test_it_has_on_a_busy_machine_too_where_bytes_are_counted() -> None:
-    """As python-can's seeedstudio, when it is unplugged."""
+def test_one_that_has_hung_up_is_lost_on_a_busy_machine_too() -> None:
+    """As python-can's seeedstudio, when it is unplugged: the kernel knows, however slow we are."""
+    master, slave = os.openpty()
     early = Early(0.0005)
-    early.port._below = Below(None, None, b'', None)
-    early.looks(999)
+    early.port._below = Below(SimpleNamespace(fd=slave), None, b'', None)
+    early.looks(999)        # it is there, and has nothing
+    os.close(master)
     with pytest.raises(BusUnavailable, match='its other end has closed'):
-        early.looks(1)
+        early.looks(100)
+    os.close(slave)
+
+
+@pytest.mark.parametrize('below', [
+    Below(None, None, b'', None), Below(SimpleNamespace(fd=None), None, b'', None)])
+def test_one_that_looks_a_thousand_times_a_second_is_there(below: Below) -> None:
+    """``timeout: 0.0005`` of seeedstudio, on a bus on which nothing is said."""
+    early = Early(0.0005)
+    early.port._below = below
+    early.looks(5000)
+    early.seconds = 0.00005
+    with pytest.raises(BusUnavailable, match='its other end has closed'):
+        early.looks(2000)
 
 
 def test_status_events_are_no_lost_bus() -> None:
