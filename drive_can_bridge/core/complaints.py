@@ -223,8 +223,12 @@ channel_of_serial = Text(
     '{name!r} is a serial port, allowed is interface: slcan with channel: {name}',
     do='write interface: slcan, and channel: the name of the port')
 driver_missing = Text(
+    "the driver of interface '{interface}' is missing ({why}), allowed is one that is installed: "
+    '{helps}',
     "the driver of interface '{interface}' is missing ({why}), allowed is one that is installed",
-    do="install the driver that python-can's page on that interface names")
+    fields='interface why helps',
+    do="do what the text names, or install the driver that python-can's page on that interface "
+       'names')
 no_serial_port = Text(
     '{channel!r} is no serial port, allowed are a device such as /dev/ttyACM0, '
     'socket://HOST:PORT and rfc2217://HOST:PORT',

@@ -24,7 +24,7 @@ from drive_can_bridge.core.complaints import suggestion
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.transport.bus_identity import identity_of, SERIAL_INTERFACES
-from drive_can_bridge.transport.known_adapters import BY_NAME, traits_of
+from drive_can_bridge.transport.known_adapters import BY_NAME, traits_of, what_helps
 
 #: how a channel begins that pyserial opens, but is no device here; others may write files
 _REMOTE = ('socket://', 'rfc2217://')
@@ -72,14 +72,20 @@ def check_interface(interface: str) -> Sentence | None:
             return complaints.channel_of_kernel(name=interface)
         if interface.startswith('/dev/'):
             return complaints.channel_of_serial(name=interface)
+        helps = what_helps(interface)
+        if helps:
+            return complaints.driver_missing(
+                interface=interface, why='a plug-in of python-can', helps=helps)
         return complaints.no_interface(name=interface, hint=suggestion(interface, known))
     try:
         adapter = _adapter_class(interface)
     except _Unusable as error:
-        return complaints.driver_missing(interface=interface, why=str(error))
+        return complaints.driver_missing(
+            interface=interface, why=str(error), helps=what_helps(interface))
     # python-can's serial adapters import without pyserial, and fail only when they are opened.
     if getattr(inspect.getmodule(adapter), 'serial', adapter) is None:
-        return complaints.driver_missing(interface=interface, why='Python module pyserial')
+        return complaints.driver_missing(
+            interface=interface, why='Python module pyserial', helps=what_helps(interface))
     return None
 
 

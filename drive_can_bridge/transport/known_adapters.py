@@ -39,6 +39,7 @@ class Row:
     :param latency: s that it may keep what it has received, whatever the host says.
     :param listen_only: what makes it listen only.
     :param drops: what it never sends.
+    :param module: of Python, as pip calls it, without which there is no such interface.
     """
 
     name: str
@@ -55,6 +56,15 @@ class Row:
     latency: float = 0.0
     listen_only: str = ''
     drops: tuple[Dropped, ...] = ()
+    module: str = ''
+
+    @property
+    def helps(self) -> str:
+        """What to do where its driver is missing, in plain text; '': nothing is known."""
+        if self.module:
+            return f'pip install {self.module}'
+        instead = self.cure.rpartition('; or ')[2].replace('`', '')
+        return '' if instead.startswith('none ') else instead
 
     @property
     def lines(self) -> str:
@@ -89,7 +99,7 @@ ROWS: tuple[Row, ...] = (
         'answers, rates and limits are those of its firmware, below; stamps of its own clock, or '
         'none; it may still send what it had been handed when the bridge ends',
         '`adapter:` with the name of its row, where there is one', PARSER,
-        listen_only='listen_only: true'),
+        listen_only='listen_only: true', module='pyserial'),
     Row('canable', 'CANable 1 with slcan firmware', 'slcan', '/dev/ttyACM0',
         'answers nothing at all: a refused bit rate or a full queue is not heard; an empty line '
         'carries out the line before again (the bridge never sends one); no command L: with '
@@ -136,15 +146,15 @@ ROWS: tuple[Row, ...] = (
         'it is told by the name that is gone',
         '`frame_type: EXT` for 29-bit drives; `timeout: 0.01`', BYTES,
         options=(('frame_type', 'STD'),), uart=True, line_bits=1.2,
-        listen_only='operation_mode: silent'),
+        listen_only='operation_mode: silent', module='pyserial'),
     Row('robotell', 'Robotell USB-CAN, and the like', 'robotell', '/dev/ttyUSB0',
         'keeps its bit rate; acknowledges settings only', 'none is needed', BYTES,
-        uart=True, line_bits=1.6),
+        uart=True, line_bits=1.6, module='pyserial'),
     Row('serial', "python-can's own format over a serial line: Arduino sketches", 'serial',
         '/dev/ttyUSB0', "bit rate and listen-only are the other end's; has no check sum; before "
         '4.6 python-can takes every identifier for one of 29 bits',
         '`baudrate:` as the other end has it; python-can 4.6 for 11-bit drives', BYTES,
-        uart=True, line_bits=1.3),
+        uart=True, line_bits=1.3, module='pyserial'),
     Row('bluetooth', 'serial ports over Bluetooth', 'slcan', '/dev/rfcomm0',
         'answers come in bursts, tens of ms late', 'a cable; else a `period` of 0.1 and more',
         'not at all', latency=0.05),
@@ -157,7 +167,8 @@ ROWS: tuple[Row, ...] = (
         '(bench)', options=(('host', '10.0.0.5'), ('port', 29536))),
     Row('udp_multicast', 'frames in UDP multicast: no hardware', 'udp_multicast', '239.74.163.2',
         "nobody acknowledges, frames may be lost or doubled; needs the module msgpack; one's own "
-        'frames are told by the address', 'only to try things; never for a motor', SOURCE),
+        'frames are told by the address', 'only to try things; never for a motor', SOURCE,
+        module='msgpack'),
     Row('virtual', 'inside one process: no hardware', 'virtual', 'demo',
         'no other process hears it', 'for tests; `drive_can simulate --pty` for two processes',
         BYTES),
@@ -166,14 +177,14 @@ ROWS: tuple[Row, ...] = (
         'hands back what it has sent, marked; has no filters; fails when it is unplugged in '
         'words of libusb; needs the modules gs_usb and pyusb, and rights to the USB device',
         "the kernel's driver: `socketcan`", 'by the source of python-can 4.3.1 and 4.6.1',
-        options=(('index', 0),)),
+        options=(('index', 0),), module='gs_usb'),
     Row('cantact', "CANtact, by its maker's module", 'cantact', 0,
         'needs the module cantact, which opens the first device it finds',
-        "the kernel's driver: `socketcan`", SOURCE, listen_only='monitor: true'),
+        "the kernel's driver: `socketcan`", SOURCE, listen_only='monitor: true', module='cantact'),
     Row('canalystii', 'CANalyst-II', 'canalystii', 0,
         'needs the module canalystii; is polled: an answer may be some ms late; no error frames, '
         'no listen-only', 'a `period` of 0.02 and more', SOURCE, latency=0.005,
-        options=(('device', 0),)),
+        options=(('device', 0),), module='canalystii'),
     # -- makers' libraries
     Row('pcan', 'PEAK PCAN', 'pcan', 'PCAN_USBBUS1',
         "needs libpcanbasic.so and PEAK's driver (with it, or with the kernel's peak_usb); "
@@ -196,22 +207,23 @@ ROWS: tuple[Row, ...] = (
         SOURCE),
     Row('neovi', 'Intrepid neoVI, ValueCAN', 'neovi', 1,
         'needs the module python-ics and its library',
-        "Intrepid's driver for SocketCAN: `socketcan`", SOURCE),
+        "Intrepid's driver for SocketCAN: `socketcan`", SOURCE, module='python-ics'),
     Row('systec', 'SYS TEC USB-CANmodul', 'systec', 0,
         'python-can knows its Windows library only', "SYS TEC's driver for SocketCAN: `socketcan`",
         SOURCE),
     Row('nixnet', 'National Instruments XNET', 'nixnet', 'CAN1',
         'needs the module nixnet and NI-XNET', 'none is known', SOURCE,
-        listen_only='listen_only: true'),
+        listen_only='listen_only: true', module='nixnet'),
     Row('neousys', 'Neousys computers with CAN', 'neousys', 0,
         'needs libwdt_dio.so', 'none is known', SOURCE, options=(('device', 0),)),
     Row('sontheim', 'Sontheim CANfox and others (plug-in python-can-sontheim)', 'sontheim', 105,
         "needs Sontheim's library; an unknown bit rate becomes 500 kbit/s without a word",
-        'look at the bit rate twice', 'by the source of python-can-sontheim 0.1.3'),
+        'look at the bit rate twice', 'by the source of python-can-sontheim 0.1.3',
+        module='python-can-sontheim'),
     Row('wuensche', 'EMS Dr. Thomas Wünsche (plug-in python-can-wuensche)', 'wuensche', 'CHAN00',
         'needs libcpc.so; channels are those of /etc/cpcconf.ini',
         "the kernel's drivers ems_usb, ems_pci: `socketcan`",
-        'by the source of python-can-wuensche 1.0.0'),
+        'by the source of python-can-wuensche 1.0.0', module='python-can-wuensche'),
 )
 
 #: interfaces of python-can without a row -> why nobody on Linux has one
@@ -249,6 +261,11 @@ def row_of_port(path: str) -> Row | None:
     return next((row for row in ROWS if name.startswith(row.usb or ('?',))), None)
 
 
+def what_helps(interface: str) -> str:
+    """Say what makes an interface usable whose driver is missing; '': nothing is known."""
+    return next((row.helps for row in ROWS if row.interface == interface), '')
+
+
 def traits_of(bus: BusConfiguration) -> AdapterTraits | None:
     """Return what is known of the adapter of a bus; None: nothing."""
     row = row_of(bus)
@@ -256,11 +273,17 @@ def traits_of(bus: BusConfiguration) -> AdapterTraits | None:
         return None
     device = device_of(bus)
     timer = None if device is None else latency_timer(device)
+    if timer is not None:
+        remedy = timer.remedy if timer.seconds > 0.001 else ''
+    elif row.latency:       # it is not plugged in here
+        remedy = row.cure.replace('`', '').replace(
+            'ttyUSB0', 'ttyUSB0' if device is None else port_name(device))
+    else:
+        remedy = ''
     return AdapterTraits(
         row.title if row.name != row.interface else bus.place,
         row.latency if timer is None else timer.seconds,
-        '' if timer is None or timer.seconds <= 0.001 else timer.remedy,
-        _line_rate(bus, row, device), row.line_bits, row.listen_only, row.drops)
+        remedy, _line_rate(bus, row, device), row.line_bits, row.listen_only, row.drops)
 
 
 def _line_rate(bus: BusConfiguration, row: Row, device: str | None) -> int:

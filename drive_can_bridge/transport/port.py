@@ -39,6 +39,7 @@ from drive_can_bridge.transport.failures import (
 from drive_can_bridge.transport.foreign_clock import ForeignClock
 from drive_can_bridge.transport.gateway import Gateway
 from drive_can_bridge.transport.kernel_interfaces import why_lost
+from drive_can_bridge.transport.known_adapters import what_helps
 from drive_can_bridge.transport.raw_socket import ERROR, EXTENDED, NO_DATA, RawSocket
 from drive_can_bridge.transport.serial_writer import Below, watched
 
@@ -444,7 +445,8 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
         _abandon(error)
         reason = in_words(error)
         if is_undefined(error):
-            reason = complaints.driver_missing(interface=bus.interface, why=reason)
+            reason = complaints.driver_missing(
+                interface=bus.interface, why=reason, helps=what_helps(bus.interface))
         text: str = around(reason, f'{where}: ')
         if is_misconfiguration(error):
             raise BusMisconfigured(text) from error

@@ -8,6 +8,7 @@ from saying import says
 from drive_can_bridge.transport.adapters import (
     adapter_keywords, check_bitrate, check_channel, check_interface, missing_keywords,
 )
+from drive_can_bridge.transport.known_adapters import ROWS, what_helps
 
 
 def test_keywords_of_an_adapter() -> None:
@@ -49,7 +50,31 @@ def test_driver_that_cannot_be_imported(monkeypatch: pytest.MonkeyPatch,
 def test_serial_adapter_without_pyserial(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('can.interfaces.slcan.serial', None)
     why = 'Python module pyserial'
-    assert check_interface('slcan') == says('driver_missing', interface='slcan', why=why)
+    assert check_interface('slcan') == says(
+        'driver_missing', interface='slcan', why=why, helps='pip install pyserial')
+
+
+@pytest.mark.parametrize(('interface', 'helps'), [
+    ('canalystii', 'pip install canalystii'), ('gs_usb', 'pip install gs_usb'),
+    ('ixxat', "IXXAT's driver for SocketCAN: socketcan"),
+    ('usb2can', "the kernel's driver usb_8dev: socketcan"),
+    ('sontheim', 'pip install python-can-sontheim'),
+    ('wuensche', 'pip install python-can-wuensche')])
+def test_a_missing_driver_is_told_with_what_helps(
+        interface: str, helps: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plug-ins of python-can, too, which are no interfaces before they are installed."""
+    monkeypatch.setattr(can.interfaces, 'BACKENDS', {
+        name: ('no_such_module', 'Bus') for name in can.interfaces.BACKENDS
+        if name not in ('sontheim', 'wuensche')})
+    assert str(check_interface(interface)).endswith(f'allowed is one that is installed: {helps}')
+
+
+def test_what_helps_of_every_interface_with_a_row() -> None:
+    """Nothing is in back-ticks, and nothing that is none helps."""
+    for row in ROWS:
+        helps = what_helps(row.interface)
+        assert '`' not in helps and not helps.startswith('none')
+    assert what_helps('neousys') == what_helps('zzzzzz') == ''
 
 
 def test_bit_rates() -> None:

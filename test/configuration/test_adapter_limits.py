@@ -10,6 +10,9 @@ from usb_host import Host
 
 from drive_can_bridge.transport import adapters
 
+#: for an adapter that is not plugged in here
+REMEDY = ('latency timer to 1 ms: echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB7/latency_timer, '
+          'for good by a udev rule')
 LAWICEL = 'interface: slcan\n        channel: /dev/ttyUSB7\n        adapter: lawicel'
 
 
@@ -40,7 +43,7 @@ def test_a_period_that_is_shorter_than_what_is_received_is_kept(tmp_path: Path) 
     assert warnings(tmp_path, text, adapters=adapters) == []
     late = text.replace('period: 0.02', 'period: 0.01')
     told = [at(f'f.yaml:{line}: drives.{drive}.period', 'adapter_late', period=0.01, latency='16',
-               adapter='LAWICEL CANUSB', least=0.019, remedy='')
+               adapter='LAWICEL CANUSB', least=0.019, remedy=REMEDY)
             for line, drive in enumerate_periods(late)]
     assert told and warnings(tmp_path, late, adapters=adapters) == told
 

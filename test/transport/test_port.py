@@ -378,7 +378,8 @@ def test_an_adapter_without_its_library(monkeypatch: pytest.MonkeyPatch) -> None
     with pytest.raises(BusMisconfigured) as caught:
         open_port(BusConfiguration('main', 'kvaser', 0), REAL)
     assert str(caught.value) == 'kvaser 0: ' + complaints.driver_missing(
-        interface='kvaser', why="name 'canGetNumberOfChannels' is not defined")
+        interface='kvaser', why="name 'canGetNumberOfChannels' is not defined",
+        helps="the kernel's driver kvaser_usb: socketcan")
 
 
 # -- serial adapters ------------------------------------------------------------------------------
