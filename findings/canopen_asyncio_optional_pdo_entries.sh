@@ -13,12 +13,12 @@
 # Shown with a LocalNode of canopen as device, on python-can's virtual bus. Output seen:
 #   canopen 2.4.1: PDO read, 1 entry
 #   canopen_asyncio 2.4.1: SdoAbortedError 06090011h
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet canopen==2.4.1 canopen-asyncio==2.4.1 python-can==4.6.1
+python3 -m venv "$folder/venv" || exit 77
+"$folder/venv/bin/pip" install --quiet canopen==2.4.1 canopen-asyncio==2.4.1 python-can==4.6.1 || exit 77
 "$folder/venv/bin/python" - <<'PYTHON'
 import importlib
 import logging

@@ -12,13 +12,13 @@
 # Output seen:
 #   2.3.0: -100..65535 is read as -100..-1, 0..32768 as 0..-32768, 0..0x12345 as 0..9029
 #   2.4.1: -100..65535 is read as -100..-1, 0..32768 as 0..-32768, 0..0x12345 as 0..9029
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
 for version in 2.3.0 2.4.1; do
-  python3 -m venv "$folder/$version"
-  "$folder/$version/bin/pip" install --quiet "canopen==$version"
+  python3 -m venv "$folder/$version" || exit 77
+  "$folder/$version/bin/pip" install --quiet "canopen==$version" || exit 77
   "$folder/$version/bin/python" - "$version" <<'PYTHON'
 import io
 import sys

@@ -9,12 +9,12 @@
 # Shown with a network of its own that only notes what is sent; SDO and NMT as from a master.
 # Output seen:
 #   type 3: sent with SYNC 3 4 5 6 7 8 9
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet durand==0.5.0 python-can==4.6.1
+python3 -m venv "$folder/venv" || exit 77
+"$folder/venv/bin/pip" install --quiet durand==0.5.0 python-can==4.6.1 || exit 77
 "$folder/venv/bin/python" - <<'PYTHON'
 import sys
 

@@ -11,13 +11,13 @@
 # Shown with one bus on pyserial's loop:// that hears what it sends; pyserial 3.5. Output seen:
 #   4.5.0: sent 123 with 11 bits, received 123 with 29 bits
 #   4.6.1: sent 123 with 11 bits, received 123 with 11 bits
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
 for version in 4.5.0 4.6.1; do
-  python3 -m venv "$folder/$version"
-  "$folder/$version/bin/pip" install --quiet "python-can==$version" pyserial==3.5
+  python3 -m venv "$folder/$version" || exit 77
+  "$folder/$version/bin/pip" install --quiet "python-can==$version" pyserial==3.5 || exit 77
   "$folder/$version/bin/python" - <<'PYTHON'
 import sys
 

@@ -11,12 +11,12 @@
 #
 # Output seen:
 #   4.6.1: 1.2 ValueError, 1.2 as 1.3 [(3, 1797)], 3.0 ValueError, 3.0 as 2.1 [(3, 1797)]
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet python-can==4.6.1
+python3 -m venv "$folder/venv" || exit 77
+"$folder/venv/bin/pip" install --quiet python-can==4.6.1 || exit 77
 "$folder/venv/bin/python" - <<'PYTHON'
 import io
 import sys

@@ -11,13 +11,13 @@
 # Output seen:
 #   2.5.0: interface told False, link types of two sections 227 227
 #   2.8.0: interface told True, link types of two sections 227 227
-# Exit code 1: the behaviour has changed.
+# Exit code 0: still so; 1: the behaviour has changed; 77: the packages cannot be installed.
 set -eu
-folder=$(mktemp -d)
+folder=$(mktemp -d) || exit 77
 trap 'rm -rf "$folder"' EXIT
 for version in 2.5.0 2.8.0; do
-  python3 -m venv "$folder/$version"
-  "$folder/$version/bin/pip" install --quiet "scapy==$version"
+  python3 -m venv "$folder/$version" || exit 77
+  "$folder/$version/bin/pip" install --quiet "scapy==$version" || exit 77
   "$folder/$version/bin/python" - "$version" <<'PYTHON'
 import io
 from struct import pack
