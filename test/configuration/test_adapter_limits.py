@@ -11,8 +11,8 @@ from usb_host import Host
 from drive_can_bridge.transport import adapters
 
 #: for an adapter that is not plugged in here
-REMEDY = ('latency timer to 1 ms: echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB7/latency_timer, '
-          'for good by a udev rule')
+REMEDY = ('latency timer to 1 ms: echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB7/'
+          'latency_timer, for good by a udev rule')
 LAWICEL = 'interface: slcan\n        channel: /dev/ttyUSB7\n        adapter: lawicel'
 
 

@@ -25,6 +25,8 @@ from repeating import again_and_again
 from test_system_reconnection import rearm_and_move, start_moving
 from waiting import SLOWNESS, wait_for, wait_for_end
 
+from drive_can_bridge.transport.kernel_interfaces import index_of
+
 CHANNEL = os.environ.get('DRIVE_CAN_SOCKETCAN', 'vcan0')
 #: two controllers with a bit rate on one wire, where there are some
 CONTROLLERS = os.environ.get('DRIVE_CAN_CONTROLLERS', '').split()
@@ -235,6 +237,45 @@ def test_interface_taken_down_and_up_deleted_and_created(
         rearm_and_move(client, drive, bridge, simulator, count)
     assert bridge.end() == 0
     assert simulator.end() == 0
+
+
+def test_interface_that_is_renamed(processes: Processes, client: Client, namespace: str,
+                                   tmp_path: Path, ends: tuple[str, str]) -> None:
+    """It is still the interface of this number, but not the one that the file names."""
+    own, there = ends
+    if own != OWN:
+        pytest.skip('the drives are on another interface')
+    other = f'{own}2'
+    file = bridge_file(tmp_path, interface='socketcan', channel=own, drives=DRIVES)
+    simulator = processes.simulator(file, '--channel', there, link=False)
+    bridge = processes.bridge(file, namespace)
+    drive = f'/{namespace}/conveyor'
+    start_moving(client, drive)
+    bridge.error('bus main: open')
+    told = len(bridge.errors)
+    ip('link', 'set', 'dev', own, 'down')
+    try:
+        ip('link', 'set', 'dev', own, 'name', other)
+        ip('link', 'set', 'dev', other, 'up')
+        client.online(drive, wanted=False)
+        why = f'interface {own} is called {other} now'
+        client.diagnostics(f'{namespace}/drive_can_bridge: bus main', state='^down$',
+                           message=why)
+        bridge.error(f'bus main: {why}: write it as channel, or', since=told)
+        # nothing is sent on an interface that the file does not name
+        count = len(simulator.frames())
+        assert client.set(drive, ramp_time=1.0) == [(False, 'bus down')]
+        assert not simulator.frames(' R$', count)
+    finally:
+        name = other if index_of(other) else own
+        ip('link', 'set', 'dev', name, 'down')
+        if name == other:
+            ip('link', 'set', 'dev', other, 'name', own)
+        ip('link', 'set', 'dev', own, 'up')
+    rearm_and_move(client, drive, bridge, simulator, count)
+    assert bridge.end() == 0
+    wait_for_end(lambda: simulator.frames('^003FFFF0#.* R$'),
+                 ['003FFFF0#000003E800000000 R'] * 3)
 
 
 def stranger(channel: str) -> socket.socket:
