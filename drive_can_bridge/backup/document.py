@@ -36,6 +36,7 @@ from typing import Any
 from drive_can_bridge.client.drive import Drive, DriveFacts
 from drive_can_bridge.configuration.parameter_file import PARAMETERS_KEY, read_sections
 from drive_can_bridge.configuration.problems import report
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, ValueKind
 from drive_can_bridge.core.profile import RestoreStep, RestoreTable
@@ -63,7 +64,7 @@ def raw_in_file(parameter: Parameter, value: object) -> int:
     :raises ValueRefused: a value of another kind.
     """
     if isinstance(value, float) and not math.isfinite(value):
-        raise ValueRefused(f'{value} is not a finite number')
+        raise ValueRefused(command_sentences.value_not_finite(value=value))
     kind = parameter.kind if parameter.listed else ValueKind.INTEGER
     if kind is ValueKind.BOOL:
         if isinstance(value, bool):
@@ -77,8 +78,8 @@ def raw_in_file(parameter: Parameter, value: object) -> int:
             return parameter.raw_from_value(value)
         except ValueRefused:
             return _nearest_raw(parameter, value)
-    raise ValueRefused(f'wrong type: {show(value)} is {describe_type(value)}, allowed is '
-                       f'{kind.words}')
+    raise ValueRefused(command_sentences.value_of_other_type(
+        value=show(value), found=describe_type(value), allowed=kind.words))
 
 
 def _nearest_raw(parameter: Parameter, value: float) -> int:
@@ -280,27 +281,27 @@ def read_backup(path: Path) -> Backup:
         raise ConfigurationError(report(problems))
     if len(sections) != 1:
         names = ', '.join(section.name for section in sections)
-        raise _wrong(path, f'has sections of {len(sections)} nodes ({names}), allowed is one'
-                     if sections else 'has no parameters of any node: this is no backup')
+        raise _wrong(path, command_sentences.backup_of_several(count=len(sections), names=names)
+                     if sections else command_sentences.backup_without_node())
     section, = sections
     data = section.tree.data
     if _BRIDGE_KEYS & set(data):
-        raise _wrong(path, f'is a parameter file of a bridge, not a backup of a drive (it has '
-                           f'{", ".join(sorted(_BRIDGE_KEYS & set(data)))})')
+        raise _wrong(path, command_sentences.bridge_file_no_backup(
+            keys=', '.join(sorted(_BRIDGE_KEYS & set(data)))))
     values = dict(_flat(data, ()))
     backup = Backup(
         str(path), section.name,
         {'.'.join(place): value for place, value in values.items() if value != NOT_SET},
         _head(path), {'.'.join(place): section.tree.line(place) for place in values})
-    wrong = [backup.problem(name, f'{_described(value)}, allowed is a number, true or false')
+    wrong = [backup.problem(name, command_sentences.no_backup_value(found=_described(value)))
              for name, value in backup.values.items()
              if not isinstance(value, (bool, int, float))]
-    wrong += [backup.problem(name, f'a name longer than {TEXT_MAX} characters')
+    wrong += [backup.problem(name, command_sentences.backup_name_too_long(most=TEXT_MAX))
               for name in backup.lines if len(name) > TEXT_MAX]
     if wrong:
         raise ConfigurationError(wrong)
     if not values:
-        raise _wrong(path, 'has no parameters: this is no backup')
+        raise _wrong(path, command_sentences.backup_without_parameters())
     return backup
 
 

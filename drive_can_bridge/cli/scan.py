@@ -463,10 +463,8 @@ def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
     if survey.trouble:
         complain(command_sentences.scan_trouble(trouble=survey.trouble))
     elif not survey.frames and not port.error_frames:
-        complain('nothing was heard: ' + (
-            'no drive answers at this bit rate; check power, cable and termination, try '
-            '--bitrates, and --protocols for drives with 11-bit identifiers' if asked else
-            'drives speak when they are asked'))
+        complain(command_sentences.nothing_answered() if asked
+                 else command_sentences.nothing_heard())
 
 
 def _compare_bitrates(args: Namespace, bus: BusConfiguration) -> int:

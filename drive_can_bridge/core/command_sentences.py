@@ -86,7 +86,7 @@ buses_on_one = Text(
     '{given} puts the buses {buses} on one: use --pty, or a parameter file with one bus')
 pty_or_interface = Text(
     '--pty and --interface/--channel exclude each other',
-    do='leave one of them away')
+    do='leave one of them away: --pty makes buses of its own')
 no_object_written = Text("'{part}' is no object; write 6007h or 1800h.05h")
 no_drive_without = Text('{index:04X}h: without it there is no drive', do='leave that object there')
 option_of_other_family = Text(
@@ -95,7 +95,9 @@ no_simulated_drive = Text("no drive '{word}'; drives: {drives}; also: status, li
 value_missing = Text('what is to be written? NAME=VALUE is missing')
 name_and_value = Text('{word}: allowed is NAME=VALUE; nothing was written')
 name_twice = Text('{name} stands twice; nothing was written')
-one_file_for_several = Text('{count} drives ({names}) do not go into one file: write -o {wanted}/')
+one_file_for_several = Text(
+    '{count} drives ({names}) do not go into one file: write -o {wanted}/',
+    do='write -o with a / behind the name: a directory, with a file for each drive')
 
 # -- drive_can: what a command needs, and does not find -------------------------------------------
 library_hangs = Text(
@@ -265,6 +267,13 @@ not_asked_beside_canopen = Text(
     '{name} is not asked: there is a CANopen node ({nodes}), which might take its reads for '
     'process data',
     do='ask it on a bus of its own')
+nothing_answered = Text(
+    'nothing was heard: no drive answers at this bit rate; check power, cable and termination, '
+    'try --bitrates, and --protocols for drives with 11-bit identifiers',
+    do='check these; give --protocols for drives with 11-bit identifiers')
+nothing_heard = Text(
+    'nothing was heard: drives speak when they are asked',
+    do='leave --passive away where no other master is on the bus')
 error_frames_seen = Text('{count} error frames{told}', do='check cable, termination and bit rate')
 no_drive_found = Text(
     'no drive found, {frames} frames heard',
@@ -326,7 +335,9 @@ rest_not_read = Text(
     'the rest cannot be read: {failure}',
     do='copy the file again: it is cut or damaged')
 no_db_entry = Text('entry {number}: no entry of a .db trace', do='nothing: the rest is read')
-recording_ended = Text('the recording has ended', do='activate the bridge')
+recording_ended = Text(
+    'the recording has ended',
+    do='activate the bridge: it records while it is active')
 trace_written = Text(
     'bus {bus}: trace of {reason}, {count} frames of the last {seconds:g} s: {path}',
     do='read it: drive_can decode FILE')
@@ -381,18 +392,24 @@ panel_other_site = Text(
 panel_without_writes = Text(
     'this panel was started without --allow-writes',
     do='start it with --allow-writes, or write by drive_can write')
-panel_busy = Text('others are at it already: try again in a moment', do='try again in a moment')
+panel_busy = Text(
+    'others are at it already: try again in a moment',
+    do='try again in a moment: one write or restore runs at a time')
 panel_needs_operator = Text(
     "{what} needs the operator's token; this browser came with the viewer's",
     do='open the address of the operator that drive_can panel has printed')
-panel_wrong_kind = Text('say it in {kind}', do='reload the page')
-panel_no_json = Text('that is no JSON object', do='reload the page')
+panel_wrong_kind = Text(
+    'say it in {kind}',
+    do='reload the page; a program has to send that content type')
+panel_no_json = Text(
+    'that is no JSON object',
+    do='reload the page; a program has to send a JSON object')
 panel_no_parameter = Text(
     '{drive} has no such parameter',
     do='reload the page: the profile is another one')
 panel_no_value = Text(
     '{name}: no value, allowed is a string: what a person types',
-    do='reload the page')
+    do='reload the page; a program has to send the value as text')
 panel_no_drive = Text('no drive {name} here', do='reload the page; see whether its bridge runs')
 panel_knows_no_parameters = Text(
     '{drive} has not told of its parameters yet',
@@ -467,7 +484,7 @@ same_address = Text('the same address as in line {first}', do='nothing: the firs
 no_object_section = Text('is no section of an object', do='nothing')
 object_not_understood = Text('is no object that can be understood', do='correct it by the manual')
 decimal_or_grouping = Text("'{text}' may be {one:g} or {other}: say which with --decimal")
-no_range = Text("'{text}' is no range", do='write it as LOW..HIGH')
+no_range = Text("'{text}' is no range", do='write it as 0 … 100, or as two columns')
 scale_zero = Text("'{text}' is no scale: 0", do='correct it by the manual')
 divides_by_zero = Text("'{text}' divides by zero", do='correct it by the manual')
 
@@ -479,9 +496,13 @@ which_channel = Text(
     'the trace has the channels {channels:, }; which of them is bus {bus} of the parameter file? '
     'Give {options: or }',
     do='give one of these options')
-panel_not_there = Text('drive_can panel: {host}, port {port}: {why}{advice}')
-other_port = Text('; --port chooses another')
-other_host = Text(': no address of this machine, --host chooses another')
+panel_not_there = Text(
+    'drive_can panel: {host}, port {port}: {why}{advice}',
+    do='choose another port by --port, or an address of this machine by --host')
+other_port = Text('; --port chooses another', do='give --port with another number')
+other_host = Text(
+    ': no address of this machine, --host chooses another',
+    do='give --host with an address of this machine (ip address shows them)')
 no_such_headings = Text('no row has the headings {missing:, }; there are: {there:, }')
 no_entry_usable = Text(
     'no entry can be used; the first reason, in line {reason}',
@@ -496,6 +517,45 @@ device_is_no_drive = Text(
 head_missing = Text(
     'section [{index:04X}] is missing; what is imported are its sub-indices', do='nothing')
 cell_empty = Text('it is empty', do='correct it by the manual')
+
+# -- backups and simulated drives: what is wrong with a file, or an option ------------------------
+value_of_other_type = Text(
+    'wrong type: {value} is {found}, allowed is {allowed}',
+    do='correct that line of the backup')
+value_not_finite = Text('{value} is not a finite number', do='correct that line of the backup')
+backup_of_several = Text(
+    'has sections of {count} nodes ({names}), allowed is one',
+    do='give the file of one drive')
+backup_without_node = Text(
+    'has no parameters of any node: this is no backup',
+    do='give a file that drive_can backup or ros2 param dump has written')
+bridge_file_no_backup = Text(
+    'is a parameter file of a bridge, not a backup of a drive (it has {keys})',
+    do='give a file that drive_can backup or ros2 param dump has written')
+no_backup_value = Text(
+    '{found}, allowed is a number, true or false',
+    do='correct that line of the backup')
+backup_name_too_long = Text(
+    'a name longer than {most} characters',
+    do='correct that line of the backup')
+backup_without_parameters = Text(
+    'has no parameters: this is no backup',
+    do='give a file that drive_can backup or ros2 param dump has written')
+habit_impossible = Text("'{part}' is not possible; allowed: {allowed}")
+no_sto_input = Text(
+    '{drive} has no input for safe torque off',
+    do='use another fault: list shows them')
+simulated_no_parameter = Text("{drive} has no parameter '{name}'")
+simulated_no_value = Text(
+    "'{text}' is no value of {name}, which is {kind}",
+    do='type a number, or a name of the values of the profile')
+simulated_fault_unknown = Text(
+    "unknown fault '{word}'{hint}; allowed: {allowed}",
+    do='type list at the simulator, or see drive_can simulate --help')
+simulated_fault_form = Text(
+    "'{text}' is not a fault, write {usage}",
+    do='type list at the simulator, or see drive_can simulate --help')
+simulated_fault_argument = Text("'{argument}' is not possible, write {usage}: {meaning}")
 
 #: all of them, by their codes
 CODES = catalogue(

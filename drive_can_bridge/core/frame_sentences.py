@@ -62,7 +62,7 @@ parameter_frame_length = Text(
     '{length} data bytes: parameter frames have {wanted}', do=_FIRMWARE)
 task_bit_set = Text(
     'bit 11 of the task identifier is set',
-    do='nothing: the inverter tells of itself what nobody asked for; switch that off at it')
+    do='nothing: the inverter tells by itself of a value that has changed; switch that off at it')
 
 # -- drive_can decode: what it remarks of a telegram ----------------------------------------------
 broadcast_of_others = Text(
@@ -104,7 +104,9 @@ hazard_maps = Text(
     do='ask only where no such inverter is on the bus')
 
 # -- drive_can scan and probe: what they found out ------------------------------------------------
-seems_requests = Text('what looks like requests of {protocol}', do='end the other master')
+seems_requests = Text(
+    'what looks like requests of {protocol}',
+    do='end the other master, or scan with --passive')
 requests_to_station = Text('requests to station {station} of {protocol}',
                            do='end the other master, or scan with --passive')
 sdo_requests_to = Text('SDO requests to node {node}',
@@ -140,7 +142,7 @@ layout_first = Text('the layout comes first', do='see what it says of layout')
 node_silent = Text(
     'no answer: a node that is not operational answers no PKW (--nmt-start starts it); check '
     'station, bit rate, request_cob_id and response_cob_id',
-    do='give --nmt-start, or check these')
+    do='give --nmt-start where nothing else starts the node; else compare these with the drive')
 one_value_only = Text(
     'one value is not enough: {told}; try again while the motor runs',
     do='try again while the motor runs')
@@ -173,13 +175,16 @@ mapping_holds = Text(
 mapping_fits = Text(
     'all PDOs are mapped as the file wants them; configure does no harm', do='nothing')
 brakes_by_ramp = Text('{told}: {word} brakes by ramp', do='nothing')
-manual_says = Text('{told}: the manual says what {word} does', do='look there')
+manual_says = Text(
+    '{told}: the manual says what {word} does',
+    do='look that value up in the manual of the drive')
 always_coasts = Text(
     '{told}: the axis coasts with every word; write 605Ch := 1 if it may be',
     do='write 605Ch := 1 where the drive takes it; else a brake has to hold the axis')
 nothing_watches = Text(
     '{told}: the drive cannot watch the bridge, nothing stops it when the bridge dies',
     do='see in the manual for another watchdog; a safety circuit has to stop it')
+no_heartbeat_places = Text('1016h has no places', do='see in the manual for another watchdog')
 misses_without_effect = Text(
     '{told}: it does nothing when it misses the bridge; write 6007h',
     do='write 6007h (3: quick stop), and store it')
@@ -195,7 +200,8 @@ maps_nowhere = Text(
     'nothing, {told}',
     do='compare cyclic_request and cyclic_response with the maps of the drive')
 maps_unanswered = Text(
-    'the maps are not answered; check request_map_base and response_map_base', do='check them')
+    'the maps are not answered; check request_map_base and response_map_base',
+    do='compare these two keys with the manual of the drive')
 maps_in_several = Text(
     'the maps of the file are in more than one place, {told}',
     do='read in the manual how the drive counts its parameters')

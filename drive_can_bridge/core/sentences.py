@@ -37,7 +37,7 @@ no_answer = Text(
     'no answer in {timeout:g} s, {attempts:#attempt}',
     do='look whether the drive has this parameter, and at its cable; raise parameter_timeout '
        'for a slow one')
-no_answer_briefly = Text('no answer', do='read it at the drive')
+no_answer_briefly = Text('no answer', do='read it at the drive; see diagnostics of the drive')
 no_answer_offline = Text(
     'no answer; drive offline',
     do='see what diagnostics say of the drive; power, cable, station, bit rate')
@@ -86,7 +86,9 @@ nothing_written = Text('{why}; nothing was written', do='what the reason says')
 
 # -- requests: why a value or a name is refused before any frame ----------------------------------
 read_only = Text('read-only', do='nothing; the profile says so')
-out_of_range = Text('{value} is out of range: {allowed}', do='send a value inside')
+out_of_range = Text(
+    '{value} is out of range: {allowed}',
+    do='send a value inside that range; the profile has it as minimum and maximum')
 too_many_bits = Text(
     'a number of {bits} bits is out of range: {allowed}',
     do='send a value inside')
@@ -117,11 +119,13 @@ unknown_parameter = Text(
     'unknown parameter {name}',
     do='use a name of the profile, or a raw one')
 use_enable = Text('use ~/enable', do='call the service; the control word is not written by hand')
-sent_cyclically = Text('sent cyclically: publish ~/command/{name}', do='publish it')
+sent_cyclically = Text(
+    'sent cyclically: publish ~/command/{name}',
+    do='publish it: the bridge sends it each cycle')
 sent_by_group = Text(
     'sent cyclically by the broadcast group: publish {leader}/command/{name}',
     fields='name leader',
-    do='command the leader')
+    do='command the leader of the group: its drives get the same frame')
 mapping_parameter = Text(
     'mapping parameter: not written while the bridge is active',
     do='deactivate the bridge, or use mapping configure')
@@ -144,7 +148,8 @@ steadily_late = Text(
 clocks_differ = Text(
     'command on {topic} thrown away: the clocks of its publishers differ by {seconds:.2f} s: '
     'synchronise the clocks of the hosts',
-    do='synchronise the clocks of the hosts')
+    do='synchronise the clocks of the hosts (chrony or ntp; chronyc tracking shows the '
+       'difference)')
 
 # -- control: what became of enable, disable, quick stop and fault reset --------------------------
 no_control_section = Text(
@@ -154,13 +159,13 @@ nothing_commanded = Text('nothing is commanded', do='nothing')
 neutral_without_control = Text('neutral; it has no control word', do='nothing')
 neutral_unanswered = Text(
     'told to be neutral, but no answer to that in {timeout:g} s',
-    do='stop it by other means')
+    do='make sure that the drive stands still, by other means if need be')
 disabled_instead = Text(
     '{outcome}; told to disable, the profile has no quick_stop word',
     do='nothing')
 no_reset_word = Text(
     'no fault reset: the profile has no reset_fault word',
-    do='reset it at the drive')
+    do='reset it at the drive, or add reset_fault to the words of the control section')
 reset_first = Text(
     'fault {fault}: remove its cause, then reset it first',
     'fault: reset it first',
@@ -202,7 +207,7 @@ state_not_reported = Text(
     do='look at the drive; add a status condition to the profile where there is one')
 reset_not_reported = Text(
     'reset_fault sent; the drive does not report faults',
-    do='look at the drive')
+    do='look at the drive: whether the fault has gone is not known')
 fault_present = Text(
     ('fault {fault}: remove its cause, then reset it again; still present after {timeout:g} s '
      '({status})'),
@@ -276,7 +281,7 @@ homing_needs_enabled = Text(
     do='call ~/enable')
 homing_needs_disarmed = Text(
     'it is armed: stop commanding it, until command_timeout has passed',
-    do='stop the commands')
+    do='end what publishes its commands, wait for command_timeout, call ~/home again')
 homing_timed_out = Text(
     'homing not ended in {timeout:g} s: stopped {step}',
     do='look at method, speeds and switches (6098h, 6099h); raise homing_timeout')
@@ -325,7 +330,8 @@ status_missing = Text(
 disregards = Text(
     'still {state} ({status}) although its control word is {action} ({word:04X}h): stop it by '
     'other means, or set a control_timeout longer than its ramp',
-    do='stop it by other means')
+    do='stop it by other means; see whether the drive takes its control word from the bus '
+       '(local control, inputs)')
 
 # -- defects of this program ----------------------------------------------------------------------
 internal_error = Text(
@@ -369,7 +375,7 @@ write_unanswered = Text('{what}: no answer', do='see why the drive does not answ
 write_not_taken = Text('{what} not taken by the bus', do='look at cable, termination and bit rate')
 write_not_acknowledged = Text(
     '{what} not acknowledged in {attempts} attempts',
-    do='see why the drive does not answer')
+    do='look at power, cable and station of the drive; see its diagnostics')
 node_may_be_stopped = Text(
     'a node that NMT has stopped answers no SDO: only an NMT command (pre-operational, start) of '
     'its own master helps',
@@ -382,7 +388,9 @@ write_refused = Text('{what} {reason}', do='look the code up in the manual of th
 # -- why a drive is offline, and what to look at --------------------------------------------------
 not_activated = Text('not activated', do='activate the bridge')
 deactivated = Text('deactivated', do='activate the bridge')
-looked_for = Text('being looked for', do='wait a moment')
+looked_for = Text(
+    'being looked for',
+    do='wait a moment; where that stays, check power, cable, station and bit rate')
 set_up_unanswered = Text(
     'no answer to SDO: drive silent, wrong station or bit rate',
     kinds=(Absence.SILENT,),
@@ -450,26 +458,29 @@ silent = Text(
     '{what}: {look_at}',
     kinds=(Absence.SILENT,),
     do='look at what it names')
-lost_because = Text('{why}: {gap}', do='correct cyclic_response')
+lost_because = Text('{why}: {gap}', do='correct cyclic_response: take out what the drive lacks')
 maps_unread = Text(
     'no answer to mapping read: drive silent, wrong station, bit rate or identifier mode',
-    do='look at what it names')
+    do='check power, cable, station and bit rate; drive_can scan shows which drives answer')
 cycles_unanswered = Text(
     'no cyclic response: drive silent or response identifier taken',
     kinds=(Absence.SILENT,),
-    do='look at what it names')
+    do='check power, cable and station; see whether another station has the same number')
 reads_unanswered = Text(
     'no answer to reads: drive silent, wrong station, bit rate or identifier mode',
     kinds=(Absence.SILENT,),
-    do='look at what it names')
+    do='check power, cable, station and bit rate; drive_can scan shows which drives answer')
 rounds_unanswered = Text(
     'no complete round of reads: drive silent, not operational, or other COB-IDs than configured',
     kinds=(Absence.SILENT,),
-    do='look at what it names')
+    do='check power, cable and node-ID; start the node (nmt_start), compare the COB-IDs '
+       '(drive_can probe)')
 one_read_unanswered = Text(
     'no answer to the read of {names}, though others are answered: does this drive have it',
-    do='correct cyclic_response')
-restarted_waiting = Text('the device restarted: waiting for it to answer', do='wait')
+    do='take it out of cyclic_response, or correct its number in the profile')
+restarted_waiting = Text(
+    'the device restarted: waiting for it to answer',
+    do='wait; where it restarts again and again, see its power supply')
 
 # -- maps -----------------------------------------------------------------------------------------
 mapping_differs = Text(
@@ -577,8 +588,12 @@ other_master_broadcasts = Text(
 
 # -- what a drive says of itself, or does not take ------------------------------------------------
 booted = Text('boot-up: the device has started', do='nothing')
-emergency = Text('emergency {text}', do='remove its cause')
-emergency_lasts = Text('emergency {text}: remove its cause', do='remove its cause')
+emergency = Text(
+    'emergency {text}',
+    do='look its code up in the manual of the drive, and remove its cause')
+emergency_lasts = Text(
+    'emergency {text}: remove its cause',
+    do='look its code up in the manual of the drive, and remove its cause')
 emergency_over = Text('emergency over: the node reports no error any more', do='nothing')
 no_heartbeat_producer = Text(
     'it takes no heartbeat time (1017h): its heartbeat is not watched',
@@ -632,7 +647,7 @@ neutral_not_taken = Text(
 timeout_too_tight = Text(
     'telegram time-out {timeout:g} s ({name}, {address}) is too tight for a period of '
     '{period:g} s: set it to {least:g} s or more, or shorten the period',
-    do='set P513 or the period')
+    do='raise P513 of the inverter, or shorten the period of the drive')
 not_monitored = Text(
     'nothing stops this inverter when the bridge dies: its telegram time-out ({name}, {address}) '
     'is {timeout:g} s, which is none', fields='name address timeout',
@@ -676,7 +691,9 @@ rearm_would_jump = Text(
 nobody_answered = Text(
     'nobody answered: is its bridge still running?',
     do='see whether the bridge runs')
-write_not_confirmed = Text('not confirmed: it may have been written', do='read it')
+write_not_confirmed = Text(
+    'not confirmed: it may have been written',
+    do='read it: it may have been written')
 answer_not_delivered = Text(
     'an answer of {service} could not be delivered: its caller takes none (another QoS, or DDS '
     'has not found all of it)',
@@ -782,10 +799,12 @@ bus_of_drive_opening = Text('bus {bus} is not open yet', do='wait')
 never_seen = Text(
     'not seen since start: {why}; check its power, cable, station number and bit rate',
     do='check its power, cable, station number and bit rate')
-not_online = Text('not online since start: {why}', do='see what it says')
+not_online = Text(
+    'not online since start: {why}',
+    do='see what the reason says; then its power, cable and station')
 offline_since = Text(
     'offline since {since}, was online before: {why}',
-    do='see what it says')
+    do='see what the reason says; then its power, cable and station')
 not_seen = Text('not seen since start: {why}', do='see what diagnostics say of the bus')
 drives_missing = Text(
     '{online} of {drives:#drive} online; not seen: {missing:, }',
@@ -821,14 +840,18 @@ disabled = Text('disabled: {enable}', do='enable it, if it is to move')
 disabled_and_commanded = Text(
     'disabled: {enable}; commands arrive, and change nothing',
     do='enable it, or stop what commands it')
-not_armed = Text('not armed: publish {wanted: and }', do='publish what is named')
+not_armed = Text(
+    'not armed: publish {wanted: and }',
+    do='publish what the text names once (neutral), then the value')
 slow_exchange = Text(
     'an exchange takes {mean} ms, the period is {period} ms: the drive is slow; choose a '
     'longer period or a shorter cyclic_response',
     mean=lambda mean: f'{1e3 * mean:.0f}',
     period=lambda period: f'{1e3 * period:g}',
     do='choose a longer period or a shorter cyclic_response')
-one_master_only = Text('{seen}: there must be one master only', do='end the other master')
+one_master_only = Text(
+    '{seen}: there must be one master only',
+    do='end the other master: a drive obeys whoever was last')
 frames_rejected = Text(
     '{frames} frames rejected, the last: {last}; check for a second station with the same number',
     do='check for a second station with the same number')
@@ -946,11 +969,15 @@ command_while_not_armed = Text(
 joint_command_short = Text(
     'joint_command has fewer {quantity} values than names',
     do='have its publisher give as many values as names')
-call_enable = Text('call ~/enable{whom} ({command})', do='run that command')
+call_enable = Text(
+    'call ~/enable{whom} ({command})',
+    do='run that command, and mind that it may then be commanded')
 call_reset = Text(
     'call ~/reset_fault{whom} ({reset}) and ~/enable ({enable})',
     do='run these commands, when the cause is gone')
-reset_at_drive = Text('reset it at the drive', do='reset it at the drive')
+reset_at_drive = Text(
+    'reset it at the drive',
+    do='see in its manual how: a key, an input, power off and on')
 attendance_failed = Text('attendance: {kind}: {text}', do='report it')
 any_command_to = Text('a command to {topic}/command/{name}', do='publish it')
 neutral_to = Text('{neutral} to {topic}/command/{name}', do='publish it')
@@ -1006,7 +1033,7 @@ unknown_order = Text(
     do='use a command of the same version as the bridge')
 lines_left_out = Text(
     '{lines} more lines left out: too many different ones at once',
-    do='see what floods the log')
+    do='see what floods the log: the lines before')
 names_in_call = Text(
     '{names} names in one call, at most {most} are allowed',
     do='ask with fewer names in one call')
@@ -1095,7 +1122,9 @@ telegrams_supervised = Text(
     '{drive}: {address} is not 0: the drive supervises telegrams once it has got one, and faults '
     'when they end',
     do='set it to 0 while you work without the bridge, or reset the fault afterwards')
-bus_not_opening = Text('bus {bus}: it does not open', do='look at the adapter and its settings')
+bus_not_opening = Text(
+    'bus {bus}: it does not open',
+    do='see the lines before it; drive_can adapters shows which adapters there are')
 other_master_talks = Text(
     'bus {bus}: another master talks to drive {drive} ({frame}); end it first',
     do='end the other master; there must be one only')
@@ -1109,7 +1138,7 @@ no_bridge_or_file = Text(
     do='start a bridge, or give --params-file')
 several_bridges = Text(
     'several bridges are running: {names:, }; choose one with --namespace',
-    do='choose one with --namespace')
+    do='give --namespace NS: what stands before the last / of its name')
 bridges_of_one_name = Text(
     '{count} bridges are called {name}: start each in a namespace of its own',
     do='start each in a namespace of its own')
@@ -1145,7 +1174,9 @@ no_bridge_tells = Text(
     do='see which process has that drive; make sure that the drive stands still')
 setpoint_of_bridge = Text('sent cyclically: a setpoint', do='publish it, or use drive_can jog')
 word_of_bridge = Text('control word: use ~/enable', do='use drive_can enable, disable, stop')
-map_of_bridge = Text('a map: not written while the bridge runs', do='use mapping configure')
+map_of_bridge = Text(
+    'a map: not written while the bridge runs',
+    do='use mapping: configure, which writes the maps, or deactivate the bridge')
 
 # -- a restore: why a setting is not as in the file -----------------------------------------------
 drive_has_not = Text('the drive has no such parameter', do='nothing; its firmware is another one')

@@ -77,5 +77,5 @@ def _in_words(held: Held, what: str, advice: str) -> InUse:
     process = 'another process' if held.process is None else f'process {held.process}'
     if held.who not in ('', BRIDGE):
         process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
-        advice = 'wait until it is done, or end it'
+        advice = bus_sentences.wait_or_end()
     return InUse(bus_sentences.in_use(what=what, process=process, advice=advice))

@@ -15,6 +15,7 @@ import math
 import random
 from typing import Any, NamedTuple
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
@@ -141,10 +142,9 @@ class Habits(PdoHabits):
             try:
                 given[key] = _HABITS[key][1](value)
             except (KeyError, ValueError):
-                raise ValueRefused(
-                    f"'{part.strip()}' is not possible; allowed: "
-                    f'{", ".join(f"{name}={what}" for name, (what, _) in _HABITS.items())}',
-                ) from None
+                raise ValueRefused(command_sentences.habit_impossible(
+                    part=part.strip(), allowed=', '.join(
+                        f'{name}={what}' for name, (what, _) in _HABITS.items()))) from None
         return cls(**given)
 
 

@@ -20,6 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import math
 from typing import Protocol
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route
@@ -276,7 +277,7 @@ class SimulatedDrive(ABC):
         :raises ValueRefused: this drive has none.
         """
         if not allowed:
-            raise ValueRefused(f'{self.name} has no input for safe torque off')
+            raise ValueRefused(command_sentences.no_sto_input(drive=self.name))
 
     def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
         """Forget what a family keeps outside the registers."""
@@ -327,7 +328,8 @@ class SimulatedDrive(ABC):
         raw = family.raw_parameter(self.configuration, name)
         known = self.table.name_of(raw) if raw else None
         if known is None:
-            raise ValueRefused(f"{self.name} has no parameter '{name}'")
+            raise ValueRefused(command_sentences.simulated_no_parameter(
+                drive=self.name, name=name))
         return known
 
     def _foreign_frames(self, answer: Frame) -> list[Frame]:
@@ -371,5 +373,5 @@ def _value(parameter: Parameter, text: str) -> Value:
             return {'true': True, 'false': False}[text]
         return int(text, 0) if parameter.kind is ValueKind.INTEGER else float(text)
     except (KeyError, ValueError):
-        raise ValueRefused(f"'{text}' is no value of {parameter.name}, which is "
-                           f'{parameter.kind.words}') from None
+        raise ValueRefused(command_sentences.simulated_no_value(
+            text=text, name=parameter.name, kind=parameter.kind.words)) from None

@@ -14,6 +14,7 @@ from itertools import count
 import math
 from typing import Any
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.text import nearest
@@ -104,17 +105,18 @@ def parse_fault(text: str) -> Fault:
     if kind is None:
         near = nearest(word, _BY_WORD)
         hint = f' (nearest: {near})' if near else ''
-        raise ValueRefused(f"unknown fault '{word}'{hint}; allowed: "
-                           f"{', '.join(kind.usage for kind in FaultKind)}")
+        raise ValueRefused(command_sentences.simulated_fault_unknown(
+            word=word, hint=hint, allowed=', '.join((kind.usage for kind in FaultKind))))
     if not equals and not kind.required:
         return Fault(kind)
     if kind.convert is None or not argument:
-        raise ValueRefused(f"'{text.strip()}' is not a fault, write {kind.usage}")
+        raise ValueRefused(command_sentences.simulated_fault_form(
+            text=text.strip(), usage=kind.usage))
     try:
         return Fault(kind, kind.convert(argument))
     except ValueError:
-        raise ValueRefused(f"'{argument}' is not possible, write {kind.usage}: "
-                           f'{kind.meaning}') from None
+        raise ValueRefused(command_sentences.simulated_fault_argument(
+            argument=argument, usage=kind.usage, meaning=kind.meaning)) from None
 
 
 class FaultyOutbox:

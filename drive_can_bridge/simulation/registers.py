@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
 from drive_can_bridge.core.parameters import Parameter, Storage, Value
@@ -100,7 +101,8 @@ class Mechanics:
                     raise ValueError
             except (KeyError, ValueError):
                 allowed = ', '.join(f'{name}=0…{most:g}' for name, most in highest.items())
-                raise ValueRefused(f"'{part.strip()}' is not possible; allowed: {allowed}",
+                raise ValueRefused(command_sentences.habit_impossible(
+                    part=part.strip(), allowed=allowed),
                                    ) from None
         return cls(**given)  # type: ignore[arg-type]  # each has the type of its range
 

@@ -283,3 +283,72 @@ def test_a_kind_is_that_of_the_form_and_a_sentence_gets_further_fields() -> None
     assert said.also(answers=True) == 'answers, but there is no heartbeat for 0.1 s'
     assert sentences.node_state('stopped').kind is Absence.SILENT
     assert sentences.booted().kind is None and NOTHING.also(more=1) is NOTHING
+
+
+#: who is handed what people read
+SINKS = {
+    'AccessRefusal', 'Answer', 'ArgumentTypeError', 'BusMisconfigured', 'BusUnavailable',
+    'DriveCanError', 'Failure', 'Finding', 'GatewayError', 'ImportFailed', 'InUse', 'NoAnswer',
+    'NoBridge', 'OperationOutcome', 'RemoteProtocolError', 'TransportError', 'Unasked',
+    'UnknownFormat', 'Unusable', 'ValueRefused', 'WrongColumns', 'WrongUsage', '_Refused',
+    '_complain', '_report', '_tell', 'complain', 'fatal', 'reject'}
+#: and what it is called where it is handed on
+CALLED = TEXTS | {'remark', 'told', 'trouble'}
+#: parts of sentences that stand elsewhere, as terms of a protocol or of a library do; not counted
+#: are help texts, headings, names of things (error codes, units) and defects of this program
+LITERALS = {
+    'cli/backup.py': 'the end of a sentence', 'cli/control.py': 'a heading; what nobody reads',
+    'cli/explain.py': 'what explains the catalogue is no part of it',
+    'cli/jog.py': 'what goes on', 'cli/scan.py': 'counts of what was heard; the next command',
+    'cli/simulate.py': 'a remark of the simulator', 'configuration/profiles.py': 'of a file',
+    'configuration/yaml_nodes.py': 'of a file', 'protocols/cia402/observer.py': 'terms',
+    'protocols/cia402/scanner.py': 'what was read', 'ros/diagnostics.py': 'a state',
+    'ros/log.py': 'the end of a line', 'simulation/simulation.py': 'a line of the simulator',
+    'trace/measured.py': 'a format', 'transport/adapters.py': 'the name of a module'}
+
+
+def literals_for_people(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Return the texts of three words and more that are handed to people as they stand."""
+    def parts(node: ast.expr) -> Iterator[str]:
+        if isinstance(node, ast.Constant):
+            yield str(node.value)
+        elif isinstance(node, ast.JoinedStr):
+            yield ' '.join(str(each.value) for each in node.values
+                           if isinstance(each, ast.Constant))
+        elif isinstance(node, ast.IfExp):
+            yield from (*parts(node.body), *parts(node.orelse))
+        elif isinstance(node, ast.BinOp):
+            yield from (*parts(node.left), *parts(node.right))
+        elif isinstance(node, ast.BoolOp):
+            yield from (each for value in node.values for each in parts(value))
+
+    def name(node: ast.expr) -> str:
+        return str(getattr(node, 'attr', getattr(node, 'id', '')))
+
+    for node in ast.walk(tree):
+        handed: list[ast.expr] = []
+        if isinstance(node, ast.Call):
+            handed += node.args if name(node.func) in SINKS else []
+            handed += [each.value for each in node.keywords if each.arg in CALLED]
+        elif isinstance(node, ast.Assign) and any(
+                name(each).lstrip('_') in CALLED for each in node.targets):
+            handed.append(node.value)
+        for each in handed:
+            for text in parts(each):
+                if sum(any(map(str.isalpha, word)) for word in text.split()) >= 3:
+                    yield node.lineno, text
+
+
+def test_what_people_read_stands_in_the_catalogue() -> None:
+    found = {str(path.relative_to(PRODUCT)): list(literals_for_people(parsed(path)))
+             for path in sorted(PRODUCT.rglob('*.py'))}
+    assert {path: texts for path, texts in found.items() if texts and path not in LITERALS} == {}
+    assert [path for path in LITERALS if not found[path]] == []
+
+
+@pytest.mark.parametrize('line', [
+    "raise BusUnavailable('the adapter is gone')", "complain(f'{name}: it is gone')",
+    "reason = 'it is gone' if gone else ''", "Finding(key, None, why or 'it is gone')",
+    "show(reason='it ' + 'it is gone')"])
+def test_which_texts_for_people_are_found(line: str) -> None:
+    assert [at for at, _ in literals_for_people(ast.parse(line))] == [1]

@@ -261,7 +261,7 @@ class Cia402Prober(Prober):
         if places.unknown:
             return undecided('bridge_heartbeat', places.why)
         if not places.value:
-            told = 'no 1016h' if places.absent else '1016h has no places'
+            told = 'no 1016h' if places.absent else frame_sentences.no_heartbeat_places()
             return Finding('bridge_heartbeat', 0.0, frame_sentences.nothing_watches(told))
         option = yield from self._value(ABORT_CONNECTION_OPTION, 0)
         told = f'1016h has {places.value} places, ' + (
