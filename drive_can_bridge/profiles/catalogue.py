@@ -23,8 +23,8 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
-from drive_can_bridge.profiles.names import (
-    block, comment, entry_lines, name_of, one_line, scalar, unique)
+from drive_can_bridge.profiles.names import name_of, unique
+from drive_can_bridge.profiles.yaml_text import block, comment, entry_lines, one_line, scalar
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Complaint, Family
 from drive_can_bridge.resources import profiles_directory

@@ -17,9 +17,12 @@ from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.catalogue import Draft, FileContent, ImportFailed, LeftOut
-from drive_can_bridge.profiles.names import (
-    decimal_sign, factor, integer, interval, is_hexadecimal_only, known_unit, Measure, measure,
-    name_of, one_line, plain_words, rounded, split_unit, unit, Unusable)
+from drive_can_bridge.profiles.names import name_of, plain_words
+from drive_can_bridge.profiles.numbers import (
+    decimal_sign, factor, integer, interval, is_hexadecimal_only, Measure, measure, rounded,
+    Unusable)
+from drive_can_bridge.profiles.units import known_unit, split_unit, unit
+from drive_can_bridge.profiles.yaml_text import one_line
 
 #: ends the search for headings
 _HEAD_ROWS = 60

@@ -26,7 +26,9 @@ from drive_can_bridge.core.parameters import ParameterType
 from drive_can_bridge.profiles.catalogue import (
     check, Checked, Draft, FileContent, ImportFailed, LeftOut)
 from drive_can_bridge.profiles.csv_import import access_of
-from drive_can_bridge.profiles.names import one_line, rounded, split_step, unit, Unusable
+from drive_can_bridge.profiles.numbers import rounded, split_step, Unusable
+from drive_can_bridge.profiles.units import unit
+from drive_can_bridge.profiles.yaml_text import one_line
 from drive_can_bridge.resources import command_that_brings, profiles_directory
 
 _HEADING = re.compile(r'\[([^\[\]]*)\]\s*(?:;.*)?')

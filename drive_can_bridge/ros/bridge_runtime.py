@@ -32,6 +32,7 @@ from drive_can_bridge.memory import data_limit, MEGABYTE, reserve
 from drive_can_bridge.process.presence import BRIDGE, Presence
 from drive_can_bridge.process.scheduling import raise_priority
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.ros.coroutines import Awaited
 from drive_can_bridge.ros.diagnostics import Attendance, Diagnostics, StatusEntry
 from drive_can_bridge.ros.drive_node import DriveNode
 from drive_can_bridge.ros.joints import Joints
@@ -39,7 +40,7 @@ from drive_can_bridge.ros.local_way import LocalWayServer
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.passing import Passing
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import Awaited, ExecutorThread, PeriodicThread, ServiceThread
+from drive_can_bridge.ros.threads import ExecutorThread, PeriodicThread, ServiceThread
 from drive_can_bridge.trace.flight import FlightRecorder
 from drive_can_bridge.transport.end_point import EndPoint
 from drive_can_bridge.transport.failures import with_outlook

@@ -24,7 +24,7 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.core.statistics import Statistic
 from drive_can_bridge.core.text import printable, value_text
 from drive_can_bridge.exchange.exchange import BusExchange
-from drive_can_bridge.ros.commands import how_to_enable, how_to_reset
+from drive_can_bridge.ros.advice import how_to_enable, how_to_reset
 from drive_can_bridge.ros.drive_node import control_state, DriveNode
 from drive_can_bridge.ros.log import Log
 from drive_can_bridge.ros.middleware import publisher

@@ -34,6 +34,8 @@ from drive_can_bridge.exchange.exchange import BusExchange
 from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.family import Family
 from drive_can_bridge.ros.commands import CommandIntake
+from drive_can_bridge.ros.coroutines import Awaited
+from drive_can_bridge.ros.drive_services import control_services, CoroutineServices
 from drive_can_bridge.ros.log import FEW, Log
 from drive_can_bridge.ros.middleware import publisher, quality_overrides
 from drive_can_bridge.ros.parameter_services import ParameterServices
@@ -42,8 +44,7 @@ from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import (
-    Awaited, control_services, CoroutineServices, ExecutorThread, ServiceThread)
+from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 
 #: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
 Completed = Callable[[Any], None]

@@ -27,14 +27,15 @@ from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import RestoreTable
 from drive_can_bridge.core.requests import (
-    Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written,
-)
+    Failure, Outcome, ReadRequest, ReadValue, Request, WriteRequest, Written)
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, TEXT_MAX
+from drive_can_bridge.ros.coroutines import Awaited
+from drive_can_bridge.ros.drive_services import CoroutineServices
 from drive_can_bridge.ros.log import BURST
 from drive_can_bridge.ros.messages import value_of
 from drive_can_bridge.ros.stamps import Stamps
-from drive_can_bridge.ros.threads import Awaited, CoroutineServices, ServiceThread
+from drive_can_bridge.ros.threads import ServiceThread
 from drive_can_bridge.ros.values import descriptor, PARAMETER_TYPES, parameter_value
 
 #: names in one call

@@ -8,33 +8,27 @@ thousand parameters is served before the one who wants a stop. So services of dr
 by threads that have nothing else to do, straight from a wait set of their own; those that stop
 machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
 halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
-
-Callbacks that are coroutines wait for answers without an executor, too: one thread begins a
-coroutine, the one that answers goes on with it.
 """
 
 from collections import Counter, deque
-from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from inspect import isawaitable
 import math
 import threading
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
-from std_srvs.srv import SetBool, Trigger
 
 from drive_can_bridge.clock import Clock, Mailbox, Worker
 from drive_can_bridge.core import sentences
-from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
+from drive_can_bridge.ros.coroutines import Answer, go_on
 from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.rcl.incoming import PolledGroup
 from drive_can_bridge.ros.rcl.relay import Relay
@@ -54,17 +48,11 @@ TAKE_MAX = 8
 STOP_PATIENCE = 1.0
 #: threads that the requests of one service may stop for ever: each keeps its stack
 STOPPED_MAX = 3
-_NO_LOCK: AbstractContextManager[Any] = nullcontext()
 
-#: takes the response, or the error that there is none for; to be called once, from any thread
-Answer = Callable[[Any], None]
 #: takes a request, and whatever is to be called with the response
 Callback = Callable[[Any, Answer], None]
 #: takes service, response and the header of the request
 Send = Callable[[Service, Any, Any], None]
-AnswerT = TypeVar('AnswerT')
-#: takes request and response, and returns the response
-Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]
 
 
 class ExecutorThread:
@@ -496,136 +484,3 @@ class ExecutorServices:
             go_on(coroutine, self._spinner.later, answer)
         else:
             answer(response)
-
-
-class Awaited(Generic[AnswerT]):
-    """
-    What such a coroutine awaits: something that is asked when it is awaited.
-
-    :param ask: takes what is to be called with the answer, once, from any thread, or at once.
-    """
-
-    __slots__ = ('ask',)
-
-    def __init__(self, ask: Callable[[Callable[[AnswerT], None]], None]) -> None:
-        self.ask = ask
-
-    def __await__(self) -> Generator[Any, AnswerT, AnswerT]:
-        return (yield self)
-
-
-def go_on(coroutine: Coroutine[Any, Any, Any], later: Callable[[Callable[[], None]], None],
-          answer: Answer, found: Any = None, *,
-          alone: AbstractContextManager[Any] = _NO_LOCK) -> None:
-    """
-    Run a coroutine until it asks something, and once there is an answer go on, to its end.
-
-    No future of rclpy takes part: an executor looks at those in an order that differs with its
-    version, and may sleep over one that was completed.
-
-    :param later: has the rest done, in the thread that is meant for it.
-    :param answer: takes what the coroutine returns, or raises.
-    :param found: the answer to what it has asked.
-    :param alone: is held while it runs.
-    """
-    try:
-        with alone:
-            question: Awaited[Any] = coroutine.send(found)
-        question.ask(lambda what: later(
-            partial(go_on, coroutine, later, answer, what, alone=alone)))
-    except StopIteration as end:
-        answer(end.value)
-    except Exception as error:
-        coroutine.close()
-        answer(error)
-        raise
-
-
-class CoroutineServices:
-    """
-    Such services of one node. No two of their coroutines run at the same time.
-
-    :param callbacks: by name, with the type of the service.
-    :ivar calls: how many callers wait for their answer.
-    """
-
-    def __init__(self, node: Node, thread: ServiceThread,
-                 callbacks: Mapping[str, tuple[Any, Serve]]) -> None:
-        self._thread = thread
-        self.calls = 0
-        self._callbacks = callbacks
-        self._counting = threading.Lock()
-        self._running = threading.Lock()
-        self._services: dict[Service, Callback] = {
-            node.create_service(kind, f'~/{name}', _never, callback_group=PolledGroup(),
-                                qos_profile=qos_profile_parameters):
-            partial(self._begin, callback, kind.Response)
-            for name, (kind, callback) in callbacks.items()}
-
-    def call(self, name: str, request: Any, answer: Answer) -> None:
-        """
-        Begin a call that has come another way than by ROS. From any thread.
-
-        :param answer: takes the response, from any thread.
-        """
-        kind, callback = self._callbacks[name]
-
-        def answered(message: Any) -> None:
-            self._ended()
-            answer(response_to(kind, request, message) if isinstance(message, Exception)
-                   else message)
-        self._thread.begin(partial(self._begin, callback, kind.Response, request, answered))
-
-    def serve(self) -> None:
-        """Begin to serve."""
-        for service, callback in self._services.items():
-            self._thread.serve(service, callback, self._ended)
-
-    def destroy(self) -> None:
-        """Let go of the services. Before the node is destroyed."""
-        self._thread.forget(list(self._services))
-
-    def _begin(self, callback: Serve, response: Callable[[], Any], request: Any,
-               answer: Answer) -> None:
-        with self._counting:
-            self.calls += 1
-        go_on(callback(request, response()), self._thread.later, answer, alone=self._running)
-
-    def _ended(self) -> None:
-        """Record that one caller less waits: it was answered, or is out of reach."""
-        with self._counting:
-            self.calls -= 1
-
-
-def _never(_: Any, response: Any) -> Any:
-    raise RuntimeError('such services are taken by a thread of their own')
-
-
-#: hands a request to the session; answered by its outcome
-Submit = Callable[[ControlRequest], Awaited[ControlCompleted]]
-
-
-def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
-                     controlled: bool, homing: bool = False) -> CoroutineServices:
-    """
-    Return the control services of a drive.
-
-    :param thread: serves them, and those of other drives, but nothing else.
-    :param controlled: it has a control word.
-    :param homing: it can be asked to look for its reference.
-    """
-    def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
-        async def callback(request: Any, response: Any) -> Any:
-            outcome = await submit(ControlRequest(wanted(request)))
-            response.success, response.message = outcome.success, outcome.message
-            return response
-        return callback
-    services: dict[str, tuple[type, Serve]] = {
-        'quick_stop': (Trigger, serving(lambda _: ControlAction.QUICK_STOP))}
-    if controlled:
-        services['enable'] = SetBool, serving(
-            lambda request: ControlAction.ENABLE if request.data else ControlAction.DISABLE)
-        services['reset_fault'] = Trigger, serving(lambda _: ControlAction.RESET_FAULT)
-    if homing:
-        services['home'] = Trigger, serving(lambda _: ControlAction.HOME)
-    return CoroutineServices(node, thread, services)

@@ -7,7 +7,8 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge.configuration.profile_check import RESERVED
-from drive_can_bridge.profiles.names import LENGTH_MAX, name_of, split_unit, unique
+from drive_can_bridge.profiles.names import LENGTH_MAX, name_of, unique
+from drive_can_bridge.profiles.units import split_unit
 
 NAME = re.compile(r'[a-z][a-z0-9_]*')
 RAW = re.compile(r'p[0-9]+|x[0-9a-f]+')

@@ -3,9 +3,9 @@
 
 import pytest
 
-from drive_can_bridge.profiles.names import (
-    decimal_sign, factor, integer, interval, measure, unit, Unusable,
-)
+from drive_can_bridge.profiles.numbers import (
+    decimal_sign, factor, integer, interval, measure, Unusable)
+from drive_can_bridge.profiles.units import unit
 
 POINT, COMMA, UNKNOWN = '.', ',', ''
 

@@ -13,9 +13,10 @@ from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import Trigger
 from waiting import clock
 
+from drive_can_bridge.ros.coroutines import Answer, Awaited
+from drive_can_bridge.ros.drive_services import CoroutineServices
 from drive_can_bridge.ros.rcl.incoming import PolledGroup
-from drive_can_bridge.ros.threads import (
-    Answer, Awaited, CoroutineServices, ExecutorThread, ServiceThread)
+from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 
 
 @pytest.fixture(name='errors')
