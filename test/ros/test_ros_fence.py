@@ -126,6 +126,8 @@ NO_WAIT = requests_by_executor('rclpy has no WaitSet any more')
     ({'GuardCondition': other}, Responses, [requests_by_executor(WRONG)]),
     ({'Service': without()}, Unfitting, [requests_by_executor(
         'rclpy has no Service.service_take_request any more')]),
+    ({'EventHandle': without('take_event')}, Responses, [commands_by_executor(
+        'rclpy has no EventHandle.destroy_when_not_in_use any more')]),
     ({'EventHandle': None}, Responses, [commands_by_executor(
         'rclpy has no EventHandle any more')]),
     ({'Subscription': without('get_publisher_count')}, Responses, [commands_by_executor(
@@ -136,7 +138,8 @@ NO_WAIT = requests_by_executor('rclpy has no WaitSet any more')
      [commands_by_executor('rclpy has no Subscription.take_message any more'),
       commands_by_executor('rclpy has no Publisher.publish_raw any more'), NO_WAIT])],
     ids=['take, answers', 'wait set', 'wait set and take', 'wait set of another kind',
-         'take at all', 'events', 'messages', 'bytes', 'all of them'])
+         'take at all', 'letting go of events', 'events',
+         'messages', 'bytes', 'all of them'])
 def test_a_bridge_without(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
         members: dict[str, Any], rcl: type, warnings: list[Sentence]) -> None:

@@ -21,7 +21,9 @@ MEMBERS = (
     'Node', 'Node.get_count_services', 'Client', 'Client.service_server_is_available',
     'Client.send_request', 'Client.take_response', 'Publisher', 'Publisher.publish',
     'Subscription', 'Subscription.take_message', 'rclpy_get_service_names_and_types',
-    'rclpy_get_topic_names_and_types', 'rclpy_get_subscriptions_info_by_topic')
+    'rclpy_get_topic_names_and_types', 'rclpy_get_subscriptions_info_by_topic',
+    *(f'{kind}.destroy_when_not_in_use'
+      for kind in ('Node', 'Client', 'Publisher', 'Subscription')))
 #: what something that is not made in this way raises, or not used in this way
 _OTHERWISE = AttributeError, TypeError
 

@@ -9,9 +9,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from rclpy.exceptions import InvalidHandle
-from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from drive_can_bridge.ros.rcl.unfit import Unfit
+
+try:
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+except ImportError:     # it is somewhere else: so nothing is in it, and all goes round it
+    rclpy_implementation = None
 
 
 class Extension:

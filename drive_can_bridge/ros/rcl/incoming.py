@@ -23,7 +23,7 @@ from drive_can_bridge.ros.rcl.extension import extension, look_for
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
 MEMBERS = ('Subscription.take_message', 'Subscription.get_publisher_count', 'EventHandle',
-           'EventHandle.take_event')
+           'EventHandle.take_event', 'EventHandle.destroy_when_not_in_use')
 
 #: messages that wait here where everything is kept: what Fast DDS keeps then, whoever takes them
 KEPT_MAX = 5000

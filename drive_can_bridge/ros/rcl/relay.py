@@ -41,3 +41,9 @@ class Relay:
         relaying: Any = callback
         service.callback = relaying
         service.callback_group = ReentrantCallbackGroup()
+        # one that waits since before, and for nothing of this service, waits for it from now on
+        self._later(_look_again)
+
+
+def _look_again() -> None:
+    """Have the executor look what it has to wait for."""
