@@ -43,7 +43,7 @@ class Worker(Protocol):
         """Begin."""
 
     def is_alive(self) -> bool:
-        """Tell whether it has begun, and not ended."""
+        """Return whether it has begun, and not ended."""
 
     def join(self, timeout: float = math.inf) -> None:
         """Wait until it has ended, for so many s; not at all if it is this one, or never began."""

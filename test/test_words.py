@@ -1,6 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Words that texts for people do not use: those of docs/architecture.md stand for them."""
 
+import ast
 from pathlib import Path
 import re
 
@@ -13,6 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 #: what is not said: what is said for it
 BANNED = {r'\banew\b': 'again, restart', r'\bwhoever\b': 'each … that',
           r'\bfor who\b': 'for those who'}
+#: words that no docstring begins with: those that do
+HEADS = {'Tell': 'Return (whether), Report'}
 PAGES = sorted({ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.rst',
                 *(ROOT / 'docs').glob('*.md')} - {ROOT / 'docs' / 'messages.md'})
 
@@ -40,6 +43,16 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match='0'):
         front_end.main([command, '--help'])
     assert wrong_in(capsys.readouterr().out) == []
+
+
+def test_heads_of_docstrings() -> None:
+    wrong = [
+        f'{source}:{node.lineno}: {text.splitlines()[0]}'
+        for source in sorted((ROOT / 'drive_can_bridge').rglob('*.py'))
+        for node in ast.walk(ast.parse(source.read_text(encoding='utf-8')))
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef))
+        and (text := ast.get_docstring(node) or '').split(' ', 1)[0] in HEADS]
+    assert wrong == []
 
 
 def test_what_is_found() -> None:

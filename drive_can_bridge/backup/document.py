@@ -112,7 +112,7 @@ class ModeBits:
         return word if (found ^ word) & (~self.mask | self.ended) else found
 
     def is_over(self, raw: int) -> bool:
-        """Tell whether a drive is not in the mode."""
+        """Return whether a drive is not in the mode."""
         return not (raw ^ self.at_end) & self.ended
 
 
@@ -136,12 +136,12 @@ def modes_of(drive: Drive) -> tuple[str, ...]:
 
 
 def is_whole(step: RestoreStep | ModeBits, parameter: Parameter) -> bool:
-    """Tell whether all bits of a parameter are meant."""
+    """Return whether all bits of a parameter are meant."""
     return step.mask == parameter.word_from_raw(-1)
 
 
 def is_setting(drive: Drive, name: str) -> bool:
-    """Tell whether a parameter is a setting of a drive."""
+    """Return whether a parameter is a setting of a drive."""
     parameter = drive.find(name)
     if parameter is None or not (parameter.readable and parameter.writable):
         return False
@@ -154,7 +154,7 @@ def is_setting(drive: Drive, name: str) -> bool:
 
 
 def is_command(protocol: str, parameter: Parameter) -> bool:
-    """Tell whether a parameter is a setpoint or a control word in some mode of a drive."""
+    """Return whether a parameter is a setpoint or a control word in some mode of a drive."""
     return protocol in FAMILIES and FAMILIES[protocol].is_command(parameter)
 
 

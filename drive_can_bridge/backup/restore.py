@@ -198,7 +198,7 @@ def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:
 
 
 def says_nothing(head: Head) -> bool:
-    """Tell whether a head leaves open what the file is a backup of."""
+    """Return whether a head leaves open what the file is a backup of."""
     return not head.profile_sha256
 
 
@@ -434,7 +434,7 @@ class Restorer:
     # -- the settings -----------------------------------------------------------------------------
 
     def _may_not_write(self) -> bool:
-        """Tell whether no more settings are to be written."""
+        """Return whether no more settings are to be written."""
         self._result.enabled = self._result.enabled or (
             not self._stopped and self._drive.enabled() is Enabled.YES)
         return self._stopped or self._result.enabled
@@ -544,7 +544,7 @@ class Restorer:
         return f'{", ".join(names)} is set back' if names else 'it stores what was written'
 
     def _kind(self, step: RestoreStep) -> StepKind:
-        """Tell what a step afterwards is for."""
+        """Report what a step afterwards is for."""
         parameter = self._drive.find(step.parameter)
         return (StepKind.STORE if parameter is not None and parameter.stores
                 else StepKind.AFTER)
@@ -641,7 +641,7 @@ class Restorer:
         return tried[-1]
 
     def _is_there(self) -> bool:
-        """Tell whether the drive answers, by something that it gave before."""
+        """Return whether the drive answers, by something that it gave before."""
         name = next(iter(self._plan.found), None)
         return name is None or not self._drive.read(name)[name].unheard
 

@@ -106,7 +106,7 @@ def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
 
 
 def answered(question: str) -> bool:
-    """Tell whether the answer to a question is yes; what was typed before it is none."""
+    """Return whether the answer to a question is yes; what was typed before it is none."""
     if sys.stdin.isatty():
         with suppress(OSError, termios.error):
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)

@@ -53,7 +53,7 @@ def define(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """
-    Tell drives, and show their answers.
+    Command drives, and show their answers.
 
     :return: 0 all did it, 1 not all.
     :raises WrongUsage: what was typed cannot be obeyed.
@@ -74,7 +74,7 @@ def run(args: Namespace) -> int:
 
 
 def _given_locally(args: Namespace) -> list[Answer] | None:
-    """Tell drives by the local way; None: it does not lead to all of them."""
+    """Command drives by the local way; None: it does not lead to all of them."""
     from drive_can_bridge.client.local import local_ways, NoWay
     with local_ways(args.clock) as ways:
         try:
@@ -85,7 +85,7 @@ def _given_locally(args: Namespace) -> list[Answer] | None:
 
 
 def _given(args: Namespace) -> list[Answer]:
-    """Tell drives through ROS."""
+    """Command drives through ROS."""
     graph, control = _ros(args)
     try:
         nodes = chosen_drives(args.words, args.namespace, partial(control.known_drives, graph),

@@ -165,7 +165,7 @@ def _ignore(_: str) -> None:
 
 
 def _prints(args: Namespace) -> bool:
-    """Tell whether it writes lines as it goes."""
+    """Return whether it writes lines as it goes."""
     return not (args.summary or args.plot or args.csv)
 
 
@@ -270,7 +270,7 @@ class _Complaints:
         complain(f'{self._name}: {printable(text)}')
 
     def conclude(self) -> None:
-        """Tell how many more there were."""
+        """Report how many more there were."""
         if self._more:
             complain(command_sentences.more_like_that(name=self._name, count=self._more))
 

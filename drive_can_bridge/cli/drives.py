@@ -104,7 +104,7 @@ def matching(names: Sequence[str], word: str) -> list[str]:
 
 def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], list[str]]:
     """
-    Tell the drives from the rest of the words: the first one is a drive if it matches one.
+    Separate the drives from the rest of the words: the first one is a drive if it matches one.
 
     :raises WrongUsage: there are several drives, and no word names one.
     """

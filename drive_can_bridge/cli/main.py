@@ -274,7 +274,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
 
 
 def _is_option(word: str) -> bool:
-    """Tell an option from a word; argparse takes ``-1e3`` and ``-inf`` for one."""
+    """Distinguish an option from a word; argparse takes ``-1e3`` and ``-inf`` for one."""
     try:
         float(word)
     except ValueError:

@@ -118,7 +118,7 @@ def _bar(what: str, total: int) -> 'Progress':
 
 def differs(path: Path, data: bytes | None = None) -> bool:
     """
-    Tell whether there is a file that would be lost.
+    Return whether there is a file that would be lost.
 
     :param data: what is to be written; None: not known yet.
     """

@@ -132,7 +132,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
 
 
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
-    """Tell whether the file may be restored into the drive; say why not."""
+    """Return whether the file may be restored into the drive; say why not."""
     problems = problems_in(backup, drive)
     if problems:
         other = other_type(backup, drive)

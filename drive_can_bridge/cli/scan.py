@@ -89,7 +89,7 @@ class Survey:
                 for station in sorted(scanner.sightings)]
 
     def forbidden(self, scanner: Scanner) -> bool:
-        """Tell whether somebody is there who might obey what a scanner asks."""
+        """Return whether somebody is there who might obey what a scanner asks."""
         return not scanner.unmistakable and bool(self.nodes)
 
     def listen(self, seconds: float) -> None:

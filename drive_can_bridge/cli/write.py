@@ -196,7 +196,7 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
 
 
 def _is_lost(outcome: WriteOutcome) -> bool:
-    """Tell whether a value was written that the drive may not keep."""
+    """Return whether a value was written that the drive may not keep."""
     parameter = outcome.parameter
     return outcome.ok and parameter is not None and not parameter.stores and (
         parameter.storage is not Storage.EEPROM)

@@ -262,7 +262,7 @@ class Drive(ABC):
         return {name: found[name] for name in wanted}
 
     def _read_all(self, names: Sequence[str]) -> Iterator[ReadOutcome]:
-        """Tell first what cannot be read at all; of the rest, neighbours share frames."""
+        """Report first what cannot be read at all; of the rest, neighbours share frames."""
         asked: list[tuple[str, Parameter]] = []
         for name in dict.fromkeys(names):
             parameter = self.find(name)
@@ -308,7 +308,7 @@ class Drive(ABC):
 
     @abstractmethod
     def enabled(self) -> Enabled:
-        """Tell whether the drive is enabled, asking for its status where that is possible."""
+        """Return whether the drive is enabled, asking for its status where that is possible."""
 
     @abstractmethod
     def identity(self) -> str:

@@ -327,7 +327,7 @@ class LocalWays:
 
     def give(self, order: str, nodes: Sequence[str]) -> list[Answer]:
         """
-        Tell drives something, all of them at once.
+        Command drives, all of them at once.
 
         :param order: one of :data:`.SERVICES`.
         """

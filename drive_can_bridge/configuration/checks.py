@@ -542,7 +542,7 @@ class DriveChecker:
         return drive
 
     def is_sound(self, *keys: str) -> bool:
-        """Tell whether none of these keys has a problem."""
+        """Return whether none of these keys has a problem."""
         return all(self._tree.is_sound((*self._path, key)) for key in keys)
 
     # -- parts ------------------------------------------------------------------------------------

@@ -207,7 +207,7 @@ def directory_that_sets(paths: Iterable[FilePath], node: str, key: Path,
 
 
 def _is_for(section: str, node: str) -> bool:
-    """Tell whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
+    """Return whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
     # several in a row are one: tried in all ways, they would take for ever
     section = re.sub(r'(/\*\*)+', '/**', f'/{section.removeprefix("/")}')
     pattern = re.escape(section)

@@ -107,11 +107,11 @@ class Tree:
             parent.pop(path[-1], None)
 
     def is_damaged(self, path: Path) -> bool:
-        """Tell whether the value at ``path``, or what it stands in, was found useless."""
+        """Return whether the value at ``path``, or what it stands in, was found useless."""
         return any(path[:length] in self.damaged for length in range(len(path) + 1))
 
     def is_sound(self, path: Path) -> bool:
-        """Tell whether nothing at ``path`` or below it was found wrong or useless."""
+        """Return whether nothing at ``path`` or below it was found wrong or useless."""
         size = len(path)
         return not any(place[:size] == path for found in (self.damaged, self._wrong)
                        for place in found)

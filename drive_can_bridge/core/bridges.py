@@ -75,5 +75,5 @@ def chosen_drives(words: Sequence[str], namespace: str | None,
 
 
 def is_some(namespace: str | None) -> bool:
-    """Tell whether it is a pattern of namespaces."""
+    """Return whether it is a pattern of namespaces."""
     return bool(namespace) and is_pattern(namespace or '')

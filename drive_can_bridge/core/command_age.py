@@ -88,7 +88,7 @@ class CommandAges:
 
     def judge(self, source: int, received: int, publisher: bytes | None) -> AgeVerdict:
         """
-        Tell what a command's stamps say.
+        Judge a command by its stamps.
 
         :param source: its publisher's time of the day when it was published; 0: not known.
         :param received: this machine's when it arrived; 0: not known.

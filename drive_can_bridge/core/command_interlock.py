@@ -73,7 +73,7 @@ class CommandInterlock:
         return self._control is None and not self._setpoints.known
 
     def follow(self) -> None:
-        """Tell what the control machine noted, and take commands as it lets them."""
+        """Report what the control machine noted, and take commands as it lets them."""
         if self._control is not None:
             for note in self._control.take_notes():
                 # during a stop, it is what everybody expects

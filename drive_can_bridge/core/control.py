@@ -215,7 +215,7 @@ class TableRules:
         return self._words[sending]
 
     def rests(self, word: int) -> bool:
-        """Tell whether a word tells the drive to stand still."""
+        """Return whether a word tells the drive to stand still."""
         return word == self._words[ControlAction.DISABLE]
 
     def left(self, word: int) -> None:

@@ -385,7 +385,7 @@ class ControlMachine:
     # -- rules ------------------------------------------------------------------------------------
 
     def _nothing_to_do(self, action: ControlAction) -> bool:
-        """Tell whether the drive is known to be where an action would bring it."""
+        """Return whether the drive is known to be where an action would bring it."""
         if action is ControlAction.QUICK_STOP:
             return not self._may_run
         return action is ControlAction.RESET_FAULT and self._fault is False
@@ -504,7 +504,7 @@ class ControlMachine:
         self._end(False, sentences.dropped_out(self._reports.text))
 
     def _watch_disabled(self, now: float) -> None:
-        """Tell of a drive that runs on although its control word is there to stop it."""
+        """Report a drive that runs on although its control word is there to stop it."""
         if self._disregard.lasts(now, so=self._sending in _STOPS and self._sent and (
                 not self._fault and self._reports.running_on and not self._rules.holds)):
             self._disregard.text = disregard_text(
@@ -518,17 +518,17 @@ class ControlMachine:
                 or not self._confirmed_off())
 
     def _confirmed(self, pattern: StatusPattern | None, wanted: bool) -> bool:
-        """Tell whether the drive, knowing the current word, reports a condition (or cannot)."""
+        """Return whether the drive, knowing the current word, reports a condition (or cannot)."""
         return self._sent if pattern is None else self._reports.confirmed(pattern, wanted)
 
     def _confirmed_off(self) -> bool:
-        """Tell whether the drive, knowing the current word, reports that it does not run."""
+        """Return whether the drive, knowing the current word, reports that it does not run."""
         if self._table.enabled is None:
             return self._sent
         return self._reports.standing and not self._rules.may_run
 
     def _resettable(self) -> bool:
-        """Tell whether the drive, knowing ``disable``, reports a fault that can be reset."""
+        """Return whether the drive, knowing ``disable``, reports a fault that can be reset."""
         return self._sent if self._table.fault is None else self._reports.resettable
 
     def _send(self, action: ControlAction) -> None:

@@ -45,7 +45,7 @@ class Route(NamedTuple):
     extended: bool
 
     def matches(self, frame: Frame) -> bool:
-        """Tell whether this route takes the frame."""
+        """Return whether this route takes the frame."""
         return (frame.extended == self.extended
                 and frame.identifier & self.mask == self.identifier & self.mask)
 

@@ -62,7 +62,7 @@ class Setpoint:
 
     def armed_by(self, value: Value) -> bool:
         """
-        Tell whether a command of this (valid) value arms: it equals neutral.
+        Return whether a command of this (valid) value arms: it equals neutral.
 
         A double does within one raw step, compared as values, or within ``arming_tolerance``; a
         bool or an integer exactly.

@@ -59,7 +59,7 @@ class Outbox:
 
     def left(self, now: float, refused: Collection[int] = ()) -> None:
         """
-        Tell everybody what became of the frames last taken.
+        Report what became of the frames last taken.
 
         :param refused: places, in the list last taken, of what the bus did not take.
         """

@@ -36,7 +36,7 @@ _NORMAL_MIN = sys.float_info.min
 
 def is_misplaced_integer(value: Value) -> bool:
     """
-    Tell whether a double is so small that it is none: an integer was put into its field.
+    Return whether a double is so small that it is none: an integer was put into its field.
 
     Message classes check no types, and so what stands in its place is taken: the size of the
     integer. 300 arrives as 5e-324, from Python 3.12 on as 4e-323, and 0 as 5e-324.

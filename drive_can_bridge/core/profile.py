@@ -14,7 +14,7 @@ class StatusPattern:
     value: int
 
     def matches(self, raw: int) -> bool:
-        """Tell whether a status word fulfils the condition."""
+        """Return whether a status word fulfils the condition."""
         return raw & self.mask == self.value
 
 
@@ -91,7 +91,7 @@ class RestoreTable:
     after: tuple[RestoreStep, ...] = ()
 
     def ends_mode(self, name: str, word: int) -> bool:
-        """Tell whether a write takes the drive out of the mode for settings."""
+        """Return whether a write takes the drive out of the mode for settings."""
         return any(step.parameter == name and word & step.mask == step.bits for step in self.after)
 
 

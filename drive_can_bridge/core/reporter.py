@@ -67,12 +67,12 @@ class Reporter:
         self.advise(unless or text, AdviceKind.CAUSE if unless else AdviceKind.GUESS)
 
     def note(self, event: Event) -> None:
-        """Tell what happened."""
+        """Report what happened."""
         self.events.append(event)
 
     def warn(self, text: Sentence, *, may_run: bool = False) -> None:
         """
-        Tell people what is not as it should be.
+        Report what is not as it should be.
 
         :param may_run: the drive may be running for that reason, which is said.
         """
@@ -101,18 +101,18 @@ class Reporter:
                 self.events.append(AnswerLate(late))
 
     def found(self) -> None:
-        """Tell that the drive exchanges process data."""
+        """Report that the drive exchanges process data."""
         self.advise(NOTHING)
         self.events.append(StationFound())
 
     def lost(self, reason: Sentence, *, was_online: bool, ordered: bool = False) -> None:
-        """Tell why the drive is offline; people hear of it when it was not."""
+        """Report why the drive is offline; people hear of it when it was not."""
         self.advise(reason)
         if was_online:
             self.events.append(StationLost(reason, ordered))
 
     def expired(self, setpoints: Iterable[Setpoint]) -> None:
-        """Tell that no fresh command keeps these setpoints: they went neutral."""
+        """Report that no fresh command keeps these setpoints: they went neutral."""
         found = tuple(setpoints)
         self.events.append(SetpointsExpired(
             tuple(setpoint.parameter.name for setpoint in found),

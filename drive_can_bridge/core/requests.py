@@ -93,7 +93,7 @@ def refused(code: int, reason: Sentence) -> Failure:
 
 
 def is_answer(outcome: Outcome) -> bool:
-    """Tell whether an outcome rests on something that the drive said."""
+    """Return whether an outcome rests on something that the drive said."""
     if isinstance(outcome, Failure):
         return not outcome.kind.unheard
     return not (isinstance(outcome, Written) and outcome.note)

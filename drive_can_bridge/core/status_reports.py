@@ -116,7 +116,7 @@ class StatusReports:
         return False
 
     def says(self, pattern: StatusPattern | None) -> bool:
-        """Tell whether the status word that says most fulfils a condition."""
+        """Return whether the status word that says most fulfils a condition."""
         raw = self.telling
         return raw is not None and _matches(pattern, raw)
 
@@ -136,7 +136,7 @@ class StatusReports:
             for member in self._present.values())
 
     def confirmed(self, pattern: StatusPattern, wanted: bool) -> bool:
-        """Tell whether all, knowing the current word, report a condition, or that it is not so."""
+        """Return whether all that know the current word report a condition, or its opposite."""
         return self._all(lambda answer: pattern.matches(answer) is wanted)
 
     @property

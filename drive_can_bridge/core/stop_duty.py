@@ -198,7 +198,7 @@ class StopDuty:
         return bool(self._debts)
 
     def runs(self, channel: Hashable) -> bool:
-        """Tell whether a channel has told it to run, and not to stop since."""
+        """Return whether a channel has told it to run, and not to stop since."""
         return self._debts.get(channel) in RUNNING
 
     def channel(self, channel: Hashable, happened: Happened) -> Do:

@@ -75,7 +75,7 @@ def show(value: Any) -> str:
 
 
 def seems_limit(*texts: str) -> bool:
-    """Tell whether names and descriptions speak of something that bounds."""
+    """Return whether names and descriptions speak of something that bounds."""
     return any(word in text.lower() for text in texts for word in ('limit', 'max'))
 
 
@@ -124,7 +124,7 @@ _WILD = frozenset('*?[')
 
 
 def is_pattern(text: str) -> bool:
-    """Tell whether a text is a shell pattern, and no name."""
+    """Return whether a text is a shell pattern, and no name."""
     return not _WILD.isdisjoint(text)
 
 
@@ -132,7 +132,7 @@ _ROS_NAME = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 def is_ros_name(name: str) -> bool:
-    """Tell whether a full name may stand in front of a topic."""
+    """Return whether a full name may stand in front of a topic."""
     return len(name) <= TEXT_MAX and _ROS_NAME.fullmatch(name) is not None
 
 

@@ -348,7 +348,7 @@ class BusExchange:
     # -- users, any thread ------------------------------------------------------------------------
 
     def stands_still(self, now: float) -> bool:
-        """Tell whether nobody has looked after its drives for so long that nothing is known."""
+        """Return whether nobody has looked after its drives for so long that nothing is known."""
         return now - self._last_pass >= LOST_TIME
 
     @contextmanager
@@ -576,7 +576,7 @@ class BusExchange:
         self._listener.bus_opened(self.bus.name)
 
     def bus_lost(self, reason: str) -> None:
-        """Tell every drive that its bus is gone."""
+        """Report to every drive that its bus is gone."""
         with self.lock:
             now = self._clock()
             self.bus_state, self.bus_reason = 'down', reason
@@ -585,7 +585,7 @@ class BusExchange:
         self._listener.bus_lost(self.bus.name, reason)
 
     def bus_told(self, text: str) -> None:
-        """Tell what people should know of the adapter."""
+        """Report what people should know of the adapter."""
         self._listener.bus_told(self.bus.name, text)
 
     def bus_misconfigured(self, reason: str) -> None:

@@ -121,7 +121,7 @@ class Member:
                 self.due = self._clock() + RETRY_AFTER
 
     def tell(self, call: Callable[..., object], *arguments: object) -> None:
-        """Tell the listener something that no event says."""
+        """Report to the listener something that no event says."""
         try:
             call(*arguments)
         except Exception as error:  # noqa: BLE001  likewise
@@ -169,7 +169,7 @@ class Member:
             frames = session.outbox.frames and session.take_frames()
 
     def _report(self) -> None:
-        """Tell the listener what was sent, and what happened."""
+        """Report to the listener what was sent, and what happened."""
         session, failure = self.session, None
         if session.sent.raws is not self.told:
             self.told = session.sent.raws

@@ -245,7 +245,7 @@ class _BridgeRecord:
         self._period = min(max(period, _PERIOD_MIN), _PERIOD_MAX)
 
     def late(self, now: float) -> bool:
-        """Tell whether it is to be asked for its period: that may have become longer."""
+        """Return whether it is to be asked for its period: that may have become longer."""
         return now - max(self._at, self._paced_at) > 1.5 * self._period
 
     def silent(self, now: float) -> float:

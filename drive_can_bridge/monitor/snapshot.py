@@ -160,7 +160,7 @@ class Rate:
         self.value = 0.0
 
     def went_back(self, count: float) -> bool:
-        """Tell whether a count is less than the last: counting has begun anew."""
+        """Return whether a count is less than the last: counting has begun anew."""
         return self._last is not None and count < self._last[1]
 
     def update(self, count: float, at: float) -> None:

@@ -158,7 +158,7 @@ def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether nobody but this machine reaches an address to listen on."""
+    """Return whether nobody but this machine reaches an address to listen on."""
     address = _address(host.strip('[]'))
     return address.is_loopback if address else host.lower() == 'localhost'
 

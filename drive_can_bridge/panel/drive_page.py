@@ -245,7 +245,7 @@ class _ParameterRow:
             self._now.set_text(f'now {text}')
 
     def _same(self, text: str) -> bool:
-        """Tell whether what is typed is what was read."""
+        """Return whether what is typed is what was read."""
         try:
             return self._info.parse(self._field.value) == self._info.parse(text)
         except (ValueRefused, AttributeError):  # empty, or nothing that a browser would send

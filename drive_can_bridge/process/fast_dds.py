@@ -103,7 +103,7 @@ class Middleware:
                                       _protects(Path(folder, release.file)))
 
     def has_profiles(self, environment: Mapping[str, str], folder: Path) -> bool:
-        """Tell whether somebody has profiles of their own, which count."""
+        """Return whether somebody has profiles of their own, which count."""
         return self.release is not None and (
             any(environment.get(name) for name in self.variables)
             or Path(folder, self.release.file).exists())

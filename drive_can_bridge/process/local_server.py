@@ -251,14 +251,14 @@ class LocalServer:
                 connection.close()
 
     def _may_stay(self, caller: _Caller) -> bool:
-        """Tell whether there is room for one more; those that ask nothing make it."""
+        """Return whether there is room for one more; those that ask nothing make it."""
         if self._is_strange(caller) and (
                 not self._open_to_all or self._is_full_for(caller.user)):
             return False
         return len(self._callers) < CALLERS_MAX or self._make_room(None)
 
     def _is_full_for(self, user: int) -> bool:
-        """Tell whether a stranger has all the room that there is for one."""
+        """Return whether a stranger has all the room that there is for one."""
         if sum(each.user == user for each in self._callers.values()) < OF_A_STRANGER:
             return False
         return not self._make_room(user)

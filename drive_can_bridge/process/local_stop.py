@@ -220,7 +220,7 @@ class LocalStop:
         self._began, self._waited_before = None, waited
 
     def over(self, now: float) -> bool:
-        """Tell whether nothing more is to be expected of this host."""
+        """Return whether nothing more is to be expected of this host."""
         waited = self._waited(now)
         if waited < PATIENCE and (any(each.quiet for each in self._told)
                                   or any(each.busy for each in self._passing)):
@@ -233,7 +233,7 @@ class LocalStop:
         return 0.0 if self._began is None else now - self._began
 
     def wants_ros(self, now: float) -> bool:
-        """Tell whether there may be bridges that only ROS reaches, or that have said nothing."""
+        """Return whether there may be bridges that only ROS reaches, or that have said nothing."""
         own = [each for each in self._told if each.present.domain in (None, self.domain)]
         if any(each.quiet for each in own) and self._waited(now) < SOON:
             return False
@@ -421,7 +421,7 @@ def does_not_answer() -> str:
 
 def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> bool:
     """
-    Tell whether words may mean a drive of a bridge that does not answer.
+    Return whether words may mean a drive of a bridge that does not answer.
 
     They do not where the graph shows as many drives of it as it has locks, and none is meant.
 

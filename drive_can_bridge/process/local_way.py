@@ -63,12 +63,12 @@ _KINDS: dict[str, Callable[[str], object]] = {
 
 
 def meant(words: Sequence[str], node: str) -> bool:
-    """Tell whether words mean a drive: none means all."""
+    """Return whether words mean a drive: none means all."""
     return not words or any(matches(word, node) for word in words)
 
 
 def matches(word: str, node: str) -> bool:
-    """Tell whether a word, a pattern or a full name means a drive."""
+    """Return whether a word, a pattern or a full name means a drive."""
     name = node if word.startswith('/') else node.rpartition('/')[2]
     if name == word:
         return True
@@ -79,7 +79,7 @@ def matches(word: str, node: str) -> bool:
 
 
 def is_pattern(word: str) -> bool:
-    """Tell whether a word is a shell pattern, and no name."""
+    """Return whether a word is a shell pattern, and no name."""
     return any(wild in word for wild in WILD)
 
 

@@ -33,7 +33,7 @@ _ROOM, _KEPT = 70, 60
 
 
 def switched_on() -> bool:
-    """Tell whether bridges listen on this host, and commands ask them there."""
+    """Return whether bridges listen on this host, and commands ask them there."""
     return os.environ.get(SWITCH, '').strip().lower() != 'off'
 
 
@@ -46,7 +46,7 @@ def own_domain() -> int | None:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Tell whether a node is in a namespace, or one of a pattern."""
+    """Return whether a node is in a namespace, or one of a pattern."""
     place = name.rpartition('/')[0]
     if place == namespace:
         return True
@@ -77,12 +77,12 @@ class Present(namedtuple('Present', 'process domain name locks')):
         return bool(self.name) and '~' not in self.name
 
     def may_be_in(self, namespace: str | None) -> bool:
-        """Tell whether it may run in a namespace, or one of a pattern; None: anywhere."""
+        """Return whether it may run in a namespace, or one of a pattern; None: anywhere."""
         return (namespace is None or not self.has_place
                 or in_namespace(self.name, namespace))
 
     def may_mean(self, words: Sequence[str]) -> bool:
-        """Tell whether words, patterns or full names may mean a drive of it; none mean all."""
+        """Return whether words, patterns or full names may mean a drive of it; none mean all."""
         place = f'{self.name.rpartition("/")[0]}/'
         return not words or not self.has_place or any(
             not word.startswith('/') or _may_mean(word, place) for word in words)
@@ -113,7 +113,7 @@ class Presence:
             self.taken = True
 
     def withdraw(self) -> None:
-        """Tell it no more."""
+        """Withdraw it."""
         self.socket.close()
 
 
@@ -143,7 +143,7 @@ def bridges() -> list[Present]:
 
 
 def _may_mean(word: str, place: str) -> bool:
-    """Tell whether a full name, or a pattern of some, may mean a drive in a namespace."""
+    """Return whether a full name, or a pattern of some, may mean a drive in a namespace."""
     literal = word[:min((word.find(wild) for wild in WILD if wild in word), default=len(word))]
     if literal.startswith(place):
         return '/' not in literal[len(place):]
@@ -151,7 +151,7 @@ def _may_mean(word: str, place: str) -> bool:
 
 
 def _is_number(text: str) -> bool:
-    """Tell whether a text may stand for a process, or a domain: anybody may write anything."""
+    """Return whether a text may stand for a process, or a domain: anybody may write anything."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 

@@ -209,7 +209,7 @@ class Interruption:
         self.number: int | None = None
 
     def __bool__(self) -> bool:
-        """Tell whether a signal came."""
+        """Return whether a signal came."""
         return self.number is not None
 
     @property

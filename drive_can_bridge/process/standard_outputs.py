@@ -246,7 +246,7 @@ class StandardOutputs:
 
 
 def _same(one: int, other: int) -> bool:
-    """Tell whether two descriptors are the same file, pipe or terminal."""
+    """Return whether two descriptors are the same file, pipe or terminal."""
     try:
         return os.path.sameopenfile(one, other)
     except OSError:  # one of them is closed

@@ -108,7 +108,7 @@ def integer(text: str, *, hexadecimal: bool = False) -> int:
 
 
 def is_hexadecimal_only(text: str) -> bool:
-    """Tell whether digits can only be hexadecimal: ``1F``, but neither ``10`` nor ``10h``."""
+    """Return whether digits can only be hexadecimal: ``1F``, but neither ``10`` nor ``10h``."""
     return bool(_DIGITS.fullmatch(_tidy(text))) and not _tidy(text).isdecimal()
 
 

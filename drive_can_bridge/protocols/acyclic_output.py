@@ -44,7 +44,7 @@ class Policy(Protocol):
 
     def again(self, control: ControlMachine, repeats: int, *, ran: bool) -> bool:
         """
-        Tell whether it is, by what the drive reports since.
+        Return whether it is, by what the drive reports since.
 
         :param repeats: how often it was written once more already.
         :param ran: it may run by a word before.
@@ -64,7 +64,7 @@ class Judged(NamedTuple):
     wears: bool = False
 
     def again(self, control: ControlMachine, repeats: int, *, ran: bool) -> bool:
-        """Tell whether the drive takes no notice."""
+        """Return whether the drive takes no notice."""
         if control.pulsing:
             return True
         if self.wears:
@@ -80,7 +80,7 @@ class Acknowledged:
     pulse_spacing = math.inf
 
     def again(self, control: ControlMachine, repeats: int, *, ran: bool) -> bool:
-        """Tell whether the drive runs on although its word is there to stop it."""
+        """Return whether the drive runs on although its word is there to stop it."""
         return control.stopping and control.unconfirmed
 
 
@@ -148,7 +148,7 @@ class AcyclicOutput:
                 self._due.append(index)
 
     def wants(self, index: int, raw: int, now: float) -> bool:
-        """Tell whether the drive does not have what it shall have, or not lately."""
+        """Return whether the drive does not have what it shall have, or not lately."""
         return (raw != self._written[index]
                 or 0.0 < self._refresh[index] <= now - self._written_at[index] + TOLERANCE)
 
@@ -202,7 +202,7 @@ class AcyclicOutput:
 
     def holds_word(self, *, again: bool = False) -> bool:
         """
-        Tell whether the control word has to wait; when it begins to, all setpoints become due.
+        Return whether the control word has to wait; when it begins to, all setpoints become due.
 
         :param again: the word is due again, to a drive that takes no notice of it.
         """
@@ -272,7 +272,7 @@ class AcyclicOutput:
             self.word, self.again_at = None, again_at
 
     def word_due(self, now: float) -> bool:
-        """Tell whether the word that has left, and is still the current one, is due again."""
+        """Return whether the word that has left, and is still the current one, is due again."""
         control = self._control
         if now >= self.again_at:
             return True
@@ -283,7 +283,7 @@ class AcyclicOutput:
             control, self._repeats, ran=self._ran)
 
     def handle_timer(self, now: float) -> bool:
-        """Tell whether the control word is to be seen to: it is written again in any case."""
+        """Return whether the control word is to be seen to: it is written again in any case."""
         if now < self.again_at:
             return False
         self.again_at = math.inf

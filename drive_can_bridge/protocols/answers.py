@@ -66,7 +66,7 @@ class CycleAnswers:
         self.due = until
 
     def expects(self, what: str, now: float, received_at: float) -> bool:
-        """Tell whether an answer belongs to the last cycle; others are late, or rejected."""
+        """Return whether an answer belongs to the last cycle; others are late, or rejected."""
         if self.wanted:
             return True
         late = self.book.late(received_at)

@@ -159,7 +159,7 @@ class _Queue(Generic[StepT, ReplyT]):
         return self.step
 
     def resume(self, reply: ReplyT | None) -> None:
-        """Tell the running procedure what became of its step; None begins it."""
+        """Send the running procedure what became of its step; None begins it."""
         if self._running is None:
             raise RuntimeError('no procedure to resume')
         procedure, done = self._running
@@ -250,7 +250,7 @@ class Channel(Generic[StepT, ReplyT]):
         self.wake(now)
 
     def is_idle(self, priority: Priority) -> bool:
-        """Tell whether nothing is to be done at a priority."""
+        """Return whether nothing is to be done at a priority."""
         return self._queues[priority].idle
 
     @property
@@ -459,7 +459,7 @@ class Channel(Generic[StepT, ReplyT]):
         return ready if key is None else max(ready, self._quarantine.ready_at(key))
 
     def _steps_aside(self, queue: _Queue[StepT, ReplyT]) -> bool:
-        """Tell whether others go on while the step of this queue is in quarantine."""
+        """Return whether others go on while the step of this queue is in quarantine."""
         if self._transactor.anonymous or queue.step is None:
             return False
         if queue.priority is Priority.USERS and (

@@ -191,7 +191,7 @@ class ExchangeBook:
         self._asked.append(PendingCycle(now, -1 if runs else self._runs))
 
     def early(self, now: float) -> bool:
-        """Tell whether what waits has had no time yet: only a cycle brought forward is so near."""
+        """Return whether what waits has had no time: only a cycle brought forward is so near."""
         return now < self._since + 0.5 * self._period
 
     def doubt(self) -> None:

@@ -118,14 +118,14 @@ class Claim(NamedTuple):
     once: bool = False
 
     def overlaps(self, other: 'Claim') -> bool:
-        """Tell whether an identifier exists that both claim."""
+        """Return whether an identifier exists that both claim."""
         common = self.route.mask & other.route.mask
         return (self.route.extended == other.route.extended
                 and (self.route.identifier ^ other.route.identifier) & common == 0
                 and not (self.shared and self.shared == other.shared))
 
     def rivals(self, other: 'Claim') -> bool:
-        """Tell whether drives of the other hear this, too, where two exchanges send them."""
+        """Return whether drives of the other hear this, too, where two exchanges send them."""
         return (self.once and other.once and self.shared == other.shared
                 and self.route.extended == other.route.extended)
 
@@ -248,7 +248,7 @@ class Family(ABC):
 
     def is_command(self, parameter: Parameter) -> bool:
         """
-        Tell whether a parameter is a command whatever the mode of the drive, and no setting.
+        Return whether a parameter is a command whatever the mode of the drive, and no setting.
 
         A setpoint of another mode moves the drive as soon as it is in that mode.
         """

@@ -160,7 +160,7 @@ class Question(NamedTuple):
     shortest: int = LENGTH
 
     def answers(self, frame: Frame) -> bool:
-        """Tell whether a frame from the bus is an answer to it."""
+        """Return whether a frame from the bus is an answer to it."""
         return (frame.identifier == self.response and frame.extended == self.frame.extended
                 and self.shortest <= len(frame.data) <= LENGTH and self.fits(frame.data))
 

@@ -73,7 +73,7 @@ class Slack:
                 gap=gap, timeout=enough(gap)))
 
     def tell(self, key: str, text: Sentence) -> None:
-        """Tell of a key what would have held, once."""
+        """Report of a key what would have held, once."""
         if key not in self._told:
             self._told.add(key)
             self._report.warn(text)

@@ -45,7 +45,7 @@ class TelegramType:
     answers: str = ''
 
     def is_sent_by(self, direction: Direction) -> bool:
-        """Tell whether it goes this way."""
+        """Return whether it goes this way."""
         return self.direction in (direction, Direction.NEITHER)
 
     @cached_property

@@ -99,15 +99,15 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
 
     @abstractmethod
     def unanswered(self, step: StepT, reply: ReplyT) -> bool:
-        """Tell whether a reply says that nobody answered, and a late answer may come."""
+        """Return whether a reply says that nobody answered, and a late answer may come."""
 
     def again(self, step: StepT) -> bool:
-        """Tell whether a step is the one before once more: what answers either answers both."""
+        """Return whether a step is the one before once more: what answers either answers both."""
         return False
 
     def repeatable(self, step: StepT, *, users: bool) -> bool:
         """
-        Tell whether a step that had to make room, or is not believed, is done once more.
+        Return whether a step that had to make room, or is not believed, is done once more.
 
         :param users: somebody else asked for it: a write of theirs is done once.
         """

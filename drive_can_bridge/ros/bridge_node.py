@@ -552,7 +552,7 @@ def _gone(drive: DriveNode) -> bool:
 
 
 def _is_wrong(file: str) -> bool:
-    """Tell whether a parameter file has problems of its own, beside those of a command line."""
+    """Return whether a parameter file has problems of its own, beside those of a command line."""
     try:
         configuration_from_file(file, adapters=adapters)
     except ConfigurationError:

@@ -319,7 +319,7 @@ class DriveReporter:
         return told
 
     def _slowness(self) -> Sentence:
-        """Tell of rounds of polling that take longer than the period allows."""
+        """Report rounds of polling that take longer than the period allows."""
         session = self._drive.session
         statistics = session.statistics
         count, total = self._latencies

@@ -155,7 +155,7 @@ class DriveNode(DriveListener):
 
     def answer_all(self) -> bool:
         """
-        Tell callers that still wait that no answer will come. The exchange must be closed.
+        Answer callers that still wait, that no answer will come. The exchange must be closed.
 
         :return: all calls are answered, and the node may go.
         """
@@ -341,7 +341,7 @@ class DriveNode(DriveListener):
         return self._told_online
 
     def offers(self, action: ControlAction) -> bool:
-        """Tell whether it has a service for this."""
+        """Return whether it has a service for this."""
         return action is ControlAction.QUICK_STOP or self.session.control is not None
 
     def command(self, action: ControlAction,
@@ -376,7 +376,7 @@ class DriveNode(DriveListener):
             self._refuse(request, sentences.internal_error(type(error).__name__, str(error)))
 
     def _refuse(self, request: Request | ControlRequest, reason: Sentence) -> None:
-        """Tell whoever asked that nothing comes of it, unless there was an answer."""
+        """Answer the caller that nothing comes of it, unless there was an answer."""
         completed = self._asked.pop(request, None)
         if completed is not None:
             completed(ControlCompleted(request, False, reason)

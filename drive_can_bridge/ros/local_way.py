@@ -41,7 +41,7 @@ _PATTERNS_MAX, _PATTERN_MAX = 16, 256
 
 
 def security_enforced() -> bool:
-    """Tell whether SROS2 says who may stop drives."""
+    """Return whether SROS2 says who may stop drives."""
     return (os.environ.get('ROS_SECURITY_ENABLE') == 'true'
             and os.environ.get('ROS_SECURITY_STRATEGY') == 'Enforce')
 
@@ -211,7 +211,7 @@ class LocalWayServer:
 
 
 def _is_costly(words: Sequence[str]) -> bool:
-    """Tell whether it takes long to see what words mean."""
+    """Return whether it takes long to see what words mean."""
     patterns = [word for word in words if is_pattern(word)]
     return len(patterns) > _PATTERNS_MAX or any(len(word) > _PATTERN_MAX for word in patterns)
 

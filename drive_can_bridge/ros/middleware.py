@@ -68,7 +68,7 @@ class Audience:
         self._count_at = 0.0
 
     def listens(self, now: float) -> bool:
-        """Tell whether there are any; ``now`` is of the steady clock."""
+        """Return whether there are any; ``now`` is of the steady clock."""
         if now >= self._count_at:
             self._count_at = now + COUNT_PERIOD
             self._listens = bool(self._publisher.get_subscription_count())

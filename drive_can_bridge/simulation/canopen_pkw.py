@@ -283,7 +283,7 @@ def register_number(parameter: Parameter) -> int | None:
 
 
 def is_starter(profile: Profile) -> bool:
-    """Tell whether a profile is that of an LTMR: its control word is register 704."""
+    """Return whether a profile is that of an LTMR: its control word is register 704."""
     control = profile.control
     word = profile.parameters.get(control.parameter) if control else None
     return word is not None and register_number(word) == CONTROL_REGISTER_1

@@ -130,7 +130,7 @@ class SimulatedServoDrive(SimulatedDrive):
         self.node.take_away(frozenset(places))
 
     def has(self, index: int, subindex: int | None) -> bool:
-        """Tell whether there is an object; None: anything of the index."""
+        """Return whether there is an object; None: anything of the index."""
         try:
             self.node.read_object(index, subindex or 0)
         except AccessRefused as error:

@@ -137,7 +137,7 @@ class DataModelTable:
         return now < self._eeprom_busy_until
 
     def _takes_eeprom(self, parameter: Parameter) -> bool:
-        """Tell whether a write goes to EEPROM: unless it is known not to, or has no effect."""
+        """Return whether a write goes to EEPROM: unless it is known not to, or has no effect."""
         return (parameter.writable and parameter.storage is not Storage.RAM
                 and parameter.name not in self._volatile)
 

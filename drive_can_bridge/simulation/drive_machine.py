@@ -241,7 +241,7 @@ class StatusWord:
         self._patterns = [(pattern, BIT_RULES[rule]) for pattern, rule in found if pattern]
 
     def __bool__(self) -> bool:
-        """Tell whether anything of the word is known; if not, it is a plain register."""
+        """Return whether anything of the word is known; if not, it is a plain register."""
         return bool(self._bits or self._patterns)
 
     def compose(self, report: MachineStatus, word: int) -> int:

@@ -101,7 +101,7 @@ class RampParameter(NamedTuple):
 
 
 def quantity_of(parameter: Parameter) -> Quantity | None:
-    """Tell what a parameter measures, or None."""
+    """Return what a parameter measures, or None."""
     words = words_of(parameter)
     if words & {'fault', 'error', 'alarm'} and words & {'code', 'number'}:
         return Quantity.FAULT_CODE
@@ -109,7 +109,7 @@ def quantity_of(parameter: Parameter) -> Quantity | None:
 
 
 def measured(parameter: Parameter) -> Quantity | None:
-    """Tell what a read-only parameter shows of the motor; None for settings and the rest."""
+    """Return what a read-only parameter shows of the motor; None for settings and the rest."""
     if parameter.writable or words_of(parameter) & _SETTING_WORDS:
         return None
     return quantity_of(parameter)
@@ -261,7 +261,7 @@ def full(unit: str, quantity: Quantity) -> float:
 
 
 def measures(unit: str, quantity: Quantity) -> bool:
-    """Tell whether a unit says how much of a quantity there is."""
+    """Return whether a unit says how much of a quantity there is."""
     return unit == '%' or unit in _RATINGS[quantity]
 
 

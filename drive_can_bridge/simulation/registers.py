@@ -208,7 +208,7 @@ class Registers:
         self._store(name, raw, not self.is_volatile(parameter) if keep is None else keep)
 
     def is_volatile(self, parameter: Parameter) -> bool:
-        """Tell whether a power cycle resets a register (of unknown storage: EEPROM)."""
+        """Return whether a power cycle resets a register (of unknown storage: EEPROM)."""
         if parameter.storage is not None:
             return parameter.storage is Storage.RAM
         return parameter.name in self._volatile or parameter.name in self._plant.volatile

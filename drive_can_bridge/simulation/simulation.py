@@ -186,7 +186,7 @@ class BusPlayer:
         self._complain(f'bus {self.bus.name}: {text}')
 
     def bus_lost(self, reason: str) -> None:
-        """Tell once that the bus is gone, or could not be opened."""
+        """Report once that the bus is gone, or could not be opened."""
         if not self._complained:
             lost = 'lost: ' if self._opened else ''
             self._complain(f'bus {self.bus.name}: {lost}{reason}; trying again every '

@@ -282,7 +282,7 @@ class SlcanTerminal(EndPoint):
             raise BusUnavailable(f'pseudo-terminal: {error.strerror}') from error
 
     def _has_room(self) -> bool:
-        """Tell whether the client reads; far before the kernel would cut a line in two."""
+        """Return whether the client reads; far before the kernel would cut a line in two."""
         unread = array('i', [0])
         fcntl.ioctl(self._slave, termios.FIONREAD, unread)
         return unread[0] < _UNREAD_MAX

@@ -175,7 +175,7 @@ class _Interfaces:
         return self._offsets[self.current] if self.is_new else 0
 
     def ends_well(self, file: BinaryIO) -> bool:
-        """Tell whether the last block is whole: its length stands at both of its ends."""
+        """Return whether the last block is whole: its length stands at both of its ends."""
         if not self.is_new:
             return True
         try:
@@ -235,7 +235,7 @@ class _Echoes:
         self._waiting: dict[Record, deque[float]] = {}
 
     def has(self, record: Record) -> bool:
-        """Tell whether an entry is the second of such two."""
+        """Return whether an entry is the second of such two."""
         frame = record._replace(time=0.0, sent=None)
         waiting = self._waiting.get(frame)
         if record.sent:

@@ -390,7 +390,7 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
 
 
 def _begins_as(head: _Head, path: Path, complain: Complain) -> bool:
-    """Tell whether a file begins as those of its suffix; an empty one does not."""
+    """Return whether a file begins as those of its suffix; an empty one does not."""
     with path.open('rb') as file:
         begin = file.read(_MAGIC)
     if begin and not head.pattern.match(begin):
@@ -572,7 +572,7 @@ def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]
 
 
 def _tell_wrong(suffix: str, lines: _Numbered, complain: Complain, text: str) -> None:
-    """Tell what is wrong with the last line; '': it is no entry."""
+    """Return what is wrong with the last line; '': it is no entry."""
     complain(f'line {lines.number()}: {text or f"no entry of a {suffix} trace"}')
 
 

@@ -167,7 +167,7 @@ class _Members:
         return content[:self.number('DataLength', place, len(content))]
 
     def sent(self, place: int) -> bool | None:
-        """Tell whether it was sent by who recorded it; None: nobody says."""
+        """Return whether it was sent by who recorded it; None: nobody says."""
         column = self._members.get('Dir')
         if column is None:
             return None

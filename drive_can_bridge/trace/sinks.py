@@ -113,7 +113,7 @@ class Selection:
         return not (self._patterns or self._only)
 
     def names(self, drive: str) -> bool:
-        """Tell whether somebody wants to see a drive."""
+        """Return whether somebody wants to see a drive."""
         wanted = self._wanted.get(drive)
         if wanted is None:
             wanted = self._wanted[drive] = not self._patterns or any(
@@ -121,7 +121,7 @@ class Selection:
         return wanted
 
     def takes(self, bus: str, telegram: Telegram) -> bool:
-        """Tell whether somebody wants to see it."""
+        """Return whether somebody wants to see it."""
         if self._patterns and not self.names(telegram.drive):
             return False
         only = self._only
@@ -132,7 +132,7 @@ class Selection:
                 or Only.CHANGES in only and self._changed(bus, telegram))
 
     def _changed(self, bus: str, telegram: Telegram) -> bool:
-        """Tell whether it says anything else than the last of its kind."""
+        """Return whether it says anything else than the last of its kind."""
         key = bus, telegram.drive, telegram.direction, telegram.title
         if telegram.kind is TelegramKind.OTHER:
             identifier, _, _ = telegram.remark.partition('#')

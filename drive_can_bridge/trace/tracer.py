@@ -276,7 +276,7 @@ class Tracer:
 
     def _tell(self, bus: BusTrace, time: float, title: str, remark: str,
               verdict: Verdict = Verdict.SUSPICIOUS) -> None:
-        """Tell what is of no drive."""
+        """Handle what is of no drive."""
         self._sink(bus.name, Telegram(time, '', Direction.NEITHER, TelegramKind.OTHER, title,
                                       verdict=verdict, remark=remark))
 

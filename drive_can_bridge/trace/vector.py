@@ -73,7 +73,7 @@ def of_vector(stream: Iterable[str], aside: deque[Record], passed: Counter[str])
 
 
 def _is_state(line: str, aside: deque[Record]) -> bool:
-    """Tell whether a line tells the state of a controller, which is put aside."""
+    """Return whether a line tells the state of a controller, which is put aside."""
     status = _STATUS.match(line)
     if status is None:
         return False

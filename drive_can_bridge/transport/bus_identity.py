@@ -72,7 +72,7 @@ def adapter_of(bus: BusConfiguration) -> str:
 
 
 def is_absent(bus: BusConfiguration) -> bool:
-    """Tell whether the adapter of a bus is not there, as far as that can be seen."""
+    """Return whether the adapter of a bus is not there, as far as that can be seen."""
     device = device_of(bus)
     if device is not None:
         return not os.path.exists(device)

@@ -65,7 +65,7 @@ class Echo:
                 self._sent.pop()
 
     def is_echo(self, frame: Frame) -> bool:
-        """Tell whether a frame that has arrived is nobody's, because it is one of ours."""
+        """Return whether a frame that has arrived is nobody's, because it is one of ours."""
         with self._lock:
             self._look(self._now())
             if self.verdict is EchoVerdict.SILENT:

@@ -43,14 +43,14 @@ def with_outlook(reason: str, period: float) -> str:
 
 
 def is_malformed(error: BaseException) -> bool:
-    """Tell whether what came was no frame: python-can reads packets without looking."""
+    """Return whether what came was no frame: python-can reads packets without looking."""
     return (isinstance(error, _CONTENT) or isinstance(error.__cause__, _CONTENT)
             # of python-can's ``serial``, which has no class for it
             or error.__cause__ is None and 'invalid delimiter' in str(error))
 
 
 def is_misconfiguration(error: BaseException) -> bool:
-    """Tell whether another attempt to open a bus would fail for the same reason."""
+    """Return whether another attempt to open a bus would fail for the same reason."""
     # python-can wraps errors; the reason is at the end of the chain
     cause: BaseException | None = error
     while cause is not None:
@@ -64,19 +64,19 @@ def is_misconfiguration(error: BaseException) -> bool:
 
 
 def is_undefined(error: BaseException) -> bool:
-    """Tell whether an adapter uses a vendor's library that it has not found, and went on."""
+    """Return whether an adapter uses a vendor's library that it has not found, and went on."""
     return type(error) is NameError
 
 
 def _is_missing_library(error: OSError) -> bool:
-    """Tell whether a vendor's library is not installed: told in words, not by the kernel."""
+    """Return whether a vendor's library is not installed: told in words, not by the kernel."""
     text = str(error).lower()
     return error.errno is None and any(words in text for words in (
         'library not found', 'cannot open shared object file', 'could not find module'))
 
 
 def is_absence(error: BaseException) -> bool:
-    """Tell whether a device could not be opened because it is not there."""
+    """Return whether a device could not be opened because it is not there."""
     cause: BaseException | None = error
     while cause is not None:
         if getattr(cause, 'errno', None) in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
@@ -86,5 +86,5 @@ def is_absence(error: BaseException) -> bool:
 
 
 def is_full_queue(error: BaseException) -> bool:
-    """Tell whether the kernel's transmit queue is full: ENOBUFS of a socket."""
+    """Return whether the kernel's transmit queue is full: ENOBUFS of a socket."""
     return errno.ENOBUFS in (getattr(error, 'error_code', None), getattr(error, 'errno', None))

@@ -93,7 +93,7 @@ def name_of(index: int) -> str:
 
 
 def has_can() -> bool:
-    """Tell whether this kernel knows CAN."""
+    """Return whether this kernel knows CAN."""
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except (OSError, AttributeError):

@@ -335,14 +335,14 @@ class Link:
             self._end.wait(self._now() + self.bus.reconnect_period)
 
     def _report(self, reason: str) -> None:
-        """Tell why the bus is not there; once."""
+        """Report why the bus is not there; once."""
         if reason != self._reported:
             self._listener.bus_lost(reason)
         self._reported = reason
         self._tell_tried()
 
     def _tell_once(self, text: str) -> None:
-        """Tell what is the same after each opening."""
+        """Report what is the same after each opening."""
         if text not in self._told:
             self._told.add(text)
             self._listener.bus_told(text)
@@ -364,11 +364,11 @@ class Link:
         return port
 
     def _ended(self) -> bool:
-        """Tell whether it was stopped meanwhile, by another thread."""
+        """Return whether it was stopped meanwhile, by another thread."""
         return self._closing
 
     def _gone(self) -> bool:
-        """Tell whether the adapter was unplugged; its name goes a moment after it."""
+        """Return whether the adapter was unplugged; its name goes a moment after it."""
         if device_of(self.bus) is not None:
             for _ in range(_GOING):
                 if is_absent(self.bus) or self._closing:

@@ -123,7 +123,7 @@ class AdapterAnswers:
             self._in_row += 1
 
     def takes_nothing(self, now: float) -> bool:
-        """Tell whether it refuses whatever it is handed."""
+        """Return whether it refuses whatever it is handed."""
         return self._in_row >= REFUSED_MAX and now - self._since >= REFUSED_TIME
 
 

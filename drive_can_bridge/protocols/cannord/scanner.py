@@ -86,7 +86,7 @@ class CannordScanner(Scanner):
 
 
 def _follows(request: bytes, data: bytes) -> bool:
-    """Tell whether a response may follow a task: others use these identifiers, too."""
+    """Return whether a response may follow a task: others use these identifiers, too."""
     task = _TASKS.get(request[1] >> 4)
     return task is not None and _number(request) == _number(data) and (
         data[1] >> 4 in (*task.responses, ResponseId.REFUSED))

@@ -93,7 +93,7 @@ def state_of(status: int) -> InverterState:
 
 
 def is_faulted(status: int) -> bool:
-    """Tell whether the fault bit is set, whatever the other bits say."""
+    """Return whether the fault bit is set, whatever the other bits say."""
     return bool(status & FAULT_BIT)
 
 

@@ -104,7 +104,7 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
         return TaskResult(response)
 
     def answers(self, answer: bytes, step: ParameterTask) -> bool:
-        """Tell whether a response may be that to a task that was given up."""
+        """Return whether a response may be that to a task that was given up."""
         return _belongs(self._layout.decode(answer), step)
 
     def attempts(self, step: ParameterTask) -> int:
@@ -121,7 +121,7 @@ TaskChannel = Channel[ParameterTask, TaskResult]
 
 
 def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:
-    """Tell whether a response answers a task, as far as its address is concerned."""
+    """Return whether a response answers a task, as far as its address is concerned."""
     if response.number != task.number:
         return False
     if response.identifier == ResponseId.REFUSED:
@@ -131,7 +131,7 @@ def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:
 
 
 def _echoes(response: ParameterFrame, task: ParameterTask) -> bool:
-    """Tell whether a response to a write holds the value that was written."""
+    """Return whether a response to a write holds the value that was written."""
     # the high half of a word says nothing
     width = 0xFFFFFFFF if response.double else 0xFFFF
     return response.value & width == task.value & width

@@ -220,7 +220,7 @@ class WatchedNode:
     # -- inside -----------------------------------------------------------------------------------
 
     def _blocked(self, now: float) -> bool:
-        """Tell whether a heartbeat that is still believed says that the node takes no PDOs."""
+        """Return whether a heartbeat that is still believed says that the node takes no PDOs."""
         return now < self._blocked_until
 
     @property

@@ -118,7 +118,7 @@ class SdoCommand(Enum):
     ABORT = TelegramType(Direction.NEITHER, 0x80, 0xFF, '<BHBI', 'head index subindex number')
 
     def answers(self, request: 'SdoCommand') -> bool:
-        """Tell whether this says that a request of the same object was carried out."""
+        """Return whether this says that a request of the same object was carried out."""
         return self.name in request.value.answers.split()
 
 

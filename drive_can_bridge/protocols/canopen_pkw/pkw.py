@@ -242,7 +242,7 @@ def error_response(request: PkwMessage, words: Words) -> PkwMessage:
 
 
 def answers(message: PkwMessage, request: PkwMessage) -> bool:
-    """Tell whether a response, refusals included, belongs to a request."""
+    """Return whether a response, refusals included, belongs to a request."""
     return (message.toggle == request.toggle
             and message.code in (request.code, Function.ERROR)
             and message.word == request.word

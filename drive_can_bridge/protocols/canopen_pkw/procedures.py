@@ -111,7 +111,7 @@ StopProcedure = Generator[Step, Reply, list[Sentence]]
 def write_until_answered(writes: Sequence[StopWrite], placement: Placement, timeout: float,
                          last: float) -> StopProcedure:
     """
-    Tell a drive to stand still, each thing until it is answered or was tried three times.
+    Stop a drive, each thing until it is answered or was tried three times.
 
     It may be executed twice: that does no harm. As the toggle is inverted with every attempt, not
     even an unknown function byte of the device keeps it from taking notice.

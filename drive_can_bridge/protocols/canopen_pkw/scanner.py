@@ -147,7 +147,7 @@ def _service(index: int, subindex: int) -> int:
 
 
 def _repeats(request: bytes, answer: bytes) -> bool:
-    """Tell whether address and function are the same, as in every layout, refusals aside."""
+    """Return whether address and function are the same, as in every layout, refusals aside."""
     different = int.from_bytes(request[:4], 'big') ^ int.from_bytes(answer[:4], 'big')
     return not different & _REPEATED
 
@@ -279,7 +279,7 @@ class PkwProber(Prober):
 
 
 def harmless(data: bytes) -> bool:
-    """Tell whether a request writes nothing, whatever the layout of who gets it."""
+    """Return whether a request writes nothing, whatever the layout of who gets it."""
     meanings = [pkw.decode(data, layout).meaning for layout in PkwLayout]
     return not any(meaning is not None and meaning.writes for meaning in meanings)
 

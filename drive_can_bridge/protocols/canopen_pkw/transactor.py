@@ -200,7 +200,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         return isinstance(step, RegisterRead)
 
     def answers(self, answer: PkwMessage, step: Step) -> bool:
-        """Tell whether an answer may be that to a step that was given up, or to its 00h."""
+        """Return whether an answer may be that to a step that was given up, or to its 00h."""
         return answer.code == Function.NONE or pkw.answers(
             answer, self._make_request(step, answer.toggle))
 
@@ -320,7 +320,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         return True
 
     def _is_doubtful(self, step: Step, now: float) -> bool:
-        """Tell whether answers to given-up writes would make more than the next one doubtful."""
+        """Return whether answers to given-up writes would make more than the next one doubtful."""
         if isinstance(step, RegisterRead) or step.blind:
             return False
         late = [each[1] for each in self._still_late(now) if each[1].address == step.address]
@@ -434,13 +434,13 @@ class MailboxTransactor(Transactor[Step, Reply]):
 
 
 def _fits(answer: PkwMessage, request: PkwMessage) -> bool:
-    """Tell whether an answer may be that to a request, function 00h included."""
+    """Return whether an answer may be that to a request, function 00h included."""
     return (answer.code == Function.NONE if request.code == Function.NONE else
             pkw.answers(answer, request))
 
 
 def _conflicts(written: Iterable[PkwMessage], request: PkwMessage) -> bool:
-    """Tell whether something else was written to the registers of a request."""
+    """Return whether something else was written to the registers of a request."""
     return any(each.words != request.words and each.address == request.address
                for each in written)
 

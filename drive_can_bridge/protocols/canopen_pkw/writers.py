@@ -148,7 +148,7 @@ class Writers:
         self._made_room = False
 
     def _stops(self, index: int, setpoint: Setpoint) -> bool:
-        """Tell whether a setpoint, as it is now, takes back what the drive was told."""
+        """Return whether a setpoint, as it is now, takes back what the drive was told."""
         return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held
                 and self._session.duty.runs(index))
 
@@ -309,7 +309,7 @@ class Writers:
 
     def _read_back(self, parameter: Parameter, word: int,
                    ) -> Generator[Step, Reply, bool | None]:
-        """Tell whether the drive has a word that was not answered; None: nobody knows."""
+        """Return whether the drive has a word that was not answered; None: nobody knows."""
         if not parameter.readable:
             return None
         span = self._placement.span(parameter)
@@ -353,7 +353,7 @@ class Writers:
 
     def stop(self, now: float, *, again: bool = False) -> None:
         """
-        Tell the drive to stand still: in the end, or because it is offline.
+        Stop the drive: in the end, or because it is offline.
 
         In the end, what failed is told even if the drive was not told to run. Otherwise nobody
         waits for the end of the stop: the last attempt has the time that any request has, for a

@@ -94,7 +94,7 @@ class Turn(CycleTimer):
         return self.due < math.inf
 
     def takes_part(self, now: float) -> bool:
-        """Tell whether this round is one of the drive: it has begun it, or is about to."""
+        """Return whether this round is one of the drive: it has begun it, or is about to."""
         return self.begun_round or self.due < now + 0.5 * self.period
 
     def start(self, at: float) -> None:

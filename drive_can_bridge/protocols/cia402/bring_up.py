@@ -140,7 +140,7 @@ class BringUp:
     # -- one object -------------------------------------------------------------------------------
 
     def tell(self, text: Sentence, *, warning: bool = True) -> None:
-        """Tell people once what the drive lacks."""
+        """Report once what the drive lacks."""
         if text not in self._told:
             self._told.add(text)
             self._session.report.note(Noted(text, warning=warning))
@@ -201,7 +201,7 @@ class BringUp:
             yield Transfer(states.CONTROL_WORD, 0, word, attempts=attempts)
 
     def _brakes(self) -> Generator[Transfer, TransferResult, bool]:
-        """Tell whether a quick stop takes its course."""
+        """Return whether a quick stop takes its course."""
         standing = self._rules.standing
         standing.quick_stop_option = yield from self._read(
             states.QUICK_STOP_OPTION, 0, 2, signed=True)
@@ -297,7 +297,7 @@ class BringUp:
             yield Transfer(pause=LOOK_PERIOD)
 
     def starting(self, now: float) -> bool:
-        """Tell whether the node may still be on its way to operational."""
+        """Return whether the node may still be on its way to operational."""
         return now < self.started_at + self._drive.control_timeout and (
             self._node.said_since(self.started_at) is not NmtState.OPERATIONAL)
 

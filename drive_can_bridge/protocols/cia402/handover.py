@@ -83,7 +83,7 @@ class Handover:
         rules.halted = rules.mode_bits == states.HALT
 
     def _see_to_acknowledge(self, acknowledged: bool, now: float) -> None:
-        """Tell once that bit 12 does not rise with bit 4, or does not fall behind it."""
+        """Report once that bit 12 does not rise with bit 4, or does not fall behind it."""
         setpoint = self._setpoint
         high = not self._rising and bool(self._rules.mode_bits & states.NEW_SETPOINT)
         waits = setpoint.armed and (not acknowledged if high else (

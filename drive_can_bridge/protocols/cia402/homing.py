@@ -180,7 +180,7 @@ class Homing:
             self._end(NOTHING)
 
     def _done_at_once(self) -> bool:
-        """Tell whether it was done before that could be seen: its bits stand, and so does it."""
+        """Return whether it was done before that could be seen: its bits stand, and so does it."""
         if self._on_the_spot:
             return self._done_in_a_row >= IN_A_ROW
         band = self._standing.band

@@ -114,7 +114,7 @@ class ObjectAccess:
 
 
 def silent(reply: TransferResult) -> bool:
-    """Tell whether nobody answered."""
+    """Return whether nobody answered."""
     return reply.data is None and reply.abort is None
 
 

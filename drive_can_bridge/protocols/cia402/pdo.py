@@ -42,7 +42,7 @@ def width(parameter: Parameter) -> int:
 
 
 def is_map(index: int) -> bool:
-    """Tell whether an object is a mapping parameter."""
+    """Return whether an object is a mapping parameter."""
     return index in _MAPS
 
 
@@ -70,7 +70,7 @@ def entry_text(entry: int) -> str:
 
 def same_mapping(found: Sequence[int], wanted: Sequence[int]) -> bool:
     """
-    Tell whether entries that were read mean those that are wanted.
+    Return whether entries that were read mean those that are wanted.
 
     Some drives set bit 7 of the length of what is signed, and some have a fixed number of entries,
     with empty ones behind those in use.

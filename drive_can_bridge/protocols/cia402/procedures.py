@@ -123,5 +123,5 @@ class SdoAccess(ParameterAccess[Parameter, Transfer, TransferResult]):
 
 
 def _own_width(parameter: Parameter) -> bool:
-    """Tell whether a profile says how wide a parameter is; the drive knows for raw names."""
+    """Return whether a profile says how wide a parameter is; the drive knows for raw names."""
     return parameter.listed

@@ -51,7 +51,7 @@ class SdoStop:
 
     def writes(self, writes: Sequence[StopWrite], *, unheard: bool = False) -> StopProcedure:
         """
-        Tell it to stand still, each thing until it is acknowledged or was tried three times.
+        Stop it, each thing until it is acknowledged or was tried three times.
 
         :param unheard: it was told by cycles, and has answered none.
         :return: what failed, in words.
@@ -112,6 +112,6 @@ class SdoStop:
         return self._node.said(self._channel.now) is NmtState.STOPPED
 
     def _may_be_stopped(self, since: float) -> bool:
-        """Tell whether nothing shows that it is in another state; a PDO since then does."""
+        """Return whether nothing shows that it is in another state; a PDO since then does."""
         return self._node.pdo_at < since and self._node.said(self._channel.now) in (
             None, NmtState.STOPPED)

@@ -310,7 +310,7 @@ class Cia402Session(Session):
             now = yield again
 
     def _stopped_by_nmt(self, now: float) -> bool:
-        """Tell whether the node says that it is in the state in which it answers no SDO."""
+        """Return whether the node says that it is in the state in which it answers no SDO."""
         return self._node.said(now) is NmtState.STOPPED
 
     def _start_cycling(self, status: int, now: float) -> None:
@@ -538,7 +538,7 @@ class Cia402Session(Session):
             self._again.heard(now, hurry=True)
 
     def _of_the_conversation(self, frame: Frame) -> bool:
-        """Tell whether a frame is for this node, which has restarted since it was made."""
+        """Return whether a frame is for this node, which has restarted since it was made."""
         return frame.identifier in self._masters or (
             frame.identifier == network.NMT_IDENTIFIER
             and frame.data[1] == self.configuration.station)
@@ -729,7 +729,7 @@ class Cia402Session(Session):
         self._stop.begin(self._see_it_stop(writes, unheard=unheard), now, again=again)
 
     def _see_it_stop(self, writes: list[StopWrite], *, unheard: bool) -> StopProcedure:
-        """Tell it to stop, and in the end look whether it has, as long as frames would go on."""
+        """Stop it, and in the end look whether it has, as long as frames would go on."""
         failed = yield from self._sdo_stop.writes(writes, unheard=unheard)
         if not failed and self.stage is Stage.STOPPING:
             state = yield from self._state_in_the_end()

@@ -101,7 +101,7 @@ class Band:
                 and abs((self._last or 0) - self._from) > 1)
 
     def stays(self, duration: float) -> bool:
-        """Tell whether it has been in its band so long, and does not creep."""
+        """Return whether it has been in its band so long, and does not creep."""
         return self.seen_at - self.since >= duration and not self.creeps
 
 

@@ -172,7 +172,7 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
 
     def answers(self, answer: bytes, step: Transfer) -> bool:
         """
-        Tell whether a response may be that to a transfer that was given up.
+        Return whether a response may be that to a transfer that was given up.
 
         :param answer: well-formed for one who expects segments.
         """

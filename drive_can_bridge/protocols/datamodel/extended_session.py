@@ -418,7 +418,7 @@ class ExtendedSession(Session):
         exchange.hurry(now, setpoints=True)
 
     def _lacks_neutral(self, now: float) -> bool:
-        """Tell whether a word that starts the drive waits for the answer to a neutral cycle."""
+        """Return whether a word that starts the drive waits for the answer to a neutral cycle."""
         output = self._side.output
         lacks = output.holds_word(again=output.word_due(now))
         if lacks and output.told(_CYCLE) is None:

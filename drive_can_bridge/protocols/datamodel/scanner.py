@@ -210,7 +210,7 @@ class DataModelProber(Prober):
                       frame_sentences.maps_ambiguous(told))
 
     def _agrees(self, maps: _Maps, offset: int) -> bool:
-        """Tell whether both maps are those of the file, when all numbers are moved like them."""
+        """Return whether both maps are those of the file, when all numbers are moved like them."""
         wanted = [tuple((each.number or 0) + offset for each in parameters[:SLOTS])
                   for parameters in (self.drive.cyclic_request, self.drive.cyclic_response)]
         return (any(wanted) and effective(maps.request) == wanted[0]

@@ -193,11 +193,11 @@ class SetpointWriter:
             output.order_word(first=stopping or control.pulsing)
 
     def holds_word(self, now: float) -> bool:
-        """Tell whether the control word waits for setpoints."""
+        """Return whether the control word waits for setpoints."""
         return self._output.holds_word(again=self._output.word_due(now))
 
     def wants_status(self, now: float) -> bool:
-        """Tell whether a word that starts the drive is to be repeated, behind its status."""
+        """Return whether a word that starts the drive is to be repeated, behind its status."""
         control, slot = self._session.control, self._slot
         return control is not None and slot is not None and (
             control.starts and not control.pulsing and self._output.wants(slot, control.word, now))

@@ -179,7 +179,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         return answer
 
     def is_news(self, asked_at: float, now: float) -> bool:
-        """Tell whether an answer taken now has not waited for a process that stood still."""
+        """Return whether an answer taken now has not waited for a process that stood still."""
         return now - asked_at <= self.retry.timeout + TOLERANCE
 
     def time_lost(self, now: float) -> Reply | bool:

@@ -296,7 +296,7 @@ class NodeCalls:
             self._hosts.popitem()[1].close()
 
     def offered(self, host: str, service: str) -> bool:
-        """Tell whether a service that was asked for is offered."""
+        """Return whether a service that was asked for is offered."""
         return host in self._hosts and self._hosts[host].offered(service)
 
     def drop(self, host: str, service: str) -> None:

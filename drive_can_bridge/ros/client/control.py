@@ -224,7 +224,7 @@ def known_drives(graph: Graph, place: str | None) -> list[str]:
 
 def give(graph: Graph, order: str, nodes: Sequence[str]) -> list[Answer]:
     """
-    Tell drives something, all of them at once.
+    Command drives, all of them at once.
 
     :param order: of :data:`ORDERS`.
     :param nodes: their full names.

@@ -243,7 +243,7 @@ class Search:
                 and all(each.answered or each.silent for each in self.found.values()))
 
     def over(self, now: float) -> bool:
-        """Tell whether nobody is there, or nobody who answers."""
+        """Return whether nobody is there, or nobody who answers."""
         return (all(each.silent for each in self.found.values()) and self._only is None
                 and now > min(self._changed_at + _QUIET, self._began + _LONGEST))
 

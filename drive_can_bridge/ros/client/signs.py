@@ -73,7 +73,7 @@ class Signs:
 
     def lives(self, bridge: str) -> bool:
         """
-        Tell whether there was a sign of a bridge just now, or was no time yet to see any.
+        Return whether there was a sign of a bridge just now, or was no time yet to see any.
 
         On a busy computer this process stands still as well: between its first look and the one
         before there may be all the time that a bridge has to answer.

@@ -253,7 +253,7 @@ class Pdos:
         return content[:BITS_MAX // 8]
 
     def synchronised(self, pdo: SimulatedPdo) -> bool:
-        """Tell whether this TPDO leaves with a SYNC: with each, or with content that is new."""
+        """Return whether this TPDO leaves with a SYNC: with each, or with content that is new."""
         if pdo.identifier is None or pdo.type > 240:
             return False
         return bool(pdo.type) or self.content(pdo) != pdo.sent
