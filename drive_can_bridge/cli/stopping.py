@@ -49,11 +49,16 @@ def finished(early: Early) -> int | None:
         stop.go_on(_QUIET)
         return None
     look_after_outputs()
+    code = FAILED
     try:
         code = show(answers(stop, None, early.namespace, early.words), 'stop', json=early.json)
         sys.stdout.flush()
-    except OSError:     # told as for all commands, if to anybody
-        return None
+    except BrokenPipeError:     # its reader has gone
+        pass
+    except OSError as error:
+        from drive_can_bridge.cli.command import complain   # takes its time
+        complain(f'drive_can stop: {error.strerror or error}')
+        return FAILED
     return code
 
 

@@ -465,14 +465,21 @@ def test_a_stop_that_is_answered_imports_nothing_more(success: str, said: str) -
         presence.socket, serve, open_to_all=True, report=print, prepare_thread=lambda: None,
         keep_share=lambda: lambda: None, clock=REAL)
     try:
-        done = subprocess.run(
-            [sys.executable, '-c', ENDING, 'stop', 'lift', '--namespace=of_a_test'],
-            capture_output=True, text=True, check=False,
-            env={**os.environ, 'DRIVE_CAN_LOCAL': 'on', 'ROS_DOMAIN_ID': '231'})
+        command = [sys.executable, '-c', ENDING, 'stop', 'lift', '--namespace=of_a_test']
+        environment = {**os.environ, 'DRIVE_CAN_LOCAL': 'on', 'ROS_DOMAIN_ID': '231'}
+        done = subprocess.run(command, capture_output=True, text=True, check=False,
+                              env=environment)
+        environment.pop('PYTHONUNBUFFERED', None)
+        with open('/dev/full', 'w', encoding='utf-8') as full:
+            lost = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True,
+                                  check=False, env=environment)
     finally:
         server.stop()
         presence.withdraw()
     assert (done.returncode, done.stdout) == (1 - int(success), said)
+    assert lost.returncode == 1     # and nothing of it is told as an error
+    assert lost.stderr.splitlines()[0] == 'drive_can stop: No space left on device'
+    assert 'lift' not in lost.stderr
     imported = set(done.stderr.split())
     assert {name for name in imported if name.startswith('drive_can_bridge')} == (
         NEEDED | TO_ITS_END)
