@@ -141,7 +141,7 @@ def _stop(args: Namespace) -> int:
         complain('interrupted; this is known:')
         show(ros.answers(), STOP, json=args.json)
         raise
-    except DriveCanError:   # no ROS: what is known without is told all the same
+    except Exception:   # no ROS, for whatever reason: what is known without is told all the same
         if local.answers() or local.unheard:
             show(ros.answers(), STOP, json=args.json)
         raise

@@ -26,3 +26,10 @@ def code_of(text: str) -> str:
     if isinstance(text, Sentence) and text.code and text.row is not sentences.uncoded:
         return text.code
     return messages.code_of(text, _SAID) if text else ''
+
+
+def make_ready() -> None:
+    """Make what saying takes now: who has to go on without new memory says things, too."""
+    for rows in CODES.values():
+        for row in rows.values():
+            row.make_ready()

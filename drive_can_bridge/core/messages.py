@@ -60,6 +60,8 @@ class Sentence(str):
 #: what a way to write a number is made of; anything else joins
 _NUMBERS = '.,0123456789Xgf'
 
+#: digits of a number that counts, at most
+_DIGITS = 20
 #: letters that a text with something else in it has in common with one of a row
 _ENOUGH = 6
 
@@ -104,6 +106,10 @@ class Text:
         self._order, self._kinds, self._how = fields, kinds, how
 
     # made when they are wanted: a command says one sentence of some hundreds
+
+    def make_ready(self) -> None:
+        """Make now what is made when it is said first."""
+        _ = self.fields, self.optional
 
     @cached_property
     def _variants(self) -> list['_Variant']:
@@ -156,19 +162,45 @@ def _places(form: str, text: str, whole: bool) -> frozenset[int]:
     pieces = list(Formatter().parse(form))
     letters = sum(each.isalpha() for before, *_ in pieces for each in before)
     if letters < (1 if whole and len(pieces) == 1 and pieces[0][1] is None else _ENOUGH) or (
-            not all(before in text for before, *_ in pieces)):      # a regex takes long to say so
+            not all(before in text for before, *_ in pieces)):      # the rest takes longer
         return frozenset()
-    pattern = ''
+    # what stands between two fields, each of which may be anything
+    patterns = ['']
     for before, name, spec, _ in pieces:
-        pattern += f'({re.escape(before)})'
+        patterns[-1] += f'({re.escape(before)})'
         if name and (spec or '').startswith('#'):
-            pattern += rf'\d+( {re.escape((spec or "")[1:])}\w*)'
+            patterns[-1] += rf'\d{{1,{_DIGITS}}}( {re.escape((spec or "")[1:])}\w*)'
         elif name and spec != '?':
-            pattern += '.+?'
-    found = (re.fullmatch if whole else re.search)(pattern, text)
-    return frozenset() if found is None else frozenset(
-        place for group in range(1, found.re.groups + 1) for place in range(*found.span(group))
-        if text[place].isalpha())
+            patterns.append('')
+    for begin in (0,) if whole else (0, *(found.end() for found in re.finditer('\n', text))):
+        spans = _spans(patterns, text, begin, whole=whole)
+        if spans is not None:
+            return frozenset(place for span in spans for place in range(*span)
+                             if text[place].isalpha())
+    return frozenset()
+
+
+def _spans(patterns: Sequence[str], text: str, at: int, *,
+           whole: bool) -> list[tuple[int, int]] | None:
+    """
+    Return where patterns match, with something of one line between two; None: they do not.
+
+    Each is looked for once, where it comes first behind the one before. One expression of all of
+    them would try each place of one with each place of the others, and whoever sends a text that
+    is made for it would have a command hang.
+    """
+    spans: list[tuple[int, int]] = []
+    last = len(patterns) - 1
+    for number, pattern in enumerate(patterns):
+        if at > len(text):      # nothing is left for the field
+            return None
+        compiled = re.compile(rf'{pattern}\Z' if whole and number == last else pattern)
+        found = (compiled.match if whole and not number else compiled.search)(text, at)
+        if found is None or number and '\n' in text[at - 1:found.start()]:
+            return None
+        spans += [found.span(group) for group in range(1, compiled.groups + 1)]
+        at = found.end() + 1
+    return spans
 
 
 class _Variant:

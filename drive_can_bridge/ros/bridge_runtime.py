@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger as TriggerService
 
 from drive_can_bridge.clock import Clock
 from drive_can_bridge.configuration.load import identity_name
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import codes, sentences
 from drive_can_bridge.core.configuration import (
     BridgeConfiguration, BusConfiguration, DriveConfiguration)
 from drive_can_bridge.core.errors import ConfigurationError
@@ -326,6 +326,7 @@ class BridgeRuntime:
         """
         for exchange in self.exchanges.values():
             exchange.open()
+        codes.make_ready()      # meanwhile
         self._await_buses()
         if self._misconfigured:
             raise ConfigurationError(self._misconfigured)

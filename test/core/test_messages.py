@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 import inspect
 from pathlib import Path
+from string import Formatter
+from time import process_time
 from types import ModuleType
 
 import pytest
@@ -18,7 +20,7 @@ from saying import says
 
 from drive_can_bridge import host_texts
 from drive_can_bridge.core import complaints, host_sentences, sentences
-from drive_can_bridge.core.codes import code_of, MODULES
+from drive_can_bridge.core.codes import code_of, CODES, MODULES
 from drive_can_bridge.core.messages import around, NOTHING, Sentence, Text, together
 from drive_can_bridge.core.sentences import Absence
 
@@ -275,6 +277,37 @@ def test_which_looks_are_found(line: str) -> None:
     (sentences.interrupted(), 'interrupted'), (sentences.uncoded('bus down'), 'bus_down')])
 def test_the_code_of_a_text_that_came_through_ros(text: str, code: str) -> None:
     assert code_of(text) == code
+
+
+def test_no_text_makes_looking_for_its_code_take_long() -> None:
+    rows = [row for about, rows in CODES.items() if about != 'files' for row in rows.values()]
+    for form in {form for row in rows for form in row.texts}:
+        parts = [before for before, *_ in Formatter().parse(form)]
+        # each piece often, in the order of the row, and an end that is not its own
+        hostile = ''.join(f'{part}x' * 300 for part in parts) + '!'
+        began = process_time()
+        for row in rows:
+            if form in row.texts:
+                row.places(hostile), row.places(hostile, whole=True)
+        assert process_time() - began < 1.0, form
+    for hostile in ('1' * 100_000, '1 attempt' * 20_000, ': ' * 50_000, 'a' * 200_000):
+        began = process_time()
+        assert code_of(hostile) == ''
+        assert process_time() - began < 2.0, hostile[:20]
+
+
+@pytest.mark.parametrize(('text', 'whole', 'letters'), [
+    ('busy: lift: 12 drives here', True, 'drives'),
+    ('busy: lift: 12 drives here', False, 'drives'),
+    ('a line\nbusy: lift: 1 drive here\nmore', False, 'drive'),
+    ('a line\nbusy: lift: 1 drive here', True, ''), ('busy: \nlift: 1 drive here', False, ''),
+    ('busy: : 1 drive here', False, ''), ('busy: : : 1 drive here', True, 'drive'),
+    ('busy: lift: 1 drive here and more', True, ''), ('not busy: lift: 1 drive here', True, ''),
+    ('not busy: lift: 1 drive here, now', False, 'drive')])
+def test_where_the_words_of_a_row_stand(text: str, whole: bool, letters: str) -> None:
+    row = Text('busy: {name}: {count:#drive} here')
+    places = sorted(row.places(text, whole=whole))
+    assert ''.join(text[each] for each in places) == (f'busy{letters}here' if letters else '')
 
 
 def test_a_kind_is_that_of_the_form_and_a_sentence_gets_further_fields() -> None:

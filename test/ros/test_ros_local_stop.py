@@ -148,3 +148,23 @@ def test_without_ros_a_bridge_that_hangs_has_its_second_and_is_named(
     began = bench.clock.now()
     assert run('stop') == (1, [hung, 'lift: ready'], '')
     assert 1.0 <= bench.clock.now() - began < 1.1
+
+
+@pytest.mark.parametrize(('error', 'why'), [
+    (DriveCanError('no ROS'), 'no ROS'), (RuntimeError('no rcl'), 'RuntimeError: no rcl')])
+def test_whatever_keeps_ros_from_beginning_what_is_known_without_is_told(
+        bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch,
+        error: Exception, why: str) -> None:
+    def no_way(*_: Any) -> Any:
+        raise error
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    older = Presence(one.context.get_domain_id(), '/b/bridge')
+    locally(one)
+    monkeypatch.setattr(control, '_ros', no_way)
+    try:
+        code, lines, errors = run('stop')
+    finally:
+        older.withdraw()
+    assert (code, lines[1:]) == (1, ['lift: ready']) and lines[0].startswith('b/bridge: NOT STOP')
+    assert why in errors

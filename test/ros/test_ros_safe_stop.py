@@ -12,7 +12,8 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import clock, pause
 import world
 
-from drive_can_bridge.core import sentences
+from drive_can_bridge.core import messages, sentences
+from drive_can_bridge.core.codes import CODES
 from drive_can_bridge.core.drive_services import DriveServices
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.exchange.exchange import BusExchange
@@ -51,6 +52,25 @@ def test_stop_sends_neutral_and_disable(bridge: StartBridge, client: Client) -> 
         assert not recorder.requests()
     wait_until(lambda: one.played['lift'].value('speed_setpoint') == 0.0)
     client.diagnostics('drive_can_bridge: drive lift', lambda drive: drive['state'] == 'offline')
+
+
+def test_what_is_said_of_a_stop_was_made_before_memory_is_short(
+        bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    for rows in CODES.values():
+        for row in rows.values():
+            for made in ('_variants', 'fields', 'optional'):
+                vars(row).pop(made, None)   # as in a process of its own
+
+    def nothing_left(*_: Any) -> Any:
+        raise MemoryError
+    one = run(bridge, client)
+    monkeypatch.setattr(messages, '_Variant', nothing_left)
+    assert client.call('/lift/quick_stop', Trigger).success
+    for rows in CODES.values():
+        for row in rows.values():
+            row.make_ready()
+    one.node.stop()
+    assert one.played['lift'].value('speed_setpoint') == 0.0
 
 
 def test_a_control_word_without_slot_is_written_at_the_end(bridge: StartBridge,
