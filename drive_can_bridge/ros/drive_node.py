@@ -155,7 +155,7 @@ class DriveNode(DriveListener):
 
     def answer_all(self) -> bool:
         """
-        Answer callers that still wait, that no answer will come. The exchange must be closed.
+        Answer callers that still wait: no answer will come. The exchange must be closed.
 
         :return: all calls are answered, and the node may go.
         """
