@@ -851,7 +851,7 @@ slow_exchange = Text(
     do='choose a longer period or a shorter cyclic_response')
 one_master_only = Text(
     '{seen}: there must be one master only',
-    do='end the other master: a drive obeys whoever was last')
+    do='end the other master: a drive obeys the last one that wrote')
 frames_rejected = Text(
     '{frames} frames rejected, the last: {last}; check for a second station with the same number',
     do='check for a second station with the same number')
