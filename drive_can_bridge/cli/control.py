@@ -136,15 +136,17 @@ def _stop(args: Namespace) -> int:
     try:
         while not local.look(now()) and not ros.look(now()):
             args.clock.wait(now() + LOOK_PERIOD)
-        return show(ros.answers(), STOP, json=args.json)
+        told = ros.answers()
     except KeyboardInterrupt:
         complain('interrupted; this is known:')
         show(ros.answers(), STOP, json=args.json)
         raise
     except Exception:   # no ROS, for whatever reason: what is known without is told all the same
         if local.answers() or local.unheard:
-            show(ros.answers(), STOP, json=args.json)
+            show(answers(local, None, args.namespace, args.words), STOP, json=args.json)
         raise
+    else:
+        return show(told, STOP, json=args.json)
     finally:
         local.close()
         ros.close()

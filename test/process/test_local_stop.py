@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drive_can_bridge.cli.stopping import answers, WithoutRos
+from drive_can_bridge.cli.stopping import answers, finished, WithoutRos
 from drive_can_bridge.process import local_stop
 from drive_can_bridge.process.local_stop import Answer, LocalStop
 from drive_can_bridge.process.presence import Present
@@ -246,3 +246,16 @@ def test_one_that_hangs_is_named_where_a_drive_of_it_may_be_meant(
     assert looked(stop, 0.1, 1.2) == [False, True]
     found = [answer.name for answer in answers(stop, Ros(), None, [word]) if answer.bridge]
     assert found == ['/other'] * named
+
+
+def test_whatever_goes_wrong_at_first_the_command_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    host = Host(monkeypatch, played)
+    early = local_stop.begin(['lift'])
+    assert early is not None and host.asked == [['stop', '*', 'lift']]
+
+    def fails(*_: Any) -> Any:
+        raise RuntimeError
+    with monkeypatch.context() as patch:
+        patch.setattr(LocalStop, 'look', fails)
+        assert finished(early) is None
+    assert local_stop.begun(None, ['lift']) is early.stop and not early.stop.look(5.0)

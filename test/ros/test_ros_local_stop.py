@@ -4,6 +4,7 @@
 from collections.abc import Callable, Iterator
 import json
 import os
+from types import SimpleNamespace
 from typing import Any
 
 from bridges import LIFT, parameters, StartBridge
@@ -168,3 +169,30 @@ def test_whatever_keeps_ros_from_beginning_what_is_known_without_is_told(
         older.withdraw()
     assert (code, lines[1:]) == (1, ['lift: ready']) and lines[0].startswith('b/bridge: NOT STOP')
     assert why in errors
+
+
+def test_where_the_way_through_ros_fails_midway_what_is_known_without_is_told(
+        bridge: StartBridge, run: Run, locally: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stop:
+        """Meets a defect of rcl."""
+
+        def __init__(self, *_: Any) -> None:
+            self.know = self.leave = lambda *_: None
+
+        def look(self, _: float) -> bool:
+            """Look."""
+            raise RuntimeError('rcl')
+
+        answers = look
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    older = Presence(one.context.get_domain_id(), '/b/bridge')
+    locally(one)
+    node = SimpleNamespace(leave=lambda: None)
+    monkeypatch.setattr(control, '_ros', lambda *_: (
+        SimpleNamespace(client_node=node), SimpleNamespace(StopRequests=Stop)))
+    try:
+        code, lines, errors = run('stop')
+    finally:
+        older.withdraw()
+    assert (code, lines[1:]) == (1, ['lift: ready']) and 'RuntimeError: rcl' in errors
