@@ -11,8 +11,8 @@ import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
 
 ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
-#: at the beginning of a line, behind a prompt, or between backticks
-COMMAND = re.compile(r'(?:^(?:\$ )?|`)drive_can ([a-z][^`\n]*)', re.MULTILINE)
+#: at the beginning of a line, behind a prompt, or between backticks; with a colon a command speaks
+COMMAND = re.compile(r'(?:^(?:\$ )?|`)drive_can ([a-z][a-z-]*(?![a-z:-])[^`\n]*)', re.MULTILINE)
 #: what follows is for the shell
 END = re.compile(r'\s[|>&]')
 
@@ -39,5 +39,6 @@ def test_commands_are_understood(page: Path) -> None:
 
 def test_commands_are_found() -> None:
     assert sum(map(len, PAGES.values())) > 40
-    page = '$ drive_can record -o a.log | x\n`drive_can decode …` `drive_can scan`\n'
+    page = ('$ drive_can record -o a.log | x\n`drive_can decode …` `drive_can scan`\n'
+            '`drive_can scan: bus down`\n')
     assert [command.split() for command in shown(page)] == [['record', '-o', 'a.log']]

@@ -340,7 +340,7 @@ class FakeService:
     class srv_type:  # noqa: N801  as in rclpy
         """Its answers are numbers."""
 
-        ReadyResponse = int
+        Response = int
 
 
 @pytest.fixture(name='rcl')
