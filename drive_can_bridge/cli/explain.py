@@ -26,7 +26,14 @@ PAGE = Path('docs', 'messages.md')
 _NEAREST = 5
 #: letters that are enough to look for
 _ENOUGH = 6
+#: what stands before the codes of files in the anchors of the page, where a code is of both
+_OF_FILES = 'file-'
+#: what the codes of a part of the catalogue stand for, behind the code
+_WHERE = {'drives and buses': 'said about a drive or a bus', 'commands': 'said by a command',
+          'files': 'said about a parameter file or a profile'}
 _HEADING = re.compile(r'# -- (.*?)(?: -+)?')
+#: where a clause of a row ends; not the comma that joins the names of a field
+_CLAUSE = re.compile(r'[,;] (?!\})')
 _ROW = re.compile(r'(\w+) = Text\(')
 
 _HEAD = """\
@@ -37,7 +44,7 @@ has](ros_interface.md)), or give it to `drive_can explain`, which takes a line o
 words of one, too:
 
 ```sh
-drive_can explain not_armed
+drive_can explain not_armed bus_up
 drive_can explain "conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts"
 ```
 
@@ -63,7 +70,7 @@ def define(parser: ArgumentParser) -> None:
         'Exit code 0: it is known. 1: it is not; the nearest ones are named. --json: code, about, '
         'texts (what changes in <brackets>), do.')
     parser.add_argument('code', metavar='CODE', nargs='+', help=(  # type: ignore[attr-defined]
-        'such as not_armed, or a text')).completer = (
+        'such as not_armed; several, one after the other; or a text')).completer = (
         lambda **_: _codes())
     parser.add_argument('--json', action='store_true', help='a JSON document a line')
 
@@ -71,17 +78,19 @@ def define(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Show the rows of a code (one of drives, one of files, or both), or those of a text."""
     text = ' '.join(args.code)
-    rows = rows_of(text)
-    for about, row in rows[:_NEAREST]:
+    named = _named(text)
+    rows = named or _told(text)
+    shown = rows if named else rows[:_NEAREST]
+    for about, row in shown:
         if args.json:
             print_json({'code': row.code, 'about': about, 'texts': forms(row), 'do': row.do})
         else:
-            say(f'{row.code} (of {about})')
+            say(f'{row.code} ({_WHERE[about]})')
             for form in forms(row):
                 say(f'  it says:    {form}')
             say(f'  what to do: {row.do}')
-    if rows[_NEAREST:]:
-        complain(f'and {len(rows) - _NEAREST} more: give more words')
+    if rows[len(shown):]:
+        complain(f'and {len(rows) - len(shown)} more: give more words')
     if not rows:
         near = difflib.get_close_matches(
             text, _codes(), _NEAREST)
@@ -91,9 +100,27 @@ def run(args: Namespace) -> int:
 
 
 def rows_of(text: str) -> list[tuple[str, Text]]:
-    """Return the rows of a code, of words of a text, or of a line, and what they are about."""
-    return [(about, rows[text]) for about, rows in CODES.items()
-            if text in rows] or _with_words(text) or _said_in(text)
+    """Return the rows of codes, of words of a text, or of a line, and what they are about."""
+    return _named(text) or _told(text)
+
+
+def _told(text: str) -> list[tuple[str, Text]]:
+    return _with_words(text) or _said_in(text)
+
+
+def _named(text: str) -> list[tuple[str, Text]]:
+    """Return the rows of codes, one after the other; none where a word is no code."""
+    found: dict[tuple[str, str], tuple[str, Text]] = {}
+    for word in text.split():
+        # as the page, and links to it, write it
+        anchor = word.strip('`').rpartition('#')[2]
+        code = anchor.removeprefix(_OF_FILES)
+        of_word = {(about, code): (about, rows[code]) for about, rows in CODES.items()
+                   if code in rows and (about == 'files' or code == anchor)}
+        if not of_word:
+            return []
+        found.update(of_word)
+    return list(found.values())
 
 
 def _codes() -> list[str]:
@@ -119,9 +146,25 @@ def _with_words(text: str) -> list[tuple[str, Text]]:
 
 def _said_in(text: str) -> list[tuple[str, Text]]:
     """Return the rows that a line may be made of: those that have most in common with it first."""
-    fitting = [(places, about, row) for about, row in _rows() if (places := row.places(text))]
-    return [(about, row) for places, about, row in sorted(fitting, key=lambda each: -len(each[0]))
-            if not any(places < others for others, *_ in fitting)]
+    fitting = [(places, about, row) for about, row in _rows()
+               if (places := row.places(text) or _begun(row, text))]
+    found = [(about, row) for places, about, row in sorted(
+        fitting, key=lambda each: (-len(each[0]), not each[2].places(text, whole=True)))
+             if not any(places < others for others, *_ in fitting)]
+    # one word and fields fit nearly every line that has the word
+    return [each for each in found if not _is_faint(each[1])] or found
+
+
+def _begun(row: Text, text: str) -> frozenset[int]:
+    """Return where the letters of a row stand in a text that was cut short behind a clause."""
+    heads = [form[:end.start()] for form in row.texts
+             if text.startswith(form.partition('{')[0]) for end in _CLAUSE.finditer(form)]
+    return Text(*heads).places(text, whole=True) if heads else frozenset()
+
+
+def _is_faint(row: Text) -> bool:
+    return all('<' in form and len(re.findall(r'[^\W\d_]+', re.sub('<.*?>', '', form))) < 2
+               for form in forms(row))
 
 
 def forms(row: Text) -> list[str]:
@@ -149,7 +192,7 @@ def page() -> str:
     lines = [_HEAD]
     for sections in (of_drives, of_files):
         lines += [f'* [{title}](#{_slug(title)})' for title, _ in sections]
-    for sections, head, prefix in ((of_drives, '', ''), (of_files, _FILES, 'file-')):
+    for sections, head, prefix in ((of_drives, '', ''), (of_files, _FILES, _OF_FILES)):
         lines.append(head)
         for title, rows in sections:
             lines += ['', f'## {title}', *_TABLE]

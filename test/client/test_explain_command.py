@@ -39,7 +39,7 @@ def test_the_contents_lead_to_headings() -> None:
 def test_a_code_of_diagnostics(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', 'no_answer']) == 0
     assert capsys.readouterr().out == (
-        'no_answer (of drives and buses)\n'
+        'no_answer (said about a drive or a bus)\n'
         '  it says:    no answer in <timeout> s, <attempts> attempts\n'
         f'  what to do: {sentences.no_answer.do}\n')
 
@@ -54,6 +54,54 @@ def test_one_that_drives_and_files_have(capsys: pytest.CaptureFixture[str]) -> N
         'texts': ['<name> is read-only, allowed are parameters with access rw or wo']}
 
 
+def codes(*words: str, capsys: pytest.CaptureFixture[str]) -> list[tuple[str, str]]:
+    assert main(['explain', '--json', *words]) == 0
+    documents = map(json.loads, capsys.readouterr().out.splitlines())
+    return [(each['code'], each['about']) for each in documents]
+
+
+DRIVES, FILES = 'drives and buses', 'files'
+
+
+@pytest.mark.parametrize(('words', 'found'), [
+    (['not_armed', 'bus_up'], [('not_armed', DRIVES), ('bus_up', DRIVES)]),
+    (['bus_up not_armed', 'bus_up'], [('bus_up', DRIVES), ('not_armed', DRIVES)]),
+    (['read_only', 'not_armed'],
+     [('read_only', DRIVES), ('read_only', FILES), ('not_armed', DRIVES)]),
+    ([*'not_armed bus_up online disabled bus_load_high no_answer'.split()],
+     [(each, DRIVES) for each in
+      'not_armed bus_up online disabled bus_load_high no_answer'.split()])])
+def test_several_codes_are_explained_one_after_the_other(
+        words: list[str], found: list[tuple[str, str]],
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert codes(*words, capsys=capsys) == found
+
+
+@pytest.mark.parametrize(('word', 'found'), [
+    ('file-does_not_fit', [('does_not_fit', FILES)]),
+    ('file-read_only', [('read_only', FILES)]),
+    ('#not_armed', [('not_armed', DRIVES)]),
+    ('docs/messages.md#file-does_not_fit', [('does_not_fit', FILES)]),
+    ('`not_armed`', [('not_armed', DRIVES)])])
+def test_a_code_as_anchors_and_pages_write_it(
+        word: str, found: list[tuple[str, str]], capsys: pytest.CaptureFixture[str]) -> None:
+    assert codes(word, capsys=capsys) == found
+
+
+def test_each_anchor_of_the_page_leads_to_its_row() -> None:
+    for anchor in re.findall('<a id="(.*?)">', explain.page()):
+        assert [row.code for _, row in explain.rows_of(anchor)][:1] == [
+            anchor.removeprefix('file-')], anchor
+
+
+def test_whom_a_text_is_about(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', 'file-read_only']) == 0
+    assert capsys.readouterr().out.startswith(
+        'read_only (said about a parameter file or a profile)\n')
+    assert main(['explain', 'no_adapters']) == 0
+    assert capsys.readouterr().out.startswith('no_adapters (said by a command)\n')
+
+
 def test_one_with_several_forms(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', 'fault_came']) == 0
     assert capsys.readouterr().out.splitlines()[1:3] == [
@@ -61,21 +109,24 @@ def test_one_with_several_forms(capsys: pytest.CaptureFixture[str]) -> None:
         '  it says:    fault (<status>)']
 
 
-@pytest.mark.parametrize(('line', 'codes'), [
+@pytest.mark.parametrize(('line', 'wanted'), [
     ('conveyor: read ramp_time (P30): no answer in 0.1 s, 3 attempts', ['no_answer']),
     ('lift: told to stop, but it does not answer: it may still be running',
      ['stop_not_answered', 'may_still_be_running']),
+    ('axis: offline: no complete set of PDOs for 3 cycles', ['silent_for_cycles']),
+    ('hoist, turn offline', ['members_offline']),
+    ('no answer in 0.1 s', ['no_answer_to_stop', 'no_answer']),
     ('drives missing: 12 of 15 drives online; not seen: a, b', ['drives_missing']),
     ('a.yaml:9: drives.a.period: 0.001 s is too fast, allowed is at least 0.01 s unless '
      'allow_fast_cycle is true', ['period_too_fast'])])
-def test_a_line_of_a_log(line: str, codes: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_of_a_log(line: str, wanted: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', '--json', line]) == 0
-    assert [json.loads(each)['code'] for each in capsys.readouterr().out.splitlines()] == codes
+    assert [json.loads(each)['code'] for each in capsys.readouterr().out.splitlines()] == wanted
 
 
 def test_words_of_a_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['explain', 'Still', 'braking']) == 0
-    assert capsys.readouterr().out.startswith('still_braking (of drives and buses)\n')
+    assert capsys.readouterr().out.startswith('still_braking (said about a drive or a bus)\n')
     assert main(['explain', 'allowed is']) == 0
     shown = capsys.readouterr()
     assert shown.out.count('what to do') == 5 and 'more: give more words' in shown.err
