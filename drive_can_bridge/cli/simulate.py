@@ -24,7 +24,8 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
-from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
+from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
+from drive_can_bridge.process.locks import Held, HostLock
 from drive_can_bridge.protocols.cia402.states import CONTROL_WORD, STATUS_WORD
 from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
@@ -211,6 +212,23 @@ def run(args: argparse.Namespace) -> int:
         return FAILED
 
 
+def _keep_links(stack: ExitStack, directory: Path, configuration: BridgeConfiguration) -> None:
+    """
+    Keep others from the links of all buses: bridges would turn to another simulation unawares.
+
+    :raises InUse: a simulation that runs has one. What a dead one has left is nobody's.
+    """
+    place = directory.resolve()
+    for name in configuration.buses:
+        try:
+            lock = HostLock(f'link {place / name}', 'drive_can simulate')
+        except Held as held:
+            process = 'another process' if held.process is None else f'process {held.process}'
+            raise InUse(command_sentences.link_in_use(
+                link=str(directory / name), process=process)) from None
+        stack.callback(lock.release)
+
+
 def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration,
               faults: list[tuple[str, Fault]], mechanics: dict[str, Mechanics],
               servos: 'Servos', *, pty: bool, link: Path | None, log_frames: Path | None,
@@ -220,6 +238,8 @@ def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration
     if not pty:     # a bridge locks the other end of a pseudo-terminal
         stack.enter_context(Ownership([(bus, ()) for bus in configuration.buses.values()],
                                       'drive_can simulate', END_FIRST))
+    if link is not None:
+        _keep_links(stack, link, configuration)
     output = _Output(sys.stdout)
     terminals: dict[str, SlcanTerminal] = {}
 

@@ -87,6 +87,10 @@ buses_on_one = Text(
 pty_or_interface = Text(
     '--pty and --interface/--channel exclude each other',
     do='leave one of them away: --pty makes buses of its own')
+link_in_use = Text(
+    '--pty-link: {link} belongs to {process}, which runs: end that first, or give another '
+    'directory',
+    do='end the other simulation, or give another directory')
 no_object_written = Text("'{part}' is no object; write 6007h or 1800h.05h")
 no_drive_without = Text('{index:04X}h: without it there is no drive', do='leave that object there')
 option_of_other_family = Text(

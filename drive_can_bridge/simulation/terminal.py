@@ -45,6 +45,8 @@ BACKLOG_AGE = 1.0
 #: bytes that a client may leave unread in the kernel's buffer of 4096
 _UNREAD_MAX = 2048
 _CHUNK = 4096
+#: what the path of every pseudo-terminal begins with
+_TERMINALS = '/dev/pts/'
 #: s between two looks at a client that does not read
 _BACKLOG_PERIOD = 0.005
 
@@ -219,10 +221,14 @@ class SlcanTerminal(EndPoint):
         """
         Let a symbolic link point here for as long as the terminal is open.
 
-        :raises OSError: it cannot be made, or something that is no link is in the way.
+        A link to another terminal is replaced: its simulation has died, and left it.
+
+        :raises OSError: it cannot be made, or something that is no such link is in the way.
         """
         if path.exists() and not path.is_symlink():
             raise FileExistsError(f'{path} exists and is not a symbolic link')
+        if path.is_symlink() and not os.readlink(path).startswith(_TERMINALS):
+            raise FileExistsError(f'{path} exists and is not a link to a pseudo-terminal')
         path.parent.mkdir(parents=True, exist_ok=True)
         # a name of its own first: who looks finds the old link or the new one, never none
         temporary = path.with_name(f'.{path.name}.{os.getpid()}')

@@ -93,6 +93,43 @@ def test_drives_behind_a_pseudo_terminal(start: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.real
+def test_a_link_of_a_running_simulation_is_left_alone(start: Any, tmp_path: Path) -> None:
+    """Told before anything is announced; the first one's drives are reached as before."""
+    links, same = tmp_path / 'links', tmp_path / 'same'
+    first = start('--pty-link', str(links))
+    first.line('drive lift')
+    shown = {each.name: os.readlink(each) for each in links.iterdir()}
+    same.symlink_to(links)
+    for directory in (links, same):     # under another name it is the same directory
+        second = start('--pty-link', str(directory))
+        assert second.process.wait(20) == 1
+        assert second.lines == [] and second.errors.splitlines() == [
+            f'drive_can simulate: --pty-link: {directory}/main belongs to process '
+            f'{first.process.pid}, which runs: end that first, or give another directory']
+        assert {each.name: os.readlink(each) for each in links.iterdir()} == shown
+    first.process.kill()
+    first.process.wait(20)
+    assert {each.name: os.readlink(each) for each in links.iterdir()} == shown      # stale
+    third = start('--pty-link', str(links))
+    third.line('drive lift')
+    assert os.readlink(links / 'main') == third.lines[0].split()[-1]
+    assert third.end(signal.SIGINT) == 0
+    assert list(links.iterdir()) == []
+
+
+def test_a_link_to_something_else_is_left_alone(capsys: pytest.CaptureFixture[str],
+                                                tmp_path: Path) -> None:
+    """One that somebody made, to an adapter for example, is not ours to replace."""
+    adapter = tmp_path / 'adapter'
+    adapter.write_text('', encoding='utf-8')
+    (tmp_path / 'main').symlink_to(adapter)
+    code, errors = refused(capsys, tmp_path, '--pty-link', str(tmp_path))
+    assert code == 1 and len(errors) == 1
+    assert f'{tmp_path}/main exists and is not a link to a pseudo-terminal' in errors[0]
+    assert os.readlink(tmp_path / 'main') == str(adapter)
+
+
+@pytest.mark.real
 def test_standard_input(start: Any) -> None:
     command = start('--pty', '--fault', 'conveyor:late=0.15', '--fault', 'lift:off', '--axis',
                     'lift:load=0.3,noise=1')
