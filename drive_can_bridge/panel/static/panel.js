@@ -14,11 +14,12 @@ const panel = (() => {
 
   // what a page without its panel shows is old, and is not to look as if it were not
   let told = false;
-  let since = '';   // time of day when the panel was last heard
+  const timeOfDay = () => new Date().toTimeString().slice(0, 8);
+  let since = timeOfDay();  // when the panel was last heard: it has sent the page
   setInterval(async () => {
     const there = Boolean(window.socket && window.socket.connected);
     document.body.classList.toggle('lost', !there);
-    if (there) since = new Date().toTimeString().slice(0, 8);
+    if (there) since = timeOfDay();
     connecting(!there);
     if (there || told) return;
     // a panel that was started again has other tokens: the page would try to reach it for ever
@@ -41,7 +42,7 @@ const panel = (() => {
       if (!page) return;
       page.before(line);
     }
-    line.textContent = since ? `connecting… what is shown is of ${since}` : 'connecting…';
+    line.textContent = `connecting… what is shown is of ${since}`;
   }
 
   // -- requests -----------------------------------------------------------------------------------
