@@ -25,12 +25,12 @@ _HEAD = """\
 opens nothing. `drive_can validate` knows this table, too. Look for what is printed on the box, or
 for the interface of python-can (4.3 to 4.6).
 
+In the file, what stands in the column *lines* of your row goes between the braces of a bus, and
+the bit rate behind it: `main: {<your row>, bitrate: 500000}`. With the row `slcan`:
+
 ```yaml
     buses:
-      main:
-        interface: slcan        # the lines of your row
-        channel: /dev/ttyACM0
-        bitrate: 500000
+      main: {interface: slcan, channel: /dev/ttyACM0, bitrate: 500000}
 ```
 
 * **Where the kernel has a driver, take `socketcan`**: several programs share the interface, and
@@ -41,7 +41,9 @@ for the interface of python-can (4.3 to 4.6).
   [name that stays](commissioning.md#10-from-now-on-at-boot) is better.
 * An adapter that hands back what it sends is told once in the log; the bridge drops that.
 * The last column is what makes it only listen, for `record`, `decode --live` and
-  `scan --bitrates`; a bridge needs it off.
+  `scan --bitrates`; a bridge needs it off. `–`: nothing is known that does; `record` and
+  `decode --live` acknowledge what they hear, as any node does, and `scan --bitrates` is not for
+  that adapter.
 
 """
 _COLUMNS = ('name', 'adapter', 'lines', 'does differently', 'what helps', 'how this is known',

@@ -51,6 +51,9 @@ _TOO_DEEP = complaints.too_deep(levels=DEPTH_MAX)
 #: what is noticed to be wrong much later: where it begins is the line to look at
 _OPENED = ('while scanning a quoted scalar', 'while parsing a flow', 'while scanning a simple key')
 
+#: keys with a comma between them, as within braces
+_TWO_KEYS = re.compile(rb'\s*(- +)?[\w.]+: [^#]*, *[\w.]+:( |$)')
+
 
 class BrokenYaml(Exception):
     """The text is not YAML from here on."""
@@ -150,12 +153,15 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
     if context.startswith(_OPENED):
         mark = getattr(error, 'context_mark', None) or mark
     line = mark.line + 1 if mark is not None else line
-    indentation = re.match(rb'\s*', b''.join(data.splitlines()[line - 1:line]))
+    text = b''.join(data.splitlines()[line - 1:line])
+    indentation = re.match(rb'\s*', text)
     if indentation is not None and b'\t' in indentation[0]:
         return BrokenYaml(line, complaints.tab())
     what = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'unreadable'
     if 'nesting' in what:   # libyaml has a limit of its own since PyYAML 6.0.4
         return BrokenYaml(line, _TOO_DEEP)
+    if what.startswith('mapping values are not allowed') and _TWO_KEYS.match(text):
+        return BrokenYaml(line, complaints.two_keys_in_line())
     if context.startswith('while scanning a quoted scalar'):
         what += ' (a quote is not closed)'
     elif context.startswith('while parsing a flow'):

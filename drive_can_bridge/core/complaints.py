@@ -110,6 +110,10 @@ not_yaml = Text(
 indented_like_no_key = Text(
     'not valid YAML: {what} (no key above it is indented like it: is one missing?)',
     do='indent the line like the other keys of its mapping, with spaces')
+two_keys_in_line = Text(
+    'two keys in one line need braces, or a line each',
+    do='write main: {interface: slcan, channel: /dev/ttyACM0}, or each key in a line of its own, '
+       'indented alike')
 tab = Text(
     'a tab in the indentation, allowed are spaces',
     do='replace each tab by spaces (two for each level)')
@@ -161,8 +165,8 @@ beside_parameters = Text(
     do='move it below ros__parameters:, or into a section of its own')
 misspelt = Text('misspelt, allowed is {allowed}', do='write ros__parameters, with two underscores')
 other_node_name = Text(
-    'fits no bridge that has its usual name, allowed is /**/{usual}, or a bridge that is '
-    'started with this name',
+    'only a bridge that is started with this name reads this section, allowed for any other is '
+    '/**/{usual}',
     do='name the section /**/drive_can_bridge, or start the bridge with that name (-r '
        '__node:=NAME)')
 other_namespace = Text(

@@ -287,10 +287,12 @@ homing_timed_out = Text(
     do='look at method, speeds and switches (6098h, 6099h); raise homing_timeout')
 homing_stopped = Text('homing stopped {step}', do='enable the drive and home it again')
 fault_while_homing = Text(
-    'fault {fault}: remove its cause, then reset it first; homing stopped {step}',
-    'fault: reset it first; homing stopped {step}',
+    'homing stopped {step} by fault {fault}: remove its cause, reset it, enable the drive and '
+    'home it again',
+    'homing stopped {step} by a fault: remove its cause, reset it, enable the drive and home it '
+    'again',
     fields='step fault',
-    do='remove its cause, then call ~/reset_fault')
+    do='remove its cause, then call ~/reset_fault, ~/enable and ~/home')
 homing_failed = Text(
     'the drive reports a homing error (bit 13)',
     do='look at method, speeds and switches (6098h, 6099h)')

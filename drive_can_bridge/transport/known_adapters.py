@@ -110,14 +110,14 @@ ROWS: tuple[Row, ...] = (
         'as CANable 1', 'candleLight firmware (fork for it) makes it a network interface',
         f'{PARSER} (canable2-fw b158aa7)', usb=('16d0:117e',)),
     Row('weact', 'WeAct USB2CANFDV1', 'slcan', '/dev/ttyACM0',
-        'refuses an empty line by BEL; otherwise as USBtin', 'none is needed',
-        f'{PARSER} (by its source)', listen_only='listen_only: true'),
+        'answers each command, and an empty line by a refusal (BEL), which is no fault',
+        'none is needed', f'{PARSER} (by its source)', listen_only='listen_only: true'),
     Row('usbtin', 'USBtin', 'slcan', '/dev/ttyACM0',
         'answers each command; lines of 99 characters at most; a whole line that lacks its end is '
         'sent at the next start', 'none is needed', f'{PARSER} (firmware 1.4)',
         usb=('04d8:000a',), listen_only='listen_only: true'),
     Row('lawicel', 'LAWICEL CANUSB', 'slcan', '/dev/ttyUSB0',
-        'FTDI chip: received bytes wait up to 16 ms; otherwise as USBtin',
+        'answers each command; FTDI chip: received bytes wait up to 16 ms',
         'latency timer to 1 ms: `echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/'
         'latency_timer`, for good by a udev rule', f'{PARSER} (by its manual)',
         usb=('0403:ffa8',), latency=0.016, listen_only='listen_only: true'),
