@@ -8,7 +8,7 @@ bridge sends is seen on ``~/request``, that the drive answers on ``~/response``;
 it is asked of the bridge, because a process that has just begun does not know the graph.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import json
@@ -140,12 +140,22 @@ def find_target(graph: Graph, namespace: str | None, drive: str, name: str | Non
     facts = graph.newest_status(f'{bridge.lstrip("/")}: drive {short}', age=0.5, patience=5.0)
     state = facts.get('state', 'unknown')
     if state not in READY:
-        advice = f'drive_can enable {node.lstrip("/")}' if state == 'disabled' else ''
-        raise JogRefused(sentences.jog_not_ready(state=printable(state), advice=advice))
+        raise JogRefused(_why_not_ready(state, facts, node.lstrip('/')))
     who = list(_others(others, graph.client_node.full_name))
     if who:
         raise JogRefused(sentences.jog_commanded(who=who))
     return Target(bridge, node, parameter, chosen['neutral'], wanted, float(timeout), tuple(shown))
+
+
+def _why_not_ready(state: str, facts: Mapping[str, str], drive: str) -> Sentence:
+    """Say what keeps a drive from being moved, and what to type about it."""
+    if state == 'fault':
+        # without a control word nobody can reset it from here
+        reset = (f'drive_can reset {drive}' if 'control_state' in facts
+                 else str(sentences.reset_at_drive()))
+        return sentences.jog_fault(fault=printable(facts.get('fault_code', '')), reset=reset)
+    advice = f'drive_can enable {drive}' if state == 'disabled' else ''
+    return sentences.jog_not_ready(state=printable(state), advice=advice)
 
 
 def _values(graph: Graph, node: str, names: Sequence[str]) -> list[Any]:

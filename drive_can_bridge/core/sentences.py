@@ -919,6 +919,10 @@ jog_timeout = Text(
     do='set command_timeout of the drive')
 jog_not_ready = Text(
     'is {state}: {advice}', 'is {state}', do='bring it online, and enable it')
+jog_fault = Text(
+    'has fault {fault}: remove its cause, then: {reset}',
+    'has a fault: remove its cause, then: {reset}',
+    do='remove its cause, reset it, enable the drive')
 jog_commanded = Text(
     'is commanded by others: {who:, }; two who command one drive move it by turns',
     do='end who else publishes commands to the drive')

@@ -146,6 +146,19 @@ def test_a_drive_that_is_not_there_is_refused(bridge: StartBridge, run: Run) -> 
     assert (code, lines) == (1, []) and 'is offline' in errors
 
 
+def test_a_drive_in_fault_is_refused_with_its_fault(bridge: StartBridge, client: Client,
+                                                   run: Run) -> None:
+    one = enabled(bridge, run)
+    one.played['lift'].fault('trip')
+    client.diagnostics('drive_can_bridge: drive lift',
+                       lambda drive: drive['fault_code'] == '7 overcurrent')
+    code, lines, errors = run('jog', 'lift', '300', '--yes')
+    assert (code, lines) == (1, [])
+    assert 'lift: has fault 7 overcurrent: remove its cause, then: drive_can reset lift\n' in errors
+    code, lines, errors = run('explain', 'jog_fault')
+    assert code == 0 and 'remove its cause, reset it, enable the drive' in ' '.join(lines)
+
+
 def test_somebody_who_commands_all_joints(bridge: StartBridge, client: Client, run: Run) -> None:
     joint = {'name': 'lift', 'velocity': 'actual_speed', 'velocity_command': 'speed_setpoint'}
     enabled(bridge, run, joint=joint)
