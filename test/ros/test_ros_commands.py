@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 from bridges import Bridge, CONVEYOR, HASTY, late, parameters, Recorder, StartBridge
-from clients import WARN, Client, wait_until
+from clients import Client, wait_until, WARN
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
