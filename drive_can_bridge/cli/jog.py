@@ -115,14 +115,16 @@ def _move(args: Namespace, graph: Any, target: Any, label: str) -> int:
         nonlocal due
         if elapsed < due:
             return
+        told = ', '.join(f'{name} {with_unit(shown[name], value)}'
+                         for name, value in jog.values.items() if name in shown)
+        if shown and not (told or args.json):   # no value has arrived yet
+            return
         due = elapsed + _LINE_PERIOD
         try:
             if args.json:
                 print_json({'drive': label, 'seconds': round(elapsed, 2), 'values': jog.values})
             else:
-                say(f'{label}: {elapsed:4.1f} s: ' + ', '.join(
-                    f'{name} {with_unit(shown[name], value)}'
-                    for name, value in jog.values.items() if name in shown))
+                say(f'{label}: {elapsed:4.1f} s' + f': {told}' * bool(told))
             sys.stdout.flush()
         except OSError as error:
             unseen.append(error)

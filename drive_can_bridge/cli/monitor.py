@@ -80,7 +80,8 @@ def run(args: argparse.Namespace) -> int:
             from drive_can_bridge.ros.monitor.client import MonitorClient
         except ImportError as error:
             raise DriveCanError(what_is_missing('drive_can monitor', error)) from error
-        model = Model(args.namespace)
+        # a demo starts its bridge itself, and ends it
+        model = Model(args.namespace, started_here=args.title != _TITLE)
         source = MonitorClient(model)
         try:
             code = _show(source, model, watcher, args, refusal)

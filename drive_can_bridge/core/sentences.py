@@ -789,6 +789,9 @@ bus_load_high = Text(
 online = Text('online', do='nothing')
 activate_bridge = Text('bridge inactive: activate it', do='activate it')
 bridge_ended = Text('bridge ended: start it again', do='start it again')
+bridge_ended_may_run = Text(
+    'bridge ended: it may still be running',
+    do='make sure that the drive stands still, by other means if need be')
 stopped_for_defect = Text(
     'offline: {why}; told to stop, looked for again in a moment; please report this defect of '
     'the bridge with its log',
@@ -1151,6 +1154,7 @@ bridges_of_one_name = Text(
 drive_of_two_bridges = Text(
     '{one} and {other} have a drive {drive} each: start each in a namespace of its own',
     do='start each in a namespace of its own')
+bridge_ended_here = Text('bridge ended', do='nothing: it was ended from here')
 bridge_silent_may_run = Text(
     'may still be running: its bridge is silent',
     do='see whether the bridge runs; make sure that the drive stands still, by other means if '

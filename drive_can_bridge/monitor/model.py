@@ -22,6 +22,8 @@ from drive_can_bridge.monitor.values import ParameterInfo
 OFFLINE, ONLINE = 'offline', 'online'
 #: key of diagnostics; there for drives with a control word only
 CONTROL_STATE = 'control_state'
+#: what a bridge says of a drive at its end: its stop was confirmed, or was not
+_ENDED, _ENDED_IN_DOUBT = sentences.bridge_ended().code, sentences.bridge_ended_may_run().code
 #: of a drive that exchanges nothing
 _SILENT_STATES = (OFFLINE, 'mapping differs', '')
 #: s after which a drive that is sampled all the time, and said to be online, has lost its bridge
@@ -134,14 +136,33 @@ class DriveRecord:
             if info is not None:
                 self._readings[name] = ('' if value is None else info.text(value), now)
 
-    def look(self, now: float, *, label: str, silent: float) -> DriveSnapshot:
+    @property
+    def stopped(self) -> bool:
+        """Its bridge has ended, and its stop was confirmed."""
+        return self._farewell == _ENDED
+
+    @property
+    def _farewell(self) -> str:
+        """What its bridge said at its end; '': it was not the end, or it was started again."""
+        if self._report is None or self._online and self._online_at > self._reported_at:
+            return ''
+        code = self._report.facts.get('code', '')
+        return code if code in (_ENDED, _ENDED_IN_DOUBT) else ''
+
+    def look(self, now: float, *, label: str, silent: float, started_here: bool = False,
+             ) -> DriveSnapshot:
         """
         Return how the drive is.
 
         :param silent: s for which the bridge says nothing any more, or 0.
+        :param started_here: nobody is told to start its bridge again.
         """
+        if self._farewell:      # nothing is to follow that: it says how it was left
+            silent = 0.0
         report = self._report or StatusReport('', True, '', Level.STALE, 'nothing known yet')
         state, level, advice, online = self._judge(report, now, silent)
+        if started_here and self.stopped:
+            advice = sentences.bridge_ended_here()
         responses, requests = self.responses, self.requests
         # what it said before it was away is no news of how it is
         sampled = online and responses.at > self._offline_at
@@ -258,9 +279,11 @@ class Model:
     Everything that is known of all bridges.
 
     :param namespace: only bridges in it, or below it; '' or '/': all.
+    :param started_here: whoever looks has started the bridge, and ends it.
     """
 
-    def __init__(self, namespace: str = '') -> None:
+    def __init__(self, namespace: str = '', *, started_here: bool = False) -> None:
+        self._started_here = started_here
         self._prefix = f'/{namespace.strip("/")}/' if namespace.strip('/') else '/'
         self._bridges: dict[str, _BridgeRecord] = {}
         self._drives: dict[str, DriveRecord] = {}
@@ -389,12 +412,15 @@ class Model:
         several = len({name.rpartition('/')[0] for name in self._bridges}) > 1
         for name, bridge in self._bridges.items():
             silent = bridge.silent(now)
-            bridges.append(BridgeSnapshot(name, silent))
+            # of one drive that may run the banner of a silent bridge tells, too
+            ended = bool(bridge.drives) and all(
+                drive.stopped for drive in bridge.drives.values())
+            bridges.append(BridgeSnapshot(name, 0.0 if ended else silent, ended))
             place = f'{name[1:].rpartition("/")[0] or name[1:]} ' if len(self._bridges) > 1 else ''
             buses += [bus.look(bus_name, label=f'{place}{bus_name}', silent=silent)
                       for bus_name, bus in bridge.buses.items()]
             drives += [drive.look(now, label=full[1:] if several else full.rpartition('/')[2],
-                                  silent=silent)
+                                  silent=silent, started_here=self._started_here)
                        for full, drive in bridge.drives.items()]
         return Snapshot(at, tuple(bridges), tuple(buses), tuple(drives), tuple(
             line for line in self._log

@@ -336,11 +336,14 @@ class BridgeSnapshot:
     """
     One bridge.
 
-    :param silent: s since its last diagnostics, once that is longer than it should be; else 0.
+    :param silent: s since its last diagnostics, once that is longer than it should be; else 0,
+        also when it has ended.
+    :param ended: it took its leave, and said of each drive that it was told to stop and heard it.
     """
 
     name: str
     silent: float = 0.0
+    ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)

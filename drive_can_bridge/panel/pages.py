@@ -235,7 +235,7 @@ class LogPage:
         told: list[tuple[str, str, str]] = []
         for bridge in snapshot.bridges:
             told.append((f'bridge {bridge.name}', 'error' if bridge.silent else '',
-                         'silent' if bridge.silent else 'runs'))
+                         'silent' if bridge.silent else 'ended' if bridge.ended else 'runs'))
         told += [(f'bus {bus.label}', class_of(bus.level), f'{bus.state}: {bus.message}')
                  for bus in snapshot.buses]
         told += [(f'drive {drive.label}', class_of(tone_of(drive)), drive.advice)

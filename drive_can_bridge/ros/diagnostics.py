@@ -209,7 +209,7 @@ class DriveReporter:
     Reports on one drive; remembers the counts of the last report.
 
     :param lateness: of the answers of all drives of its bus.
-    :ivar inactive: the message while the bridge is inactive.
+    :ivar ended: the drives have been stopped, and the process ends.
     """
 
     def __init__(self, drive: DriveNode, lateness: Lateness | None = None) -> None:
@@ -218,7 +218,7 @@ class DriveReporter:
         self._rejected = self._late = 0
         self._latencies = 0, 0.0        # how many, and their sum
         self._requests = 0
-        self.inactive = sentences.activate_bridge()
+        self.ended = False
 
     def report(self, now: float) -> StatusEntry:
         """Return the report of this moment."""
@@ -266,7 +266,10 @@ class DriveReporter:
         if session.defect and drive.exchange.active:
             return DiagnosticStatus.ERROR, sentences.stopped_for_defect(session.defect)
         if not session.active:
-            return DiagnosticStatus.STALE, self.inactive
+            if self.ended and drive.may_run:
+                return DiagnosticStatus.ERROR, sentences.bridge_ended_may_run()
+            return DiagnosticStatus.STALE, (sentences.bridge_ended() if self.ended
+                                            else sentences.activate_bridge())
         if state is DriveState.MAPPING_DIFFERS:
             return DiagnosticStatus.ERROR, session.remedy(session.offline_advice)
         if state is DriveState.OFFLINE:
@@ -432,7 +435,7 @@ class Diagnostics:
     def conclude(self) -> None:
         """Publish for the last time: the drives have been stopped, and the process ends."""
         for drive in self.drives:
-            drive.inactive = sentences.bridge_ended()
+            drive.ended = True
         self.publish()
 
     def reports(self, now: float) -> list[StatusEntry]:

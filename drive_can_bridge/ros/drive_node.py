@@ -295,6 +295,16 @@ class DriveNode(DriveListener):
         self._told_online = online
         self._online.publish(Bool(data=online))
 
+    @property
+    def may_run(self) -> bool:
+        """
+        Nobody has confirmed that it stands: asked when the drives have been stopped.
+
+        That was said of it, and it was not online anew since; or its stop is not over.
+        """
+        session = self.session
+        return bool(self._may_run or session.owed or session.defect or not session.stopped)
+
     def looked_at(self, entered: bool) -> None:
         """
         Take a look at its bus from outside: a drive is not online while that hangs.
@@ -320,6 +330,7 @@ class DriveNode(DriveListener):
         control = self.session.control
         if control is not None and control.table.enabled is not None and not control.off:
             # it may lag, or the drive runs down
+            self._may_run = True
             self._log.warning(sentences.stopped_state_differs(state=control.state))
         else:
             self._log.info('stopped')

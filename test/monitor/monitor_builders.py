@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 import math
+from typing import Any
 
 from drive_can_bridge.core.parameters import ValueKind
 from drive_can_bridge.monitor.model import Model
@@ -15,6 +16,13 @@ BRIDGE = '/drive_can_bridge'
 NOT_ARMED = 'not armed: publish 0 to /lift/command/speed_setpoint'
 SILENT = ('not seen since start: no answer to mapping read: drive silent, wrong station, bit rate '
           'or identifier mode; check its power, cable, station number and bit rate')
+
+#: what a bridge says of a drive when it takes its leave
+ENDED: dict[str, Any] = {'level': 3, 'state': 'offline', 'code': 'bridge_ended',
+                         'message': 'bridge ended: start it again'}
+ENDED_IN_DOUBT: dict[str, Any] = {
+    'level': 2, 'state': 'offline', 'code': 'bridge_ended_may_run',
+    'message': 'bridge ended: it may still be running'}
 
 
 def info(name: str, unit: str = '', kind: str = 'int16', scale: str = '1.0', **facts: str,

@@ -7,8 +7,8 @@ from typing import Any
 
 from hypothesis import given, strategies as st
 from monitor_builders import (
-    AT, BRIDGE, bus_status, drive_status, feed, info, model_of, NOT_ARMED, NOW, PARAMETERS, seen,
-    three_drives,
+    AT, BRIDGE, bus_status, drive_status, ENDED, ENDED_IN_DOUBT, feed, info, model_of, NOT_ARMED,
+    NOW, PARAMETERS, seen, three_drives,
 )
 import pytest
 from transcripts import replayed, stories
@@ -20,7 +20,9 @@ from drive_can_bridge.monitor.summary import balance, line, Lines
 STORIES = stories(__file__, 'lines.yaml')
 #: what diagnostics say of the drive
 STATES: dict[str, dict[str, Any]] = {
-    'diagnosed': {},
+    'diagnosed': {}, 'ended': ENDED, 'ended_in_doubt': ENDED_IN_DOUBT,
+    'inactive': {'level': 3, 'state': 'offline', 'code': 'activate_bridge',
+                 'message': 'bridge inactive: activate it'},
     'fault': {'level': 2, 'state': 'fault',
               'message': 'fault 7 overcurrent: remove its cause, then reset it'}}
 

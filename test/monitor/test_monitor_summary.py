@@ -2,9 +2,11 @@
 """Colours, order, counts and advice, the same for all views."""
 
 from collections.abc import Callable
+from typing import Any
 
 from monitor_builders import (
-    AT, bus_status, drive_status, fifteen_drives, model_of, NOW, seen, three_drives,
+    AT, bus_status, drive_status, ENDED, ENDED_IN_DOUBT, fifteen_drives, model_of, NOW, seen,
+    three_drives,
 )
 import pytest
 from transcripts import replayed, stories
@@ -58,8 +60,17 @@ def unheard() -> Model:
     return model
 
 
+def ended(lift: dict[str, Any] = ENDED, **options: bool) -> Model:
+    """Return a bridge that has taken its leave; what it said of one drive."""
+    model = Model(**options)
+    model.diagnosed([bus_status(), drive_status(**ENDED), drive_status('lift', **lift),
+                     drive_status('hoist', **ENDED)], AT, NOW)
+    return model
+
+
 DRIVES: dict[str, Callable[[], Model]] = {
-    'unheard': unheard,
+    'unheard': unheard, 'ended': ended, 'ended_in_doubt': lambda: ended(ENDED_IN_DOUBT),
+    'ended_of_two': lambda: ended({}), 'ended_here': lambda: ended(started_here=True),
     'fifteen': fifteen_drives, 'three': three_drives, 'nobody': Model, 'two_bridges': two_bridges,
     'with_files': lambda: alike('call ~/enable (drive_can enable {0}) of an online {0}.yaml'),
     'with_bus_off': lambda: alike('enable {}, online', bus_status(level=2, message='bus off'))}

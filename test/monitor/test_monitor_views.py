@@ -5,7 +5,8 @@ from itertools import product
 
 from extent import some
 from monitor_builders import (
-    bus_status, drive_status, feed, many_drives, model_of, seen, three_drives)
+    AT, bus_status, drive_status, ENDED, ENDED_IN_DOUBT, feed, many_drives, model_of, NOW, seen,
+    three_drives)
 import pytest
 from views import golden_file, plain, shown, SIZES, VIEWS
 
@@ -33,6 +34,14 @@ def test_it_fits_everywhere(width: int, page: Page) -> None:
         assert len(lines) == height
         assert all(len(line) <= width for line in lines)
         assert 'Layout' not in ''.join(lines)
+
+
+def test_of_a_bridge_that_took_its_leave_there_is_no_banner() -> None:
+    for farewell, doubt in ((ENDED, False), (ENDED_IN_DOUBT, True)):
+        model = model_of([bus_status(), drive_status(**farewell)])
+        text = plain(model.look(NOW + 60.0, AT + 60.0), Choice(), 100, 30)
+        assert 'bridge ended: ' in text
+        assert ('may still be running; a stop may not reach them' in text) == doubt
 
 
 def test_nobody_starts_a_bridge_that_is_being_started() -> None:

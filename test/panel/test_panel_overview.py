@@ -150,6 +150,16 @@ def test_the_banner_says_so_once(page: Any) -> None:
     assert texts(page, 'banner') == []
 
 
+def test_a_bridge_that_took_its_leave_neither_runs_nor_is_silent(page: Any) -> None:
+    from drive_can_bridge.panel.pages import LogPage
+    made = LogPage()
+    for bridge, told in ((BridgeSnapshot(BRIDGE), 'runs'), (BridgeSnapshot(BRIDGE, 7.0), 'silent'),
+                         (BridgeSnapshot(BRIDGE, ended=True), 'ended')):
+        made.show(Snapshot(bridges=(bridge,)))
+        assert told in [text for kind in ('facts', 'states') for text in ' '.join(
+            texts(page, kind)).replace(BRIDGE, ' ').split()]
+
+
 def test_the_log_is_filtered_and_stands_still_on_request(page: Any) -> None:
     from drive_can_bridge.panel.pages import LogPage
     made = LogPage()

@@ -57,6 +57,21 @@ def test_holds_the_value_and_ends_with_neutral(bridge: StartBridge, run: Run) ->
     assert speeds(one) == [0.0]
 
 
+def test_no_line_is_empty_before_the_first_values(
+        bridge: StartBridge, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    enabled(bridge, run)
+    looks = 0
+
+    def values(_: jog.Jog) -> dict[str, Any]:
+        nonlocal looks
+        looks += 1
+        return {} if looks == 1 else {'actual_speed': 1.0}
+    monkeypatch.setattr(jog.Jog, 'values', property(values, lambda *_: None), raising=False)
+    code, lines, _ = run('jog', 'lift', '300', '--yes', '--for', '1')
+    assert code == 0 and looks > 1
+    assert len(lines) > 1 and all('actual_speed' in line for line in lines[:-1])
+
+
 def test_its_end_is_no_warning(bridge: StartBridge, client: Client, run: Run) -> None:
     enabled(bridge, run)
     assert run('jog', 'lift', '300', '--yes', '--for', '1')[0] == 0

@@ -5,6 +5,7 @@ from typing import Any
 
 from bridges import Bridge, CONVEYOR, late, LIFT, parameters, Recorder, StartBridge
 from clients import Client, ERROR, wait_until, WARN
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 import pytest
 from std_msgs.msg import Bool, Float64
@@ -31,6 +32,29 @@ def run(bridge: StartBridge, client: Client, content: Any = LIFTS) -> Bridge:
         client.publish('/lift/command/speed_setpoint', Float64(data=value))
     wait_until(lambda: float(one.played['lift'].value('actual_speed')) > 10.0)
     return one
+
+
+#: whoever looks at it afterwards must not take it for stopped
+DOUBT = DiagnosticStatus.ERROR, 'bridge ended: it may still be running'
+
+
+def farewell(one: Bridge, client: Client) -> tuple[bytes, str]:
+    """End it; return level and message of what diagnostics say last of its drive."""
+    topic = client.topic('/diagnostics', DiagnosticArray)
+    topic.wait()
+    one.node.stop()
+    codes = {'bridge_ended', 'bridge_ended_may_run'}
+    last = topic.wait(lambda array: codes.intersection(
+        value.value for value in array.status[1].values))
+    return last.status[1].level, last.status[1].message
+
+
+@pytest.mark.parametrize('more', [
+    {}, {'cyclic_request': ['speed_setpoint']}, {'protocol': 'datamodel_standard'}])
+def test_the_farewell_is_without_doubt_where_the_stop_was_confirmed(
+        bridge: StartBridge, client: Client, more: dict[str, object]) -> None:
+    one = run(bridge, client, parameters(lift={**LIFT, **more}))
+    assert farewell(one, client) == (DiagnosticStatus.STALE, 'bridge ended: start it again')
 
 
 def last_cycles(recorder: Recorder) -> list[tuple[int, ...]]:
@@ -128,7 +152,7 @@ def test_a_drive_that_says_enabled_to_the_end_is_not_called_stopped(
     one = run(bridge, client, parameters(lift={**LIFT, **more}))
     client.listen()
     one.played['lift'].fault(f'set=status_word:{one.played["lift"].value("status_word"):g}')
-    one.node.stop()
+    assert farewell(one, client) == DOUBT
     client.wait_logged('lift: told to stop, and answers, but its last status word does not say '
                        'so: enabled', WARN)
     assert 'lift: stopped' not in client.logged(0)
@@ -154,7 +178,7 @@ def test_a_bus_that_is_lost_during_the_stop_leaves_nobody_called_stopped(
             wire.lose()
     wire.watchers.append(unplug)
     client.listen()
-    one.node.stop()
+    assert farewell(one, client) == DOUBT
     danger = sentences.may_still_be_running(sentences.bus_lost_before_stop())
     client.wait_logged(f'{name}: {danger}', WARN)
     assert not [line for line in client.logged(0)
