@@ -18,7 +18,7 @@ from drive_can_bridge.configuration.profiles import ProfileStore
 from drive_can_bridge.configuration.schema import ALL_OPTIONS, complete, definition
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.adapter import AdapterTraits
-from drive_can_bridge.core.complaints import hint, suggestion
+from drive_can_bridge.core.complaints import hint, suggestion, suggestion_of_profile
 from drive_can_bridge.core.configuration import (
     BusConfiguration, convertible_units, DriveConfiguration, ELECTRICAL_FREQUENCY,
     JointConfiguration, JointQuantity, si_factor)
@@ -35,6 +35,8 @@ _SLIP = 0.8
 #: what several adapters call a mode in which they send nothing
 _LISTEN_ONLY = 'listen_only'
 _COMMAND = '_command'
+#: what makers call the control word, see ``_plain``
+_CONTROL_WORD = 'controlword'
 _KEYS = tuple(quantity.value + suffix for suffix in ('', _COMMAND) for quantity in JointQuantity)
 
 
@@ -522,7 +524,7 @@ class DriveChecker:
             self._wrong(('bus',), complaints.unknown(name=bus, hint=suggestion(bus, self._buses)))
         family = FAMILIES.get(self._entry.get('protocol', ''))
         self._load_profile(family)
-        lists = {key: self._list(key) for key in LISTS}
+        lists = {key: self._list(key, family) for key in LISTS}
         if family is None:
             return None
         drive = self._build(family, lists)
@@ -571,7 +573,7 @@ class DriveChecker:
             return
         self._loaded = loaded
 
-    def _list(self, key: str) -> tuple[Parameter, ...]:
+    def _list(self, key: str, family: Family | None) -> tuple[Parameter, ...]:
         """Resolve a list of parameter names; what has a problem is a stand-in, not listed."""
         found: list[Parameter] = []
         path = (*self._path, key)
@@ -586,8 +588,9 @@ class DriveChecker:
                 if name not in self._loaded.names:
                     fit = [each for each in self._loaded.names if each not in known
                            or not _direction_problem(key, known[each])]
-                    self._wrong((key,), complaints.not_in_profile(
-                        name=name, hint=suggestion(name, fit)), at=at)
+                    self._wrong((key,), _built_in(name, family) or complaints.not_in_profile(
+                        name=name, hint=suggestion_of_profile(
+                            name, fit, self._entry.get('profile', ''))), at=at)
                 parameter = known.get(name, parameter)
             message = _direction_problem(key, parameter)
             if message:
@@ -694,6 +697,23 @@ class DriveChecker:
                 note(self._loaded.tree, parts[1:], message)
             elif not self._tree.is_damaged((*self._path, *parts)):
                 note(self._tree, (*self._path, *parts), message)
+
+
+def _built_in(name: str, family: Family | None) -> Sentence:
+    """Say that a name means what the family exchanges by itself; '' if it does not."""
+    if family is None or not family.control_built_in:
+        return NOTHING
+    plain = _plain(name)
+    if plain in map(_plain, family.builtin_names):
+        return complaints.status_word_mapped(name=name)
+    if plain == _CONTROL_WORD:
+        return complaints.mapped_already(name=name, taken=complaints.THE_CONTROL_WORD)
+    return NOTHING
+
+
+def _plain(name: str) -> str:
+    """Return a name without what makers write differently: Statusword, status_word."""
+    return name.lower().replace('_', '')
 
 
 def _direction_problem(key: str, parameter: Parameter) -> Sentence:

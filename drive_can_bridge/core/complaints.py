@@ -7,16 +7,26 @@ place of the problem is not part of it.
 """
 
 from collections.abc import Iterable
+import difflib
+import shlex
 
 from drive_can_bridge.core.messages import catalogue, NOTHING, Sentence, Text
 from drive_can_bridge.core.text import nearest
 
 _WORDS_MAX = 30
+#: names of a profile that are all shown, and how many of more
+_NAMES_MAX, _NAMES_NEAREST = 8, 4
+
+#: what a name is that means the control word
+THE_CONTROL_WORD = 'the control word, which the bridge sends by itself'
 
 # -- what may be meant instead
 did_you_mean = Text("did you mean '{word}'?", do='write that word')
 near = Text(" (did you mean '{word}'?)", do='write that word')
 allowed = Text('allowed: {words}', do='write one of these')
+some_allowed = Text(
+    'allowed are for example {words}; all: drive_can profile show {profile}',
+    do='write a name that the profile has')
 nothing_allowed = Text('nothing is allowed here', do='leave it out')
 allowed_below = Text(
     'allowed is {entry} below it',
@@ -663,7 +673,7 @@ node_of_drive = Text(
 mapped_already = Text("'{name}' is {taken}, allowed is to leave it out")
 status_word_mapped = Text(
     "'{name}' is the status word, which is published by itself, allowed is to leave it out",
-    do='delete it from cyclic_response')
+    do='delete it from the list')
 period_too_fast = Text(
     '{period:g} s is too fast, allowed is at least {least:g} s unless allow_fast_cycle is true',
     do='raise period, or write allow_fast_cycle: true if drive and bus can do it')
@@ -760,3 +770,12 @@ def suggestion(word: str, known: Iterable[str]) -> Sentence:
         return nothing_allowed()
     more = ' …' if len(words) > _WORDS_MAX else ''
     return allowed(words=', '.join(words[:_WORDS_MAX]) + more)
+
+
+def suggestion_of_profile(word: str, known: Iterable[str], profile: str) -> Sentence:
+    """Write the same about a name that a profile lacks, of which there may be hundreds."""
+    words = list(known)
+    if len(words) <= _NAMES_MAX or _meant(word, words) is not None:
+        return suggestion(word, words)
+    few = difflib.get_close_matches(word, words, n=_NAMES_NEAREST, cutoff=0.0)
+    return some_allowed(words=', '.join(few), profile=shlex.quote(profile))

@@ -84,6 +84,8 @@ def test_there_are_many_and_the_file_itself_is_good(
     (complaints.without_head, 'without a head'),
     (complaints.two_protocols, 'protocol: canopen'),
     (complaints.to_be_imported, 'profile: an EDS file'),
+    (complaints.some_allowed, 'cyclic_response: a name that is like none'),
+    (complaints.status_word_mapped, 'cyclic_response: the status word'),
 ], ids=lambda each: getattr(each, 'code', each))
 def test_row_of_a_mistake(row: Text, mistake: str) -> None:
     """Its longest words stand in what is said of that mistake."""

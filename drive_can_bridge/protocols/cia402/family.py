@@ -230,7 +230,7 @@ class Cia402(Family):
 
     def _check_lists(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         taken: dict[tuple[int, int], str] = {
-            (CONTROL_WORD, 0): 'the control word, which the bridge sends by itself',
+            (CONTROL_WORD, 0): complaints.THE_CONTROL_WORD,
             (MODE, 0): 'the mode, which the key mode gives'}
         for key, listed, first in _LISTS:
             parameters: tuple[Parameter, ...] = getattr(drive, listed)
