@@ -30,6 +30,7 @@ _ENOUGH = 6
 _OF_FILES = 'file-'
 #: what the codes of a part of the catalogue stand for, behind the code
 _WHERE = {'drives and buses': 'said about a drive or a bus', 'commands': 'said by a command',
+          'states': 'a state of a drive',
           'files': 'said about a parameter file or a profile'}
 _HEADING = re.compile(r'# -- (.*?)(?: -+)?')
 #: where a clause of a row ends; not the comma that joins the names of a field

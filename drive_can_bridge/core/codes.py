@@ -5,20 +5,22 @@ from types import ModuleType
 
 from drive_can_bridge.core import (
     bus_sentences, command_sentences, complaints, frame_sentences, host_sentences, messages,
-    sentences)
+    sentences, state_names)
 from drive_can_bridge.core.messages import Sentence, Text
 
 #: the modules of rows, by what they are about; a code stands once, and may be one of files, too
 MODULES: dict[str, tuple[ModuleType, ...]] = {
     'drives and buses': (sentences, bus_sentences, frame_sentences, host_sentences),
     'commands': (command_sentences,),
+    'states': (state_names,),
     'files': (complaints,),
 }
 CODES: dict[str, dict[str, Text]] = {
     about: {code: row for module in modules for code, row in module.CODES.items()}
     for about, modules in MODULES.items()}
 #: rows that a text may be of which came through ROS
-_SAID = [row for about, rows in CODES.items() if about != 'files' for row in rows.values()]
+_SAID = [row for about, rows in CODES.items() if about not in ('files', 'states')
+         for row in rows.values()]
 
 
 def code_of(text: str) -> str:

@@ -10,7 +10,9 @@ import pytest
 from drive_can_bridge.cli import explain
 from drive_can_bridge.cli.main import main
 from drive_can_bridge.core import complaints, sentences
-from drive_can_bridge.core.codes import CODES
+from drive_can_bridge.core.codes import code_of, CODES
+from drive_can_bridge.protocols.cannord.states import InverterState
+from drive_can_bridge.protocols.cia402.states import ServoState
 
 
 def test_the_page_is_current() -> None:
@@ -92,6 +94,16 @@ def test_each_anchor_of_the_page_leads_to_its_row() -> None:
     for anchor in re.findall('<a id="(.*?)">', explain.page()):
         assert [row.code for _, row in explain.rows_of(anchor)][:1] == [
             anchor.removeprefix('file-')], anchor
+
+
+@pytest.mark.parametrize('state', [
+    each for each in (*ServoState, *InverterState) if each.name != 'FAULT'])
+def test_a_state_that_services_answer_with(
+        state: ServoState | InverterState, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', '--json', state.value]) == 0
+    first = json.loads(capsys.readouterr().out.splitlines()[0])
+    assert first['about'] == 'states' and state.value in first['texts']
+    assert 'motor' in first['do'] and code_of(state.value) == ''
 
 
 def test_whom_a_text_is_about(capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,6 +20,7 @@ Bits 14 and 15 choose the parameter set (:func:`parameter_set_bits`).
 
 from enum import Enum
 
+from drive_can_bridge.core import state_names
 from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.parameters import AccessMode, Parameter
 from drive_can_bridge.core.status_bits import CANNORD, STATUS_NAME
@@ -59,16 +60,16 @@ CONTROL_PARAMETER = Parameter(
 class InverterState(Enum):
     """The states of the inverter, by the names that users see."""
 
-    NOT_READY = 'not ready'
-    SWITCH_ON_DISABLED = 'switch-on disabled'
-    READY_TO_SWITCH_ON = 'ready to switch on'
-    SWITCHED_ON = 'switched on'
-    OPERATION_ENABLED = 'operation enabled'
+    NOT_READY = state_names.state_not_ready.texts[1]
+    SWITCH_ON_DISABLED = state_names.state_switch_on_disabled.texts[1]
+    READY_TO_SWITCH_ON = state_names.state_ready_to_switch_on.texts[0]
+    SWITCHED_ON = state_names.state_switched_on.texts[0]
+    OPERATION_ENABLED = state_names.state_operation_enabled.texts[0]
     FAULT = 'fault'
-    FAULT_REACTION = 'fault reaction'
-    QUICK_STOP = 'quick stop'
+    FAULT_REACTION = state_names.state_fault_reaction.texts[1]
+    QUICK_STOP = state_names.state_quick_stop_active.texts[1]
     #: a combination of bits that the table does not have
-    UNKNOWN = 'unknown state'
+    UNKNOWN = state_names.state_unknown.texts[0]
 
 
 #: (mask, value, state), as the manuals print the table

@@ -19,6 +19,7 @@ Beside them bit 8 halts, and bits 4 to 6 mean something else in each mode (:data
 from dataclasses import dataclass
 from enum import Enum
 
+from drive_can_bridge.core import state_names
 from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
 from drive_can_bridge.core.status_bits import CIA402, STATUS_NAME
 
@@ -71,16 +72,16 @@ CONTROL_PARAMETER = Parameter(
 class ServoState(Enum):
     """The states of a drive, by the names that users see."""
 
-    NOT_READY = 'not ready to switch on'
-    SWITCH_ON_DISABLED = 'switch on disabled'
-    READY_TO_SWITCH_ON = 'ready to switch on'
-    SWITCHED_ON = 'switched on'
-    OPERATION_ENABLED = 'operation enabled'
-    QUICK_STOP_ACTIVE = 'quick stop active'
-    FAULT_REACTION = 'fault reaction active'
+    NOT_READY = state_names.state_not_ready.texts[0]
+    SWITCH_ON_DISABLED = state_names.state_switch_on_disabled.texts[0]
+    READY_TO_SWITCH_ON = state_names.state_ready_to_switch_on.texts[0]
+    SWITCHED_ON = state_names.state_switched_on.texts[0]
+    OPERATION_ENABLED = state_names.state_operation_enabled.texts[0]
+    QUICK_STOP_ACTIVE = state_names.state_quick_stop_active.texts[0]
+    FAULT_REACTION = state_names.state_fault_reaction.texts[0]
     FAULT = 'fault'
     #: a combination of bits that the table does not have
-    UNKNOWN = 'unknown state'
+    UNKNOWN = state_names.state_unknown.texts[0]
 
 
 #: state: (mask, value) of the status word
