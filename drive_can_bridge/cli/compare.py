@@ -72,9 +72,8 @@ def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
     bits = mode_bits(drive.facts.restore)
     found = {name: outcome for name, outcome in outcomes.items() if outcome.ok and (
         is_setting(drive, name) or not bits[name].is_over(outcome.raw or 0))}
-    return Side({name: ComparedSetting(outcome.value, outcome.raw) for name,
-                 outcome in found.items()
-                 if outcome.value is not None},
+    return Side({name: ComparedSetting(outcome.value, outcome.raw)
+                 for name, outcome in found.items() if outcome.value is not None},
                 {name: outcome.parameter for name, outcome in found.items()
                  if outcome.parameter is not None})
 

@@ -223,9 +223,8 @@ def _keep_links(stack: ExitStack, directory: Path, configuration: BridgeConfigur
         try:
             lock = HostLock(f'link {place / name}', 'drive_can simulate')
         except Held as held:
-            process = 'another process' if held.process is None else f'process {held.process}'
             raise InUse(command_sentences.link_in_use(
-                link=str(directory / name), process=process)) from None
+                link=str(directory / name), process=held.in_words)) from None
         stack.callback(lock.release)
 
 

@@ -194,6 +194,7 @@ class BridgeSource:
     def __init__(self, way: Way) -> None:
         self._way = way
         self._bridges = way.bridge_of
+        self._periods: dict[str, float] = {}
 
     @property
     def names(self) -> Sequence[str]:
@@ -230,8 +231,11 @@ class BridgeSource:
         return dict(zip(names, values))
 
     def period(self, drive: str) -> float:
-        """Return the s between diagnostic messages of the bridge of a drive."""
-        return float(self._values(self._bridges[drive], [_PERIOD])[_PERIOD] or 1.0)
+        """Return the s between diagnostic messages of the bridge of a drive; asked for once."""
+        bridge = self._bridges[drive]
+        if bridge not in self._periods:
+            self._periods[bridge] = float(self._values(bridge, [_PERIOD])[_PERIOD] or 1.0)
+        return self._periods[bridge]
 
     def facts(self, drive: str) -> DriveFacts:
         """Return what its bridge knows of a drive."""

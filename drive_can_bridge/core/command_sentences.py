@@ -335,6 +335,9 @@ frames_in_a_line = Text('more than one frame in a line', do='correct that line, 
 rest_not_unpacked = Text(
     'the rest cannot be unpacked: {error}',
     do='copy the file again: it is cut or damaged')
+trace_cut = Text(
+    'the rest cannot be read: it is damaged, or cut',
+    do='copy the file again, or record again')
 rest_not_read = Text(
     'the rest cannot be read: {failure}',
     do='copy the file again: it is cut or damaged')

@@ -450,11 +450,7 @@ class BusExchange:
 
     def _pass(self) -> float:
         """Serve every session that is due; return when the next one is."""
-        clock = self._clock
-        now = clock()
-        if now - self._meant_at > LATENESS_MAX:
-            self._late(now)
-        self._last_pass = now
+        now = self._last_pass = self._look_at_clock()
         self.hung = False
         self._meant_at = min(self._meant_at, now)
         if now >= self._tell_at:
@@ -462,14 +458,10 @@ class BusExchange:
         soonest = min(now + PASS_PERIOD, self._tell_at)
         for member in self._members:
             if member.due <= now or member.look_at <= now and self.active:
-                now = clock()   # the drives before took their time
-                if now - self._meant_at > LATENESS_MAX:
-                    self._late(now)
+                now = self._look_at_clock()  # the drives before took their time
                 member.look_at = now + LOOK_PERIOD
                 member.take_commands(now)
-                now = clock()   # and so did these
-                if now - self._meant_at > LATENESS_MAX:
-                    self._late(now)
+                now = self._look_at_clock()  # and so did these
                 member.take(member.session.handle_timer, now)
             if member.anew_at <= now:
                 member.begin_anew(now)
@@ -480,18 +472,20 @@ class BusExchange:
         self._meant_at = max(soonest, now)
         return soonest
 
-    def _late(self, now: float) -> None:
+    def _look_at_clock(self) -> float:
         """
-        See to what a stall has made stale.
+        Return the time, and see to what a stall has made stale.
 
         Not only when a pass begins: a process may be stopped in the midst of one.
         """
+        now = self._clock()
         late = now - self._meant_at
-        if not self._notice_lost_time(now):
+        if late > LATENESS_MAX and not self._notice_lost_time(now):
             self._meant_at = now
             for member in self._members if self.active else ():
                 member.tell(member.listener.discard_commands,
                             sentences.exchange_late(seconds=late))
+        return now
 
     def _tell_again(self, now: float) -> None:
         self._tell_at = now + REQUEST_PERIOD

@@ -134,10 +134,7 @@ class Member:
         Behind a defect, too: a limit is taken all the same, and what waits for all joints of the
         bus is of other drives as well.
         """
-        try:
-            self.listener.take_commands(now)
-        except Exception as error:  # noqa: BLE001  as in tell(), in every pass
-            self.unheard(error)
+        self.tell(self.listener.take_commands, now)
 
     def pump(self) -> None:
         """Send what the session wants sent, and tell its listener what happened."""
@@ -166,7 +163,7 @@ class Member:
                 if not self._transmit(frame, leaving):
                     refused.append(place)
             session.frames_left(self._clock(), refused)
-            frames = session.outbox.frames and session.take_frames()
+            frames = session.take_frames()
 
     def _report(self) -> None:
         """Report to the listener what was sent, and what happened."""

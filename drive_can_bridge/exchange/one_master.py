@@ -74,7 +74,7 @@ class Ownership:
 
 
 def _in_words(held: Held, what: str, advice: str) -> InUse:
-    process = 'another process' if held.process is None else f'process {held.process}'
+    process = held.in_words
     if held.who not in ('', BRIDGE):
         process += f' ({held.who.replace("_", " ").replace("drive can", "drive_can")})'
         advice = bus_sentences.wait_or_end()

@@ -184,8 +184,8 @@ class DriveRecord:
                       for name, (text, at) in self._readings.items()},
             silent=bool(silent))
 
-    def _judge(self, report: StatusReport, now: float, silent: float) -> tuple[str, Level, str,
-                                                                               bool]:
+    def _judge(self, report: StatusReport, now: float, silent: float,
+               ) -> tuple[str, Level, str, bool]:
         """Return state, level, advice, and whether it is online."""
         if silent:
             return UNKNOWN, Level.STALE, sentences.bridge_silent_may_run(), False
@@ -430,8 +430,7 @@ class Model:
     # -- inside -----------------------------------------------------------------------------------
 
     def _reported(self, bridge: _BridgeRecord, reports: list[StatusReport], stamp: float,
-                  now: float,
-                  ) -> None:
+                  now: float) -> None:
         """Take all that one bridge says in one message: what it does not name has gone."""
         bridge.heard(stamp, now)
         buses = {report.name: report for report in reports if not report.is_drive}

@@ -42,6 +42,11 @@ class Held(Exception):
         self.process = process
         self.who = who
 
+    @property
+    def in_words(self) -> str:
+        """Its process, in words."""
+        return 'another process' if self.process is None else f'process {self.process}'
+
 
 class HostLock:
     """

@@ -57,7 +57,6 @@ _LENGTH = 0x0F
 _TENS_OF_MICROSECONDS = 1
 _CLASSICAL_MAX = 8
 
-_CUT = 'the rest cannot be read: it is damaged, or cut'
 
 Complain = Callable[[str], None]
 
@@ -77,7 +76,7 @@ def read_blf(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
     """
     header = file.read(_FILE_HEADER.size)
     if len(header) < _FILE_HEADER.size:
-        complain(_CUT)
+        complain(command_sentences.trace_cut())
         return
     begin, size = _begin(header)
     file.seek(max(size, _FILE_HEADER.size))
@@ -124,7 +123,7 @@ def _objects(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
             waiting = head
             break
     if waiting.strip(b'\0'):
-        complain(_CUT)
+        complain(command_sentences.trace_cut())
 
 
 def _unpack(container: bytes) -> tuple[bytes, bool]:

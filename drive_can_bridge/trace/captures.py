@@ -48,7 +48,6 @@ _SECTION = b'\x0a\x0d\x0d\x0a'
 _ECHO_MAX = 1.0
 #: sent frames that may wait
 _WAITING_MAX = 10_000
-_CUT = 'the rest cannot be read: it is damaged, or cut'
 
 Complain = Callable[[str], None]
 
@@ -87,7 +86,7 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
             # a file is taken, too, whatever scapy's types say
             reader = RawPcapReader(cast('Any', watched))
         except Exception:  # noqa: BLE001  whatever a damaged head makes it raise
-            complain(_CUT)
+            complain(command_sentences.trace_cut())
             return
         interfaces = _Interfaces(reader, watched)
         whole = True
@@ -107,7 +106,7 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
             whole = False
         whole = whole and watched.place == size and not watched.short
         if not (whole and interfaces.ends_well(file)):
-            complain(_CUT)
+            complain(command_sentences.trace_cut())
     if echoes.dropped:
         complain(command_sentences.trace_doubled(count=echoes.dropped))
 

@@ -51,7 +51,6 @@ _ERROR_TYPES = {
     4: (PROTOCOL | BUS_ERROR, b'\0\0\0\x08\0\0\0\0'),
     5: (NO_ACKNOWLEDGEMENT | BUS_ERROR, bytes(8)),
 }
-_CUT = 'the rest cannot be read: it is damaged, or cut'
 
 Complain = Callable[[str], None]
 
@@ -70,7 +69,7 @@ def read_measured(path: Path, complain: Complain, passed: Counter[str]) -> Itera
             command_sentences.asammdf_missing(path=path)) from None
     measured = _opened(opener, path)
     if measured is None:
-        complain(_CUT)
+        complain(command_sentences.trace_cut())
         return
     try:
         yield from _records(measured, complain, passed)
@@ -123,7 +122,7 @@ def _group(measured: Any, number: int, kind: str, begin: float, count: int,
             members = {name.removeprefix(prefix): samples[name]
                        for name in samples.dtype.names or ()}
         except Exception:  # noqa: BLE001  whatever damaged data make it raise
-            complain(_CUT)
+            complain(command_sentences.trace_cut())
             return
         build = _BUILDERS[kind](members)
         for place, time in enumerate(times):

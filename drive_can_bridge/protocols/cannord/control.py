@@ -22,10 +22,10 @@ from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.sentences import bus_not_in_control, quick_stop_active, voltage_disabled
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.protocols.cannord.states import (
-    ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, state_of, STATUS_WORD,
-)
+    ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, state_of)
 
 OUTPUT_ON = 0x0004
 _VOLTAGE_ENABLED = 0x0010
@@ -39,7 +39,7 @@ def control_table(parameter_set: int) -> ControlTable:
     return ControlTable(
         parameter='', disable=READY | chosen, enable=RUN | chosen,
         quick_stop=QUICK_STOP | chosen, reset_fault=ACKNOWLEDGE | chosen,
-        status_parameter=STATUS_WORD,
+        status_parameter=STATUS_NAME,
         ready=StatusPattern(0x007F, 0x0031), enabled=StatusPattern(0x007F, 0x0037),
         fault=StatusPattern(0x0008, 0x0008), running=StatusPattern(OUTPUT_ON, OUTPUT_ON),
         reaction=StatusPattern(0x004F, 0x000F), braking=StatusPattern(0x007F, 0x0017))

@@ -11,13 +11,14 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject, route)
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES)
-from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_WORD
+from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS
 from drive_can_bridge.protocols.family import Claim, Complaint, Family, option, out_of_range, Talk
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
@@ -75,7 +76,7 @@ class Cannord(Family):
     name = 'cannord'
     cyclic = True
     control_built_in = True
-    builtin_names = frozenset((STATUS_WORD,))
+    builtin_names = frozenset((STATUS_NAME,))
     options_type = CannordOptions
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:

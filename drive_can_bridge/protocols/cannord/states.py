@@ -47,11 +47,10 @@ PARAMETER_SETS = 4
 
 #: names of the bits of the status word, as they are published
 STATUS_BITS = CANNORD
-STATUS_WORD = STATUS_NAME
 FAULT_BIT = 0x0008
 
 STATUS_PARAMETER = Parameter(
-    name=STATUS_WORD, access=AccessMode.READ_ONLY, bits=tuple(STATUS_BITS.items()),
+    name=STATUS_NAME, access=AccessMode.READ_ONLY, bits=tuple(STATUS_BITS.items()),
     description='Status word of the inverter')
 CONTROL_PARAMETER = Parameter(
     name='control_word', access=AccessMode.WRITE_ONLY, description='Control word of the inverter')
