@@ -15,18 +15,19 @@ from drive_can_bridge.cli.command import complain, print_json, say
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.found_adapters import ask_libraries, FoundAdapter, of_host
-from drive_can_bridge.transport.known_adapters import NOT_ON_LINUX, Row, ROWS
+from drive_can_bridge.transport.known_adapters import (
+    NOT_ON_LINUX, Row, ROWS, TRIED)
 
 PAGE = Path('docs', 'adapters.md')
 _HEAD = """\
 # CAN adapters: how to write yours, and what it does differently
 
 `drive_can adapters` lists what this computer has, each with its lines for the parameter file; it
-opens nothing. `drive_can validate` knows this table, too. Look for what is printed on the box, or
-for the interface of python-can (4.3 to 4.6).
+opens nothing. Here, look for what is printed on the box, or for the interface of python-can (4.3
+to 4.6).
 
-In the file, what stands in the column *lines* of your row goes between the braces of a bus, and
-the bit rate behind it: `main: {<your row>, bitrate: 500000}`. With the row `slcan`:
+The column *lines* goes between the braces of a bus, and the bit rate behind it. With the row
+`slcan`:
 
 ```yaml
     buses:
@@ -36,23 +37,23 @@ the bit rate behind it: `main: {<your row>, bitrate: 500000}`. With the row `slc
 * **Where the kernel has a driver, take `socketcan`**: several programs share the interface, and
   stamps are the host's.
 * `adapter: NAME` (first column) says which one it is where neither interface nor USB shows it;
-  then `validate` says what it cannot do.
+  then `drive_can validate` says what it cannot do.
 * `/dev/ttyACM0` is numbered as it is plugged; a
   [name that stays](commissioning.md#10-from-now-on-at-boot) is better.
-* An adapter that hands back what it sends is told once in the log; the bridge drops that.
-* The last column is what makes it only listen, for `record`, `decode --live` and
-  `scan --bitrates`; a bridge needs it off. `–`: nothing is known that does; `record` and
-  `decode --live` acknowledge what they hear, as any node does, and `scan --bitrates` is not for
-  that adapter.
+* An adapter that hands back what it sends is logged once; the bridge drops those frames.
+* *known by*: {tried}.
+* *only listens*: the setting that makes it do so, for `record`, `decode --live` and
+  `scan --bitrates`; a bridge needs it off. `–`: none is known; `record` and `decode --live` then
+  acknowledge what they hear, as any node does, and `scan --bitrates` is not for that adapter.
 
 """
-_COLUMNS = ('name', 'adapter', 'lines', 'does differently', 'what helps', 'how this is known',
+_COLUMNS = ('name', 'adapter', 'lines', 'does differently', 'what helps', 'known by',
             'only listens')
 _PARTS = {'socketcan': 'Of the kernel', 'slcan': 'Serial, with SLCAN commands',
           'seeedstudio': 'Serial, with packets', 'socketcand': 'Over the network, and without '
           'hardware', 'gs_usb': 'USB, past the kernel', 'pcan': "By the makers' libraries"}
 _TAIL = """
-Without a row, because nobody on Linux can have them: {none}.
+Without a row, because they do not exist on Linux: {none}.
 
 ## Late answers
 
@@ -118,7 +119,8 @@ def _document(found: FoundAdapter) -> dict[str, object]:
 
 def page() -> str:
     """Return the text of the page."""
-    lines = [_HEAD.rstrip()]
+    tried = ';\n  '.join(f'**{letter}** {words}' for letter, words in TRIED.items())
+    lines = [_HEAD.rstrip().replace('{tried}', tried)]
     for row in ROWS:
         part = _PARTS.get(row.interface)
         if part is not None and row.interface == row.name:

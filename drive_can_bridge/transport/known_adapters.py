@@ -13,11 +13,13 @@ from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.transport.bus_identity import device_of
 from drive_can_bridge.transport.usb_serial import latency_timer, port_name, usb_device
 
-#: how a row was tried
-REAL = 'real drivers and daemons in CI'
-BYTES = "python-can's code, 4.3.1 and 4.6.1, over bytes in tests"
-PARSER = f'{BYTES}, against the parser of the firmware'
-SOURCE = "by the source of python-can 4.3.1 and 4.6.1; never with its maker's library"
+#: how a row was tried, in the letters of :data:`TRIED`
+REAL, BYTES, PARSER, SOURCE = 'R', 'B', 'F', 'S'
+TRIED = {
+    REAL: 'real drivers and daemons in CI',
+    BYTES: "python-can's code, 4.3.1 and 4.6.1, over bytes in tests",
+    PARSER: 'the same, against the parser of the firmware',
+    SOURCE: "by the source of python-can 4.3.1 and 4.6.1, never with its maker's library"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class Row:
     :param options: further keys of the example.
     :param differs: what it does otherwise, in words.
     :param cure: which setting helps.
-    :param tried: how this is known.
+    :param tried: how this is known: a letter of :data:`TRIED`, or words.
     :param usb: how the USB device begins to name itself: number, then product.
     :param uart: a real serial line is behind the port, whose speed counts.
     :param line_bits: bits on that line for each bit on the bus.
@@ -123,7 +125,7 @@ ROWS: tuple[Row, ...] = (
         usb=('0403:ffa8',), latency=0.016, listen_only='listen_only: true'),
     Row('vscom', 'VSCOM USB-CAN Plus', 'slcan', '/dev/ttyUSB0',
         'FTDI chip: received bytes wait up to 16 ms; echoes what it sends in some of its modes',
-        'latency timer to 1 ms, as for LAWICEL; echo off in its set-up', 'not at all',
+        'latency timer to 1 ms, as for LAWICEL; echo off in its set-up', 'untested',
         usb=('0403:6015 USB-CAN',), latency=0.016, listen_only='listen_only: true'),
     Row('esp32_slcan', 'ESP32-SLCAN', 'slcan', '/dev/ttyUSB0@500000',
         'says yes, and never sends: identifier 0 (NMT), frames without data (SYNC), 29-bit '
@@ -157,7 +159,7 @@ ROWS: tuple[Row, ...] = (
         uart=True, line_bits=1.3, module='pyserial'),
     Row('bluetooth', 'serial ports over Bluetooth', 'slcan', '/dev/rfcomm0',
         'answers come in bursts, tens of ms late', 'a cable; else a `period` of 0.1 and more',
-        'not at all', latency=0.05),
+        'untested', latency=0.05),
     # -- the network
     Row('socketcand', 'socketcand: a CAN interface of another computer', 'socketcand', 'can0',
         'stamps of the other computer; no more of an error than its class; a gateway that ends is '
