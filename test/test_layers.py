@@ -39,7 +39,7 @@ INTERNAL: dict[str, set[str]] = {
         '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'trace', 'transport',
         'exchange', 'memory', 'process', 'ros.client', 'ros.messages', 'ros.rcl',
         'ros.recognition'},
-    'monitor': {'', 'core'},
+    'monitor': {'', 'core', 'protocols'},
     'view': {'', 'clock', 'core', 'monitor'},
     # what it asks of drives comes from whoever starts it: it knows no ROS
     'panel': {'', 'clock', 'core', 'monitor'},

@@ -132,10 +132,10 @@ UNDECIDED = 'undecided'
 def define(parser: ArgumentParser) -> None:
     """Define the words and options of the subcommand."""
     parser.description = (
-        'Find out by harmless reads what the manuals leave open: value_order and '
-        'index_byte (cannord), layout, word_order and abort_code_order (canopen_pkw), '
-        'parameter_offset and maps (DataModel). Sends reads only. Listens for 1.2 s '
-        'before, and ends when another master talks to a drive of the file.')
+        'Find out by harmless reads what the manuals leave open: ' + '; '.join(
+            f'{name}: {", ".join(family.probed)}' for name, family in FAMILIES.items()
+            if family.probed) + '. Sends reads only. Listens for 1.2 s before, and ends when '
+        'another master talks to a drive of the file.')
     parser.epilog = (
         'Exit code 0: the drive answered, whether or not everything could be decided. 1: '
         'it did not, or there is another master, or the bus cannot be used. 2: wrong '

@@ -33,8 +33,8 @@ from drive_can_bridge.core.frame import bits_on_bus, Frame, STUFFING
 from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.text import column_lines
 from drive_can_bridge.exchange.one_master import END_FIRST, Ownership
-from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.families import FAMILIES
+from drive_can_bridge.protocols.family import ScanEntry
 from drive_can_bridge.protocols.scanner import Certainty, Scanner, Sighting
 from drive_can_bridge.transport import adapters
 from drive_can_bridge.transport.adapters import adapter_keywords, check_channel, check_interface
@@ -155,25 +155,19 @@ class Survey:
             scanner.hear(frame, now)
 
 
-#: shipped tables for families of one maker, and an exchange that all their drives know
-_KNOWN = {
-    'cannord': ('inverter', 'nord_sk500e', ['frequency_setpoint'], ['actual_frequency']),
-    'canopen_pkw': ('starter', 'tesys_t_ltmr', [], ['system_status_1']),
-    'cia402': ('axis', 'cia402_servo', ['target_velocity'], ['actual_velocity']),
-}
 _HEAD = """\
 # Found by drive_can scan. Look it over before a bridge runs with it: profiles are the shipped ones
 # where there is one, and otherwise tables of raw numbers beside this file, without units.
 """
-#: families without a known table -> what their drives are called
-_UNKNOWN = {'datamodel_extended': 'drive', 'datamodel_standard': 'drive_std'}
-#: families whose stations are Node-IDs
-_ON_CANOPEN = ('cia402', 'canopen_pkw')
+#: what scanners say that is no drive key
+_NO_KEYS = {'request_numbers', 'response_numbers', 'remarks'}
 
 
 def tables_beside(path: Path) -> list[Path]:
     """Return the tables there are that a parameter file of this name may be written with."""
-    table = re.compile(rf'{re.escape(path.stem)}_(?:{"|".join(_UNKNOWN.values())})_[0-9]+\.yaml')
+    kinds = '|'.join(family.scan_entry.kind for family in FAMILIES.values()
+                     if not family.scan_entry.profile)
+    table = re.compile(rf'{re.escape(path.stem)}_(?:{kinds})_[0-9]+\.yaml')
     return sorted(each for each in path.parent.glob('*.yaml') if table.fullmatch(each.name))
 
 
@@ -194,8 +188,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     written = [path]
     # so slow that all of them fit the bus: an exchange has at most 320 bits
     period = max(0.05, 0.01 * len(sightings), math.ceil(1e6 * len(sightings) / bus.bitrate) / 1e3)
-    taken = {each.station for each in sightings if each.protocol in _ON_CANOPEN} | {*nodes}
-    bridge_node = max(set(range(1, NODE_MAX + 1)) - taken, default=NODE_MAX)
+    taken = _canopen_stations(sightings) | {*nodes}
     head = [_HEAD, '/**/drive_can_bridge:', '  ros__parameters:', '    buses:', '      main:',
             f'        interface: {bus.interface}', f'        channel: {json.dumps(bus.channel)}',
             f'        bitrate: {bus.bitrate}',
@@ -204,27 +197,22 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     drives: dict[str, list[str]] = {}
     for sighting, keys in sorted(      # the surest first
             zip(sightings, settings), key=lambda each: each[0].certainty is Certainty.LIKELY):
-        if sighting.protocol in _KNOWN:
-            kind, profile, request, response = _KNOWN[sighting.protocol]
-        else:
-            kind = _UNKNOWN[sighting.protocol]
-            table = path.with_name(f'{path.stem}_{kind}_{sighting.station}.yaml').absolute()
-            request = [f'parameter_{number}' for number in keys['request_numbers']]
-            response = [f'parameter_{number}' for number in keys['response_numbers']]
-            _write_table(table, sighting, keys)
+        family = FAMILIES[sighting.protocol]
+        name = f'{family.scan_entry.kind}_{sighting.station}'
+        entry = family.scan_entry
+        if not entry.profile:
+            table = path.with_name(f'{path.stem}_{name}.yaml').absolute()
+            entry = _write_table(table, sighting, keys)
             written.append(table)
-            profile = str(table)
-        name = f'{kind}_{sighting.station}'
         drives[name] = lines = [f'      # {remark}' for remark in keys.get('remarks', ())]
         lines += [f'      {name}:   # {sighting.text}', '        bus: main',
                   f'        protocol: {sighting.protocol}',
                   f'        station: {sighting.station}',
-                  f'        profile: {json.dumps(profile)}',
-                  f'        period: {period:g}', f'        cyclic_request: [{", ".join(request)}]',
-                  f'        cyclic_response: [{", ".join(response)}]']
-        lines += [f'        mode: {keys["mode"]}'] if 'mode' in keys else []
-        if sighting.protocol == 'cia402' and bridge_node != NODE_MAX:
-            lines.append(f'        bridge_node: {bridge_node}')
+                  f'        profile: {json.dumps(entry.profile)}', f'        period: {period:g}',
+                  f'        cyclic_request: [{", ".join(entry.request)}]',
+                  f'        cyclic_response: [{", ".join(entry.response)}]']
+        lines += [f'        {key}: {value}' for key, value in (
+            *keys.items(), *family.scan_keys(taken).items()) if key not in _NO_KEYS]
     _write(path, [*head, *chain.from_iterable(drives.values())])
     collisions = _collisions(path)
     for name, why in collisions.items():
@@ -248,16 +236,24 @@ def _collisions(path: Path) -> dict[str, str]:
     return {}
 
 
-def _write_table(path: Path, sighting: Sighting, keys: dict[str, Any]) -> None:
+def _canopen_stations(sightings: Sequence[Sighting]) -> set[int]:
+    return {each.station for each in sightings if FAMILIES[each.protocol].on_canopen}
+
+
+def _write_table(path: Path, sighting: Sighting, keys: dict[str, Any]) -> ScanEntry:
+    """Write a table of the numbers that are exchanged; return how a drive uses it."""
+    request, response = (keys.get(f'{each}_numbers', ()) for each in ('request', 'response'))
     lines = [f'description: Raw parameters of station {sighting.station}, found by a scan',
              f'protocols: [{sighting.protocol}]', 'parameters:']
-    entries = dict.fromkeys(keys['response_numbers'], 'access: ro')
-    entries.update(dict.fromkeys(keys['request_numbers'], 'access: rw, storage: ram'))
+    entries = dict.fromkeys(response, 'access: ro')
+    entries.update(dict.fromkeys(request, 'access: rw, storage: ram'))
     lines += [f'  parameter_{number}: {{number: {number}, type: uint16, {entry}}}'
               for number, entry in sorted(entries.items())]
     if not entries:
         lines[-1] = 'parameters: {}'
     _write(path, lines)
+    return ScanEntry(profile=str(path), request=tuple(f'parameter_{each}' for each in request),
+                     response=tuple(f'parameter_{each}' for each in response))
 
 
 def _write(path: Path, lines: Sequence[str]) -> None:
@@ -441,7 +437,7 @@ def _show(args: Namespace, survey: Survey) -> None:
                       'certainty': each.certainty.value, 'text': each.text}
                      for each in sightings))
         return
-    drives = {each.station for each in sightings if each.protocol in ('canopen_pkw', 'cia402')}
+    drives = _canopen_stations(sightings)
     rows = [(each.protocol, str(each.station), each.certainty.value, each.text)
             for each in sightings]
     rows += [('CANopen node', str(node), '–', text)

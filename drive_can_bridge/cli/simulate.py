@@ -12,7 +12,6 @@ from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
-import re
 import select
 import signal
 import sys
@@ -26,12 +25,12 @@ from drive_can_bridge.core.configuration import BridgeConfiguration, BusConfigur
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, ValueRefused
 from drive_can_bridge.exchange.one_master import END_FIRST, InUse, Ownership
 from drive_can_bridge.process.locks import Held, HostLock
-from drive_can_bridge.protocols.cia402.states import CONTROL_WORD, STATUS_WORD
-from drive_can_bridge.simulation.cia402 import SimulatedServoDrive
+from drive_can_bridge.simulation.cia402 import object_text, parse_objects, SimulatedServoDrive
 from drive_can_bridge.simulation.cia402_plant import Habits
 from drive_can_bridge.simulation.faults import Fault, parse_fault, usage_lines
 from drive_can_bridge.simulation.registers import Mechanics
-from drive_can_bridge.simulation.simulation import PlayedDrive, Say, ShowFrame, Simulation
+from drive_can_bridge.simulation.simulation import (
+    PlayedDrive, Say, ShowFrame, SIMULATED_DRIVES, Simulation)
 from drive_can_bridge.simulation.terminal import SlcanTerminal
 from drive_can_bridge.transport.adapters import check_interface
 
@@ -39,8 +38,9 @@ _CHUNK = 4096
 _LINE_MAX = 1000
 #: s between two looks at the threads
 _LOOK_PERIOD = 0.5
-CIA402 = 'cia402'
-_OBJECT = re.compile('([0-9A-Fa-f]{4})h?(?:[.]([0-9A-Fa-f]{1,2})h?)?')
+#: families whose drives may lack objects, and have habits
+_SERVOS = [name for name, kind in SIMULATED_DRIVES.items()
+           if issubclass(kind, SimulatedServoDrive)]
 
 
 class Console:
@@ -167,10 +167,10 @@ def define(parser: argparse.ArgumentParser) -> None:
                         help='what the motor of a drive carries, for example '
                              'lift:load=0.3,noise=1,brake=0; repeatable')
     parser.add_argument('--without', metavar='DRIVE=OBJECT,…', action='append', default=[],
-                        help='objects that a cia402 drive does not have, for example '
+                        help=f'objects that a {_SERVOS[0]} drive does not have, for example '
                              'servo=6007h,1800h.05h; repeatable')
     parser.add_argument('--habit', metavar='DRIVE:KEY=VALUE,…', action='append', default=[],
-                        help='what differs between makers of cia402 drives, for example '
+                        help=f'what differs between makers of {_SERVOS[0]} drives, for example '
                              'servo:mapping=operational,start=0.3 (docs/simulation.md); '
                              'repeatable')
     parser.add_argument('--log-frames', metavar='FILE', type=Path, nargs='?', const=Path('-'),
@@ -293,7 +293,7 @@ class Servos:
             servo = _servo(simulation, name)
             for index, subindex in sorted(places, key=str):
                 if not servo.has(index, subindex):
-                    _complain(f'--without: {name} has no {_object_text(index, subindex)} anyway')
+                    _complain(f'--without: {name} has no {object_text(index, subindex)} anyway')
             servo.take_away(places)
 
 
@@ -305,38 +305,17 @@ def _servos(configuration: BridgeConfiguration, without: list[str], habit: list[
     """
     taken: dict[str, frozenset[tuple[int, int | None]]] = {}
     for text in without:
-        name, places = of_drive('--without', text, configuration, _objects, '=')
+        name, places = of_drive('--without', text, configuration, parse_objects, '=')
         taken[name] = taken.get(name, frozenset()) | places
     habits = dict(of_drive('--habit', text, configuration, Habits.parse) for text in habit)
     for option, names in (('--without', taken), ('--habit', habits)):
         for name in names:
             protocol = configuration.drives[name].protocol
-            if protocol != CIA402:
+            if protocol not in _SERVOS:
                 raise WrongUsage(command_sentences.option_of_other_family(
-                    option=option, name=name, protocol=protocol, allowed=CIA402))
+                    option=option, name=name, protocol=protocol,
+                    allowed=', '.join(_SERVOS)))
     return Servos(taken, habits)
-
-
-def _objects(text: str) -> frozenset[tuple[int, int | None]]:
-    """
-    Read ``6007h,1800h.05h``; a sub-index that is left out is all of the index.
-
-    :raises ValueRefused: it is no list of objects, or one without which no drive can be played.
-    """
-    found: set[tuple[int, int | None]] = set()
-    for part in text.split(','):
-        match = _OBJECT.fullmatch(part.strip())
-        if match is None:
-            raise ValueRefused(command_sentences.no_object_written(part=part.strip()))
-        index, subindex = int(match[1], 16), int(match[2], 16) if match[2] else None
-        if index in (CONTROL_WORD, STATUS_WORD):
-            raise ValueRefused(command_sentences.no_drive_without(index=index))
-        found.add((index, subindex))
-    return frozenset(found)
-
-
-def _object_text(index: int, subindex: int | None) -> str:
-    return f'{index:04X}h' + ('' if subindex is None else f'.{subindex:02X}h')
 
 
 def _servo(simulation: Simulation, name: str) -> SimulatedServoDrive:

@@ -23,6 +23,7 @@ from drive_can_bridge.core.parameters import (
 from drive_can_bridge.core.profile import (
     ControlTable, FaultTable, Profile, RestoreStep, RestoreTable, StatusPattern)
 from drive_can_bridge.core.text import show
+from drive_can_bridge.protocols.families import FAMILIES
 
 #: names that a drive's node uses itself
 RESERVED = frozenset((
@@ -352,7 +353,8 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
         check_fault(tree, parameters, names)
         if tree.is_sound(('fault',)) and tree.data['fault']['parameter'] in parameters:
             fault = fault_table(tree.data['fault'], parameters)
-            built_in = {'cannord', 'cia402'} & {*tree.data.get('protocols', ())}
+            built_in = any(FAMILIES[name].control_built_in
+                           for name in tree.data.get('protocols', ()) if name in FAMILIES)
             if control is None and fault.bit is None and not built_in and not (
                     tree.is_damaged(('control',))):
                 tree.suspicious(('fault',), complaints.fault_without_bit())

@@ -30,7 +30,6 @@ from drive_can_bridge.core.complaints import hint, suggestion
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import uncoded
 from drive_can_bridge.core.text import describe_type, value_text
-from drive_can_bridge.protocols.cia402.states import MODES
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Family
 
@@ -183,8 +182,9 @@ def _message(error: ValidationError) -> Sentence:
     return complaints.wrong(value=value, allowed=allowed(schema))
 
 
-#: what 6060h calls the modes
-_NUMBERED = {mode.number: name for name, mode in MODES.items()}
+#: what drives call the modes
+_NUMBERED = {number: name for family in FAMILIES.values() if family.mode_key
+             for number, name in family.mode_key.names.items()}
 _NUMBER = re.compile(r'([0-9]+(?:\.[0-9]+)?) *([A-Za-z/]*)')
 _FACTORS = {'': 1.0, 's': 1.0, 'ms': 1e-3, 'us': 1e-6, 'bit/s': 1.0, **{
     f'{letter}{unit}': factor for letter, factor in (('k', 1e3), ('m', 1e6))

@@ -26,7 +26,7 @@ from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.profiles.names import name_of, unique
 from drive_can_bridge.profiles.yaml_text import block, comment, entry_lines, one_line, scalar
 from drive_can_bridge.protocols.families import FAMILIES
-from drive_can_bridge.protocols.family import Complaint, Family
+from drive_can_bridge.protocols.family import Complaint, Family, ModeKey
 from drive_can_bridge.resources import profiles_directory
 
 #: how an entry's key ``verified`` is shown
@@ -37,8 +37,6 @@ _DESCRIBED = (
     'address', 'number', 'index', 'subindex', 'type', 'scale', 'offset', 'unit', 'access',
     'storage', 'minimum', 'maximum', 'neutral', 'neutral_from', 'limit', 'arming_tolerance',
     'bits', 'values', 'word_order', 'protected', 'description', 'source', 'verified', 'open')
-#: a key of a family that changes what it needs of an entry: any value will do
-_CHOICES = {'canopen_pkw': ('addressing', ('register', 'canopen'))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +143,9 @@ def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
     :return: keys are paths in the profile, ``parameters.speed.type``.
     """
     family = FAMILIES[protocol]
-    key, values = _CHOICES.get(protocol, ('', ()))
     found = [list(_complaints(replace(profile, protocols=(protocol,)), family,
                               family.make_options(1, given)))
-             for given in [{key: value} for value in values] or [{}]]
+             for given in family.import_rules.choices]
     return min(found, key=len)
 
 
@@ -178,9 +175,6 @@ _NEEDED = ('index', 'subindex', 'number', 'type', 'access')
 _TOGETHER = {'neutral_from': ('arming_tolerance',), 'arming_tolerance': ('neutral_from',)}
 #: characters of an entry without its description, at least
 _SHORTEST = 60
-#: names of the standard's setpoints
-_SETPOINTS = ('target_position', 'interpolation_target', 'target_velocity', 'target_torque',
-              'vl_target_velocity')
 
 
 class ImportFailed(DriveCanError):
@@ -418,16 +412,16 @@ def _sections(named: dict[str, Draft], found: FileContent, protocols: Sequence[s
         section = problem.key.partition('.')[0]
         if sections.pop(section, None) is not None:
             notes.append(f'section {section} left out: {problem.key}: {problem.message}')
-    if tuple(protocols) == ('cia402',):
-        notes += _modes(loaded.profile)
+    family = FAMILIES[protocols[0]] if len(protocols) == 1 else None
+    if family is not None and family.mode_key is not None:
+        notes += _modes(loaded.profile, family, family.mode_key)
     return sections, notes
 
 
-def _modes(profile: Profile) -> Iterator[str]:
-    """Say in which modes ``validate`` takes the profile, and why not in the others."""
-    family = FAMILIES['cia402']
+def _modes(profile: Profile, family: Family, key: ModeKey) -> Iterator[str]:
+    """Yield in which modes ``validate`` takes the profile, and why not in the others."""
     setpoints = [parameter for parameter in profile.parameters.values()
-                 if parameter.name in _SETPOINTS]
+                 if parameter.name in key.setpoints]
     if not setpoints:
         yield 'validate takes it in no mode: it has no setpoint of any'
         return
@@ -466,9 +460,11 @@ def _carriers(named: dict[str, Draft], profile: Profile, said: tuple[str, ...],
                for protocol in said or FAMILIES}
     missed = {protocol: len(each) for protocol, each in reasons.items()}
     if not said:    # those that can carry everything; else the one that can carry most
-        # registers have no elements: all of an array would be one and the same
-        missed['canopen_pkw'] += sum('subindex' in draft.entry and 'index' not in draft.entry
-                                     for draft in named.values())
+        # where numbers have no elements, all of an array would be one and the same
+        of_arrays = sum('subindex' in draft.entry and 'index' not in draft.entry
+                        for draft in named.values())
+        missed = {protocol: count + of_arrays * (not FAMILIES[protocol].import_rules.elements)
+                  for protocol, count in missed.items()}
         fewest = min(missed.values())
         said = tuple(protocol for protocol, count in missed.items() if count == fewest)
         said = said[:1] if fewest else said
@@ -485,9 +481,9 @@ def _text(named: dict[str, Draft], found: FileContent, sections: dict[str, Any],
                     f'{len(found.drafts) + len(found.left_out)} entries, sorted by address. '
                     'Compare what you use with the manual: the file may be wrong, and so may '
                     'what was made of it.')
-    if 'canopen_pkw' in protocols and all('number' not in draft.entry for draft in named.values()):
-        lines += comment('The entries are CANopen objects: a drive of canopen_pkw that uses them '
-                         'needs "addressing: canopen".')
+    for protocol in protocols:
+        remark = FAMILIES[protocol].profile_remark([draft.entry for draft in named.values()])
+        lines += comment(remark) if remark else []
     words = one_line(description or found.description) or f'Parameters from {source}'
     lines += ['', f'description: {scalar(words)}']
     if guessed and len(protocols) > 1:

@@ -23,6 +23,7 @@ from drive_can_bridge.profiles.numbers import (
     Unusable)
 from drive_can_bridge.profiles.units import known_unit, split_unit, unit
 from drive_can_bridge.profiles.yaml_text import one_line
+from drive_can_bridge.protocols.families import FAMILIES
 
 #: ends the search for headings
 _HEAD_ROWS = 60
@@ -315,14 +316,14 @@ def read_table(text: str, given: Mapping[str, str], sign: str = '',
 
     :param given: columns by heading or place, as for :class:`CsvTable`.
     :param sign: the decimal sign, where somebody says it.
-    :param protocols: that the drive speaks; 8-bit types exist for cia402 only.
+    :param protocols: that the drive speaks; where all have 8-bit types, those stay.
     :raises ImportFailed: it is no table of parameters.
     :raises WrongColumns: a given column is not there.
     """
     table = CsvTable(_read_rows(text), given)
     reader = _RowReader(table, sign or decimal_sign(
         table.cell(row, column) for row in table.rows for column in _NUMERIC),
-        bytes_stay=tuple(protocols) == ('cia402',))
+        bytes_stay=bool(protocols) and all(8 in FAMILIES[name].widths for name in protocols))
     found = FileContent(notes=table.notes())
     sections = []
     for row in table.rows:

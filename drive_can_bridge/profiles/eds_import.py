@@ -7,8 +7,8 @@ knows no lines, folds limits that its type cannot hold, and believes what heads 
 it gets each object in the one notation that it reads well, and limits, access and what is a record
 are read here: a broken section costs that entry and no other, an odd key costs no entry at all.
 
-Standard objects of CiA 402 have names, bits, values and units of the shipped profile
-``cia402_servo``; units that are every maker's own are taken from the file, else raw.
+Standard objects of CiA 402 have names, bits, values and units of the shipped profile of its
+family; units that are every maker's own are taken from the file, else raw.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,6 +29,7 @@ from drive_can_bridge.profiles.csv_import import access_of
 from drive_can_bridge.profiles.numbers import rounded, split_step, Unusable
 from drive_can_bridge.profiles.units import unit
 from drive_can_bridge.profiles.yaml_text import one_line
+from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.resources import command_that_brings, profiles_directory
 
 _HEADING = re.compile(r'\[([^\[\]]*)\]\s*(?:;.*)?')
@@ -55,11 +56,12 @@ _DRIVES, _NO_PROFILE = 402, 0
 _DEVICES = {401: 'inputs and outputs', 404: 'measuring devices', 405: 'programmable controllers',
             406: 'encoders', 408: 'hydraulics', 410: 'inclinometers', 418: 'batteries',
             419: 'battery chargers'}
-#: CiA 402: control word and status word, which are built in
-_BUILT_IN = (0x6040, 0x6041)
-#: profile of the objects that CiA 402 knows; entries of it that are not verified have units of
-#: every maker's own, and are placeholders there
-_STANDARD = 'cia402_servo'
+#: families whose drives have EDS files; the first: those that are known by most objects
+_BY_OBJECTS = sorted((family for family in FAMILIES.values()
+                      if family.import_rules.eds_objects is not None),
+                     key=lambda family: -len(family.import_rules.eds_objects or ()))
+#: control word and status word of the first axis, which are built in
+_BUILT_IN = _BY_OBJECTS[0].import_rules.eds_objects or ()
 #: what those entries have in common with the one that they stand for
 _MEANING = ('bits', 'values', 'neutral', 'neutral_from', 'limit', 'protected')
 #: numerators and denominators of 60A8h and 60A9h (bits 23 to 8; above them a power of ten) in the
@@ -164,8 +166,8 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     """
     Read what an EDS or DCF file offers.
 
-    :param protocols: that the drive speaks; none: cia402 where the file has its control word and
-        status word, else canopen_pkw.
+    :param protocols: that the drive speaks; none: the one whose objects the file has, of the first
+        axis that it has.
     :param axis: whose objects are taken, counted from 1; None: the first.
     :param force: take a file of a device that is no drive.
     :raises ImportFailed: it is none, or none of a drive, or the library is missing.
@@ -180,10 +182,12 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
     shift = _choose_axis(sections, found, axis)
     if shift is None and not force:
         _refuse_others(sections)
-    controlled = {f'{index + (shift or 0):04x}' for index in _BUILT_IN} <= sections.keys()
-    found.protocols = ('cia402' if controlled else 'canopen_pkw',)
-    standard = (tuple(protocols) or found.protocols) == ('cia402',)
-    _ObjectReader(library, sections, found, bytes_stay=standard).read()
+    found.protocols = (next(family.name for family in _BY_OBJECTS if {
+        f'{index + (shift or 0):04x}' for index in family.import_rules.eds_objects or ()
+    } <= sections.keys()),)
+    spoken = protocols or found.protocols
+    standard = FAMILIES[spoken[0]].import_rules.eds_profile if len(spoken) == 1 else ''
+    _ObjectReader(library, sections, found, bytes_stay=bool(standard)).read()
     for name in ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects'):
         for key, value in sections.get(name, _NONE).values.items():
             listed = re.fullmatch('0x([0-9a-f]{1,4})', value.lower())
@@ -191,7 +195,7 @@ def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = Non
                 found.left_out.append(sections[name].lost(
                     command_sentences.section_missing(section=int(listed[1], 16))))
     if standard:
-        _standardise(found, sections, shift or 0)
+        _standardise(found, sections, shift or 0, standard)
     else:
         for draft in found.drafts:
             _take_step(draft)
@@ -223,8 +227,8 @@ def _choose_axis(sections: Mapping[str, EdsSection], found: FileContent,
     if axis > 1:
         found.notes.append(
             f'axis {axis}: a bridge sends the control word of the first axis, 6040h, so that '
-            'validate takes this profile in no mode; with --protocols canopen_pkw its objects '
-            'are parameters')
+            f'validate takes this profile in no mode; with --protocols {_BY_OBJECTS[-1].name} its '
+            'objects are parameters')
     return len(_AXIS) * (axis - 1)
 
 
@@ -659,13 +663,16 @@ def _si_unit(section: EdsSection) -> tuple[str, float] | None:
     return (name, count * 10.0 ** exponent) if name and exponent in _EXPONENTS else None
 
 
-def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: int) -> None:
+def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: int,
+                 profile: str) -> None:
     """
     Call standard objects by their names, and say what is known of them.
 
     :param shift: how far the objects of the axis are from those of the first one.
+    :param profile: that knows them; entries of it that are not verified have units of every
+        maker's own, and are placeholders there.
     """
-    shipped = check(profiles_directory() / f'{_STANDARD}.yaml')
+    shipped = check(profiles_directory() / f'{profile}.yaml')
     units = {name: _si_unit(sections.get(f'{int(name, 16) + shift:04x}', _NONE))
              for name in ('60a8', '60a9')}
     turning = _turning(sections, shift)
@@ -680,7 +687,7 @@ def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: 
     standard = [draft.name for draft in raw if draft.name]
     others = sum(not draft.name and draft.entry['index'] not in _COMMUNICATION for draft in raw)
     found.notes.append(f'CiA 402: {len(names - {""})} standard objects have the names of the '
-                       f'profile {_STANDARD}; control word and status word are built in')
+                       f'profile {profile}; control word and status word are built in')
     if standard:
         found.notes.append(f'raw, because their unit is the maker\'s own: {", ".join(standard)}; '
                            'scale and unit stand in the manual')

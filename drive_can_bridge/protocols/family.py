@@ -10,7 +10,7 @@ limits and meaning of a key. JSON Schema and the parameters of the node are made
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, Field, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -130,6 +130,53 @@ class Claim(NamedTuple):
                 and self.route.extended == other.route.extended)
 
 
+@dataclass(frozen=True, slots=True)
+class ScanEntry:
+    """
+    What ``scan -o`` writes for a drive of the family.
+
+    :param kind: what it is called, in front of its station.
+    :param profile: a shipped one; '': a table of raw numbers, beside the file.
+    :param request: in ``cyclic_request`` and, ``response``, in ``cyclic_response``: what all
+        drives of the family know.
+    """
+
+    kind: str = 'drive'
+    profile: str = ''
+    request: tuple[str, ...] = ()
+    response: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ImportRules:
+    """
+    What ``profile import`` and ``profile check`` know of the family.
+
+    :param choices: options that change which entries it can carry: one of them has to do.
+    :param elements: parameters with a ``number`` may have a ``subindex``.
+    :param eds_objects: what an EDS file has if it is of such a drive, and of no other; None: its
+        drives have no EDS files.
+    :param eds_profile: the shipped profile that says what those objects mean; '': none does.
+    """
+
+    choices: tuple[Mapping[str, Any], ...] = ({},)
+    elements: bool = True
+    eds_objects: tuple[int, ...] | None = None
+    eds_profile: str = ''
+
+
+class ModeKey(NamedTuple):
+    """
+    The drive key ``mode``.
+
+    :param names: its values, by the numbers that drives have for them.
+    :param setpoints: names of the setpoints of all modes in profiles.
+    """
+
+    names: Mapping[int, str]
+    setpoints: tuple[str, ...]
+
+
 class Talk(NamedTuple):
     """What makes those who talk to the drives of a family, or listen to them."""
 
@@ -150,12 +197,22 @@ class Family(ABC):
     control_built_in: bool = False
     #: names of what is built in and published like the parameters of a profile
     builtin_names: frozenset[str] = frozenset()
+    #: numbers of the bits of a status word that is built in, by name
+    status_bits: Mapping[str, int] = MappingProxyType({})
     #: bits of the types that its parameters may have
     widths: frozenset[int] = frozenset((16, 32))
     #: the keys that only this family has: a frozen dataclass
     options_type: type[Any] = FamilyOptions
     #: keys that all families have, but whose default is another one here
     drive_defaults: Mapping[str, Any] = MappingProxyType({})
+    #: None: there is no such key
+    mode_key: ModeKey | None = None
+    #: its drives are CANopen nodes, their stations Node-IDs
+    on_canopen: bool = False
+    #: keys that ``probe`` settles
+    probed: tuple[str, ...] = ()
+    scan_entry: ScanEntry = ScanEntry()
+    import_rules: ImportRules = ImportRules()
 
     @cached_property
     def options_schema(self) -> dict[str, Any]:
@@ -271,6 +328,18 @@ class Family(ABC):
         if control is None or control.enabled is None or not status:
             return None
         return status, control.enabled.matches
+
+    def scan_keys(self, taken: Collection[int]) -> dict[str, Any]:
+        """
+        Return further drive keys for the file of a scan.
+
+        :param taken: Node-IDs on the bus.
+        """
+        return {}
+
+    def profile_remark(self, entries: Iterable[Mapping[str, Any]]) -> str:
+        """Return which keys drives need that have a profile of these entries; '' for none."""
+        return ''
 
     # -- who talks and listens --------------------------------------------------------------------
 

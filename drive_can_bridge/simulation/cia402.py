@@ -11,8 +11,10 @@ missing does what 6007h says.
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
+import re
 
-from drive_can_bridge.core.errors import ConfigurationError
+from drive_can_bridge.core import command_sentences
+from drive_can_bridge.core.errors import ConfigurationError, ValueRefused
 from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.protocols.canopen import network, sdo
@@ -35,6 +37,29 @@ CONSUMERS = 2
 NOT_STORED = 0x08000020
 #: bits of the error register by the first digit of a code: CiA 301
 _REGISTER_BITS = {1: 0x01, 2: 0x02, 3: 0x04, 4: 0x08, 8: 0x10}
+_OBJECT = re.compile('([0-9A-Fa-f]{4})h?(?:[.]([0-9A-Fa-f]{1,2})h?)?')
+
+
+def parse_objects(text: str) -> frozenset[tuple[int, int | None]]:
+    """
+    Read ``6007h,1800h.05h``; a sub-index that is left out is all of the index.
+
+    :raises ValueRefused: it is no list of objects, or one without which no drive can be played.
+    """
+    found: set[tuple[int, int | None]] = set()
+    for part in text.split(','):
+        match = _OBJECT.fullmatch(part.strip())
+        if match is None:
+            raise ValueRefused(command_sentences.no_object_written(part=part.strip()))
+        index, subindex = int(match[1], 16), int(match[2], 16) if match[2] else None
+        if index in (states.CONTROL_WORD, states.STATUS_WORD):
+            raise ValueRefused(command_sentences.no_drive_without(index=index))
+        found.add((index, subindex))
+    return frozenset(found)
+
+
+def object_text(index: int, subindex: int | None) -> str:
+    return f'{index:04X}h' + ('' if subindex is None else f'.{subindex:02X}h')
 
 
 class HeartbeatConsumer:

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for the CANopen PKW mailbox."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -16,7 +16,8 @@ from drive_can_bridge.protocols.canopen.addressing import (
 from drive_can_bridge.protocols.canopen.masters import NMT_ROUTE, sdo_route
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, option, Talk
+from drive_can_bridge.protocols.family import (
+    Claim, Complaint, Family, ImportRules, option, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polled_exchange import round_time
 
@@ -57,6 +58,12 @@ class CanopenPkw(Family):
     #: a device may take its time: nothing is documented
     drive_defaults = {'parameter_timeout': 0.5}
     options_type = PkwOptions
+    on_canopen = True
+    probed = ('layout', 'word_order', 'abort_code_order')
+    scan_entry = ScanEntry('starter', 'tesys_t_ltmr', response=('system_status_1',))
+    import_rules = ImportRules(
+        choices=({'addressing': 'register'}, {'addressing': 'canopen'}), elements=False,
+        eds_objects=())
 
     def make_options(self, station: int, given: Mapping[str, Any]) -> PkwOptions:
         """Make the options; the COB-IDs are the predefined ones of the node by default."""
@@ -127,6 +134,12 @@ class CanopenPkw(Family):
                 return Parameter(name=name, listed=False, number=other.number,
                                  index=other.index, subindex=other.subindex)
         return raw
+
+    def profile_remark(self, entries: Iterable[Mapping[str, Any]]) -> str:
+        if any('number' in entry for entry in entries):
+            return ''
+        return (f'The entries are CANopen objects: a drive of {self.name} that uses them needs '
+                '"addressing: canopen".')
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver

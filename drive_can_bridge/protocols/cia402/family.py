@@ -1,16 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The row of the family table for drives of CiA 402."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
+from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.session import Session
-from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
     node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints)
@@ -20,8 +20,9 @@ from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of,
-    STATUS_PARAMETER, STATUS_WORD)
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, IntegerList, option, Talk
+    STATUS_BITS, STATUS_PARAMETER, STATUS_WORD)
+from drive_can_bridge.protocols.family import (
+    Claim, Complaint, Family, ImportRules, IntegerList, ModeKey, option, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s: periods of which the jitter of a process without a real-time kernel is a good part
@@ -88,8 +89,17 @@ class Cia402(Family):
     cyclic = True
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
+    status_bits = STATUS_BITS
     widths = frozenset((8, 16, 32))
     options_type = Cia402Options
+    mode_key = ModeKey({mode.number: name for name, mode in MODES.items()}, (
+        'target_position', 'interpolation_target', 'target_velocity', 'target_torque',
+        'vl_target_velocity'))
+    on_canopen = True
+    probed = ('mode', 'mapping', 'disable_word', 'bridge_heartbeat')
+    scan_entry = ScanEntry('axis', 'cia402_servo', ('target_velocity',), ('actual_velocity',))
+    import_rules = ImportRules(
+        eds_objects=(CONTROL_WORD, STATUS_WORD), eds_profile=scan_entry.profile)
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         yield from station_complaints(drive)
@@ -175,6 +185,11 @@ class Cia402(Family):
 
     def is_command(self, parameter: Parameter) -> bool:
         return parameter.index in _COMMANDS
+
+    def scan_keys(self, taken: Collection[int]) -> dict[str, Any]:
+        """Return the highest Node-ID that no node has, for the bridge, where that is not 127."""
+        free = max({*range(1, NODE_MAX + 1)} - {*taken}, default=NODE_MAX)
+        return {} if free == NODE_MAX else {'bridge_node': free}
 
     def raw_parameter(self, drive: DriveConfiguration, name: str) -> Parameter | None:
         """Resolve ``x<index>.<sub-index>``; the drive tells the width."""

@@ -14,7 +14,8 @@ from drive_can_bridge.protocols.datamodel.extended import (
     CYCLIC_PARAMETER, PAYLOAD, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT)
 from drive_can_bridge.protocols.datamodel.options import (
     ExtendedOptions, NUMBER_MAX, REQUEST_MAP_BASE, RESPONSE_MAP_BASE, StandardOptions)
-from drive_can_bridge.protocols.family import Claim, Complaint, Family, out_of_range, Talk
+from drive_can_bridge.protocols.family import (
+    Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
 
 #: the manual recommends not to cycle faster
 FASTEST_PERIOD = 0.005
@@ -114,6 +115,8 @@ class DataModelStandard(Family):
     cyclic = False
     widths = frozenset((16,))
     options_type = StandardOptions
+    probed = ('parameter_offset',)
+    scan_entry = ScanEntry('drive_std')
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         yield from self._check_station(drive)
@@ -181,6 +184,7 @@ class DataModelExtended(Family):
     cyclic = True
     widths = frozenset((16,))
     options_type = ExtendedOptions
+    probed = ('parameter_offset', 'cyclic_request', 'cyclic_response')
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         yield from out_of_range('station', drive.station, 1, STATION_MAX, f' ({self.name})')
