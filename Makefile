@@ -40,7 +40,7 @@ test:
 	@.ci/test '$(PYTHON)' '$(VENV)' $(ARGS)
 
 check-stops:
-	@venv=$$($(SETUP)) && exec $$venv/bin/python .ci/foreground $$venv/bin/python test/stop_checker.py $(ARGS)
+	@venv=$$($(SETUP)) && exec $$venv/bin/python .ci/foreground $$venv/bin/python test/bench/stop_checker.py $(ARGS)
 
 bench:
 	@venv=$$($(SETUP)) && exec $$venv/bin/python .ci/foreground $$venv/bin/python bench/run.py $(ARGS)

@@ -2,8 +2,8 @@
 """
 What all tests share: where they run, how long they look, and which of them run beside each other.
 
-Puts this directory, ``clocked/`` and ``ros/`` on the path: every test may import ``builders``, and
-``bridges`` on the bench.
+Puts this directory, ``bench/``, ``clocked/`` and ``ros/`` on the path: every test may import
+``conversation`` and ``drives``, and ``bridges`` on the clocked bench.
 
 *Domains.* Nothing leaves this machine, and two test processes on it never meet: each takes ROS
 domains of its own, before anything of ROS is imported. The tests of ``ros/`` have another one than
@@ -61,6 +61,7 @@ from drive_can_bridge.configuration import profiles
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.resources import profiles_directory
 
+sys.path.insert(0, str(Path(__file__).with_name('bench')))
 sys.path.insert(0, str(Path(__file__).with_name('clocked')))
 sys.path.append(str(Path(__file__).with_name('ros')))
 from guard import Guard  # noqa: I100, I202

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from backup_builders import Command, Said
-from literal_drives import ServoDrive
+from drives import ServoDrive
 import pytest
 import world
 

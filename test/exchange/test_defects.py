@@ -13,9 +13,9 @@ from itertools import count, product
 from typing import Any
 
 from builders import ACTUAL, CONTROL, CURRENT, drive, frame, LIMIT, SPEED, STATUS, WORD
+from drives import ExtendedDrive, PkwNode, StandardDrive
 from exchange_builders import Bench
 from extent import some
-from literal_drives import ExtendedDrive, PkwNode, StandardDrive
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration

@@ -3,7 +3,8 @@
 
 from typing import Any
 
-from builders import Conversation, drive, EEPROM, INT16, INT32, parameter, RAM, RO
+from builders import drive, EEPROM, INT16, INT32, parameter, RAM, RO
+from conversation import Conversation
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction

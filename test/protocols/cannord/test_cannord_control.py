@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Control word and status word of one inverter: every way through the states."""
 
-from builders import Conversation
 from cannord_session_builders import (
     enabled, exchange, FAULT, online, READY, RUNNING, STANDING, TICK,
 )
+from conversation import Conversation
 import pytest
 from saying import says, status_word
 

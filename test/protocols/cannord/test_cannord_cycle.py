@@ -4,11 +4,12 @@
 import math
 from typing import Any
 
-from builders import Conversation, frame
+from builders import frame
 from cannord_session_builders import (
     ACTUAL, commanded, CURRENT, ENABLED, enabled, exchange, FAULT, FREQUENCY, INPUTS, online,
     READY, READY_FRAME, RUNNING, SECOND, SETPOINTS, started, THIRD, VALUES,
 )
+from conversation import Conversation
 import pytest
 from saying import says, status_word
 

@@ -3,11 +3,12 @@
 
 from typing import Any
 
-from builders import Conversation, read, write
+from builders import read, write
 from cannord_session_builders import (
     ACCELERATION, ACCELERATION_2, ACTUAL, COUNTER, exchange, FAULT_NUMBER, FLAG, FREQUENCY,
     inverter, MONITORING, OFFSET, online, PARAMETERS, POSITION, SETPOINTS, VALUES,
 )
+from conversation import Conversation
 import pytest
 from saying import says
 

@@ -1,11 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Whatever was told to run is told to stop, soon, and by frames that really left."""
 
-from builders import Conversation, read
+from builders import read
 from cannord_session_builders import (
     ACTUAL, commanded, ENABLED, exchange, FREQUENCY, inverter, MONITORING, OFFSET, online, READY,
     READY_FRAME, RUNNING, SETPOINTS, STANDING, TICK, VALUES,
 )
+from conversation import Conversation
 import pytest
 from saying import says
 

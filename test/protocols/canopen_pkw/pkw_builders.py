@@ -4,7 +4,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from builders import Conversation, drive, INT32, parameter, RAM, RO, WO
+from builders import drive, INT32, parameter, RAM, RO, WO
+from conversation import Conversation
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction

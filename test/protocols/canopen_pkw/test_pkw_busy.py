@@ -3,7 +3,8 @@
 
 from collections.abc import Callable
 
-from builders import Conversation, read, write
+from builders import read, write
+from conversation import Conversation
 from pkw_builders import (
     CLASS, denied, DISABLE_0, DISABLE_1, driven, echo, FLC, online, running, SPEED, SPEED_1,
     STILL_0, STILL_1, TORQUE,

@@ -12,9 +12,9 @@ from typing import Any
 
 from any_order import AnyOrder, Observer, PATIENCE, SETTINGS
 from builders import frame, read
+from drives import PkwNode
 from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
-from literal_drives import PkwNode
 from pkw_builders import (
     CLASS, configuration, CONTROL, CURRENT, FLC, FLC_2, KEY, LEVEL, POSITION, SPEED, STATUS,
     STATUS_2, TORQUE,

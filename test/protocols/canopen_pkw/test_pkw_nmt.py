@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """NMT, heartbeats and emergency messages as the session handles them."""
 
-from builders import Conversation, read
+from builders import read
+from conversation import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, BOOT_UP, configuration, CONTROL, FLC, IDLE, IDLE_ANSWER, LEVEL, online,
     OPERATIONAL, PRE_OPERATIONAL, READ_0, READ_1, reading, START, started, STATUS, STOPPED,

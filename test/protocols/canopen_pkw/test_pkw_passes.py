@@ -3,8 +3,9 @@
 
 from functools import partial
 
-from builders import Conversation, frame
-from literal_drives import PkwNode
+from builders import frame
+from conversation import Conversation
+from drives import PkwNode
 from pkw_builders import commanding, configuration, CONTROL, SPEED, TORQUE
 import pytest
 from timeline import Timeline

@@ -9,7 +9,8 @@ from collections import deque
 import math
 from random import Random
 
-from builders import Conversation, write
+from builders import write
+from conversation import Conversation
 from extent import some
 from pkw_builders import CLASS, configuration, FLC, STATUS, STATUS_2
 import pytest

@@ -4,7 +4,8 @@
 from dataclasses import replace
 from typing import Any
 
-from builders import Conversation, read, write
+from builders import read, write
+from conversation import Conversation
 from pkw_builders import (
     ANSWER_1, BOOT_UP, CLASS, configuration, CURRENT, DISABLE_1, echo, FLC, FLC_2, IDLE,
     IDLE_ANSWER, KEY, LEVEL, online, POSITION, PRE_OPERATIONAL, READ_1, reading, running, SPEED,

@@ -5,7 +5,8 @@ from functools import partial
 import math
 from typing import Any
 
-from builders import Conversation, read
+from builders import read
+from conversation import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, answered, BOOT_UP, CLASS, commanding, CURRENT, denied, DISABLE_0,
     DISABLE_1, DISABLED_0, driven, echo, IDLE, LEVEL, online, POSITION, READ_0, READ_1, SPEED,

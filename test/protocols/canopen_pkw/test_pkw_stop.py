@@ -3,7 +3,8 @@
 
 from dataclasses import replace
 
-from builders import BOOL, Conversation, parameter, RAM, read
+from builders import BOOL, parameter, RAM, read
+from conversation import Conversation
 from pkw_builders import (
     ANSWER_0, ANSWER_1, BOOT_UP, CLASS, CONTROL, DISABLE_0, DISABLE_1, DISABLED_0, DISABLED_1,
     driven, echo, ENABLE_0, IDLE, IDLE_ANSWER, online, PRE_OPERATIONAL, READ_0, READ_1, ready,

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A drive that ran, fell silent, and shows up without being online, is told to stop again."""
 
-from builders import Conversation
+from conversation import Conversation
 from pkw_builders import (
     CONTROL, CURRENT, DISABLE_0, DISABLE_1, DISABLED_0, echo, ENABLE_0, ENABLE_1, IDLE,
     OPERATIONAL, PRE_OPERATIONAL, READ_1, running, START, started, STATUS, STATUS_2,

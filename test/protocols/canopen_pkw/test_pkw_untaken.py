@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """Setpoints and control words that a device does not take: they are refused, or not answered."""
 
-from builders import Conversation
+from conversation import Conversation
 from pkw_builders import answered, CONTROL, denied, driven, echo, online, SPEED, SPEED_1
 from saying import may_run, says
 from timeline import Timeline

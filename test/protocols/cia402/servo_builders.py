@@ -5,8 +5,9 @@ from collections.abc import Callable
 import math
 from typing import Any
 
-from builders import Conversation, drive, frame, INT16, INT32, parameter, RAM, RO
-from literal_drives import ServoDrive
+from builders import drive, frame, INT16, INT32, parameter, RAM, RO
+from conversation import Conversation
+from drives import ServoDrive
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction

@@ -4,10 +4,10 @@
 from typing import Any
 
 from builders import INT16, parameter, write
-from literal_servos import LateServo
 import pytest
 from saying import says
 from servo_builders import Axis, ERROR, OBJECTS, TABLE
+from servos import LateServo
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted

@@ -2,10 +2,10 @@
 """The end of a homing, as drives show it that are late, done at once, or left off as they were."""
 
 from builders import INT32, parameter, RAM
-from literal_servos import HomingServo, LelyHomingServo, StepperServo
 import pytest
 from saying import says
 from servo_builders import Axis, OBJECTS
+from servos import HomingServo, LelyHomingServo, StepperServo
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 

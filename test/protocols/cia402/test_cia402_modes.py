@@ -4,12 +4,12 @@
 from dataclasses import replace
 from typing import Any
 
+from drives import ServoDrive
 from extent import some
-from literal_drives import ServoDrive
-from literal_servos import ProfileServo
 import pytest
 from saying import says
 from servo_builders import Axis, ERROR, OBJECTS, POSITION, TABLE, TARGET
+from servos import ProfileServo
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest

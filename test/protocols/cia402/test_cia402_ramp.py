@@ -4,7 +4,7 @@
 import math
 
 from builders import frame
-from literal_drives import ServoDrive
+from drives import ServoDrive
 import pytest
 from servo_builders import Axis
 

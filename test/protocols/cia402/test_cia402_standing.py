@@ -2,10 +2,10 @@
 """Whether an axis stands, and what follows: quick stops in which drives stay, found and asked."""
 
 from builders import parameter
-from literal_servos import CanopenNodeServo, LelyServo, TurningServo
 import pytest
 from saying import says
 from servo_builders import Axis, OBJECTS, POSITION, TARGET
+from servos import CanopenNodeServo, LelyServo, TurningServo
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import Noted

@@ -3,7 +3,8 @@
 
 from collections.abc import Callable
 
-from builders import Conversation, parameter, read, RO
+from builders import parameter, read, RO
+from conversation import Conversation
 import pytest
 from saying import says
 from servo_builders import Axis, servo, TABLE

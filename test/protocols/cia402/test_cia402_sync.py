@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from literal_drives import ServoDrive
+from drives import ServoDrive
 import pytest
 from servo_builders import Axis, OBJECTS, servo
 

@@ -3,7 +3,8 @@
 
 from typing import Any
 
-from builders import Conversation, drive
+from builders import drive
+from conversation import Conversation
 from saying import says
 
 ZEROS = '0000000000000000'

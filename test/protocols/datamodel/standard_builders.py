@@ -3,7 +3,8 @@
 
 from typing import Any
 
-from builders import Conversation, drive
+from builders import drive
+from conversation import Conversation
 
 #: Reg.209 to 211 in one read
 ASK = '3F1#03D1000300000000'

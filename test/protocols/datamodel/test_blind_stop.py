@@ -3,7 +3,8 @@
 
 from dataclasses import replace
 
-from builders import CONTROL, Conversation, drive, LIMIT, SPEED, TABLE, WO, WORD
+from builders import CONTROL, drive, LIMIT, SPEED, TABLE, WO, WORD
+from conversation import Conversation
 import extended_builders
 import pytest
 from saying import may_run, says

@@ -5,9 +5,10 @@ from dataclasses import replace
 from functools import partial
 
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, RAMP, read,
+    ACTUAL, CONTROL, CURRENT, DAMPING, drive, frame, GAIN, INT16, LIMIT, RAMP, read,
     SILENT_CONTROL, SPEED, TABLE, WORD, write,
 )
+from conversation import Conversation
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_WORD, checked, DISABLE, ENABLED, exchange, NEUTRAL, online,
     TICK, ZEROS,

@@ -2,7 +2,8 @@
 """Conversations in cycles: pace, responses of every kind, offline and online."""
 
 
-from builders import Conversation, drive, FLAG, frame, read
+from builders import drive, FLAG, frame, read
+from conversation import Conversation
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, cycling, NEUTRAL, online,
     REQUEST_MAP, RESPONSE_MAP, SILENT, TICK, ZEROS,

@@ -8,9 +8,8 @@ ready 1, enabled 2, fault 8), 212 (position). The position is limited to ±10 de
 
 from typing import Any
 
-from builders import (
-    ACTUAL, CONTROL, Conversation, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD,
-)
+from builders import ACTUAL, CONTROL, drive, INT16, parameter, RAM, RO, STATUS, TABLE, WORD
+from conversation import Conversation
 import pytest
 from saying import says
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from any_order import AnyOrder, Observer, PATIENCE, SETTINGS
 from builders import CONTROL, drive, GAIN, INT16, parameter, RAM, RO, STATUS, WORD
+from drives import ExtendedDrive
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
-from literal_drives import ExtendedDrive
 import pytest
 
 from drive_can_bridge.core.control import ControlAction

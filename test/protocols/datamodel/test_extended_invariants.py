@@ -14,9 +14,9 @@ from builders import (
     CONTROL, DAMPING, drive, FLAG, GAIN, LIMIT, MAXIMUM, ORDER, parameter, RAMP, SPEED, STATUS,
     WORD,
 )
+from drives import ExtendedDrive
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
-from literal_drives import ExtendedDrive
 import pytest
 
 from drive_can_bridge.core.control import ControlAction

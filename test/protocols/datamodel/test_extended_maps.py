@@ -3,7 +3,8 @@
 
 import math
 
-from builders import ACTUAL, Conversation, drive, frame, GAIN, RAMP, read, SPEED, write
+from builders import ACTUAL, drive, frame, GAIN, RAMP, read, SPEED, write
+from conversation import Conversation
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, checked, exchange, NEUTRAL, online, REQUEST_MAP,
     RESPONSE_MAP, ZEROS,

@@ -9,9 +9,8 @@ refuses frames: there is always a frame that stops it, or a warning that it may 
 from collections.abc import Callable
 from dataclasses import replace
 
-from builders import (
-    CONTROL, Conversation, LIMIT, SPEED, TABLE, WORD,
-)
+from builders import CONTROL, LIMIT, SPEED, TABLE, WORD
+from conversation import Conversation
 from extended_builders import (
     ANSWER, ASK_LIMIT, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, ASK_SPEED, checked, DISABLE, ENABLED,
     exchange, LIMIT_IS_ZERO, LIMIT_ZERO, NEUTRAL, online, REQUEST_MAP, RESPONSE_MAP, RUNNING,

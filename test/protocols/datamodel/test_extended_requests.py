@@ -2,9 +2,10 @@
 """Conversations about parameter requests: acyclic frames, their pace, and what became of them."""
 
 from builders import (
-    BOOL, Conversation, DAMPING, drive, FLAG, GAIN, KEY, MAXIMUM, ORDER, parameter, RAM,
-    RAMP, read, SPEED, write,
+    BOOL, DAMPING, drive, FLAG, GAIN, KEY, MAXIMUM, ORDER, parameter, RAM, RAMP, read, SPEED,
+    write,
 )
+from conversation import Conversation
 from extended_builders import ANSWER, NEUTRAL, online, TICK, ZEROS
 import pytest
 from saying import says

@@ -3,9 +3,8 @@
 
 import math
 
-from builders import (
-    CONTROL, Conversation, CURRENT, drive, parameter, SPEED, TABLE, WORD,
-)
+from builders import CONTROL, CURRENT, drive, parameter, SPEED, TABLE, WORD
+from conversation import Conversation
 from extended_builders import (
     ANSWER, ASK_REQUEST_MAP, ASK_WORD, cycling, DISABLE, ENABLED, exchange, NEUTRAL, online,
     REQUEST_MAP, TICK,

@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A drive that ran, fell silent, and answers only a part of what is asked, is told again."""
 
-from builders import Conversation
+from conversation import Conversation
 from extended_builders import (
     ASK_LIMIT, ASK_REQUEST_MAP, ASK_RESPONSE_MAP, ASK_SPEED, exchange, LIMIT_IS_ZERO, LIMIT_ZERO,
     NEUTRAL, online, REQUEST_MAP, RESPONSE_MAP, RUNNING, SPEED_IS_ZERO, SPEED_ZERO,

@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """A late answer to what a user has asked does not show that a 29-bit drive has stopped."""
 
-from builders import CONTROL, Conversation, read, WORD
+from builders import CONTROL, read, WORD
+from conversation import Conversation
 from extended_builders import ANSWER, NEUTRAL, online
 
 from drive_can_bridge.core.control import ControlAction

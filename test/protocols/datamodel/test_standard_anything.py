@@ -14,9 +14,9 @@ from builders import (
     ACTUAL, CONTROL, CURRENT, DAMPING, drive, FLAG, GAIN, KEY, LIMIT, MAXIMUM, ORDER, parameter,
     RAMP, RO, SPEED, STATUS, WORD,
 )
+from drives import StandardDrive
 from hypothesis import example, given, strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
-from literal_drives import StandardDrive
 import pytest
 
 from drive_can_bridge.core.control import ControlAction

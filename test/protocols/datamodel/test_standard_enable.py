@@ -1,7 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The word that enables an 11-bit drive, while nobody knows what state the drive is in."""
 
-from builders import ACTUAL, CONTROL, Conversation, CURRENT, drive, LIMIT, SPEED, STATUS, WORD
+from builders import ACTUAL, CONTROL, CURRENT, drive, LIMIT, SPEED, STATUS, WORD
+from conversation import Conversation
 from extent import some
 import pytest
 from saying import says

@@ -9,7 +9,8 @@ register has ever had, so that an answer in the wrong place is seen.
 import heapq
 import random
 
-from builders import Conversation, drive, parameter, RO, RW
+from builders import drive, parameter, RO, RW
+from conversation import Conversation
 from extent import some
 import pytest
 from timeline import Timeline

@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, parameter, RAMP, read,
-    RO, SPEED, STATUS, TABLE, WORD, write,
+    ACTUAL, CONTROL, CURRENT, DAMPING, drive, frame, GAIN, parameter, RAMP, read, RO, SPEED,
+    STATUS, TABLE, WORD, write,
 )
+from conversation import Conversation
 import pytest
 from saying import may_run, says
 from standard_builders import (

@@ -7,7 +7,8 @@ may be the first to go on; what the reader thread finds then is from before. By 
 ``test_standard_late.py``.
 """
 
-from builders import Conversation, frame, GAIN, read
+from builders import frame, GAIN, read
+from conversation import Conversation
 import pytest
 from standard_builders import ANSWER, ASK, online, polling
 

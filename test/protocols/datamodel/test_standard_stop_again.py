@@ -3,9 +3,8 @@
 
 from dataclasses import replace
 
-from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, drive, GAIN, LIMIT, SPEED, STATUS, TABLE, WORD,
-)
+from builders import ACTUAL, CONTROL, CURRENT, drive, GAIN, LIMIT, SPEED, STATUS, TABLE, WORD
+from conversation import Conversation
 from saying import says
 from standard_builders import LIMIT_ZERO, SPEED_ZERO
 

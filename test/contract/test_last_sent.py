@@ -2,8 +2,8 @@
 """``Session.sent``: what stood in the last frames, in every family."""
 
 from builders import CONTROL, drive, LIMIT, SPEED, WORD
+from partners import Partner, PARTNERS
 import pytest
-from test_contract import Partner, PARTNERS
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.parameters import Parameter

@@ -4,10 +4,9 @@
 from dataclasses import replace
 from functools import partial
 
-from builders import (
-    ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, RAM, SPEED, STATUS,
-)
-from literal_drives import ExtendedDrive, Registers, StandardDrive
+from builders import ACTUAL, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, RAM, SPEED, STATUS
+from conversation import Conversation
+from drives import ExtendedDrive, Registers, StandardDrive
 import pytest
 from timeline import Timeline
 

@@ -6,7 +6,8 @@ from random import Random
 from typing import Any
 
 import builders
-from builders import Conversation, EEPROM, parameter, RO, text_of
+from builders import EEPROM, parameter, RO, text_of
+from conversation import Conversation
 import pytest
 from test_late_answers import KINDS, Partner, REGISTERS, SPEED, TIMEOUT
 

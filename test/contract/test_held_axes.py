@@ -9,9 +9,8 @@ the position is known first, and what is sent until then and after a loss. 70 is
 from dataclasses import replace
 from typing import Any
 
-from builders import (
-    CONTROL, Conversation, drive, INT16, parameter, RAM, RO, SPEED, STATUS, TABLE, WORD,
-)
+from builders import CONTROL, drive, INT16, parameter, RAM, RO, SPEED, STATUS, TABLE, WORD
+from conversation import Conversation
 from saying import may_run, says
 
 from drive_can_bridge.core.control import ControlAction

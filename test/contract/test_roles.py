@@ -7,9 +7,9 @@ from typing import Any
 from builders import (
     ACTUAL, CONTROL, drive, EEPROM, GAIN, INT32, parameter, RAM, RO, SPEED, TABLE, WORD,
 )
+from partners import PARTNERS
 import pytest
 from saying import says
-from test_contract import PARTNERS
 
 from drive_can_bridge.core.directory import ParameterDirectory
 from drive_can_bridge.core.parameters import Parameter, ParameterType

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from builders import CONTROL, LIMIT, SPEED
+from partners import Partner, PARTNERS, run, warnings
 import pytest
-from test_contract import Partner, PARTNERS, run, warnings
 
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import DriveState, SetpointsExpired, StationLost

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 from builders import LIMIT, SPEED
+from partners import Partner, PARTNERS, run
 import pytest
 from saying import says
-from test_contract import Partner, PARTNERS, run
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
 from drive_can_bridge.core.events import DriveState

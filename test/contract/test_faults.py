@@ -7,9 +7,9 @@ from typing import Any
 
 from builders import (
     ACTUAL, CONTROL, CURRENT, drive, frame, GAIN, parameter, RO, SPEED, STATUS, TABLE)
+from partners import Partner, PARTNERS
 import pytest
 from saying import says
-from test_contract import Partner, PARTNERS
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
 from drive_can_bridge.core.events import (

@@ -6,7 +6,7 @@ from functools import partial
 import heapq
 from itertools import count
 
-from builders import Conversation
+from conversation import Conversation
 
 
 class Timeline:

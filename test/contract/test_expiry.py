@@ -4,7 +4,8 @@
 from functools import partial
 from typing import Any
 
-from builders import Conversation, drive, INT16, parameter
+from builders import drive, INT16, parameter
+from conversation import Conversation
 import pytest
 from timeline import Timeline
 

@@ -8,7 +8,7 @@ docstring.
 
 from collections import deque
 
-from literal_drives import ServoDrive
+from drives import ServoDrive
 
 from drive_can_bridge.core.frame import Frame
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import random
 
 import builders
-from builders import Conversation, EEPROM, INT16, parameter, RAM, RO
+from builders import EEPROM, INT16, parameter, RAM, RO
+from conversation import Conversation
 from extent import some, times
 import pytest
 
@@ -150,13 +151,13 @@ class ServoPartner(Partner):
 
 KINDS = {'cannord': NordPartner, 'cia402': ServoPartner, 'datamodel_extended': DataModelPartner}
 #: where the same is shown of families whose answers say less of what they answer
-ELSEWHERE = {'canopen_pkw': 'canopen_pkw/test_pkw_round.py',
-             'datamodel_standard': 'datamodel/test_standard_late.py'}
+ELSEWHERE = {'canopen_pkw': 'protocols/canopen_pkw/test_pkw_round.py',
+             'datamodel_standard': 'protocols/datamodel/test_standard_late.py'}
 
 
 def test_every_family_is_here_or_elsewhere() -> None:
     assert {*KINDS, *ELSEWHERE} == set(FAMILIES)
-    assert all((Path(__file__).parent / path).is_file() for path in ELSEWHERE.values())
+    assert all((Path(__file__).parents[1] / path).is_file() for path in ELSEWHERE.values())
 
 
 @pytest.mark.parametrize('seed', some([1, 2], 2))

@@ -2,306 +2,26 @@
 """
 The promises that every protocol family keeps, whatever its frames look like.
 
-A new family adds a :class:`Partner`: how its drive is configured and what the drive answers. The
-tests stay as they are.
+A new family adds a :class:`~partners.Partner`: how its drive is configured and what the drive
+answers. The tests stay as they are.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
 import math
-from typing import Any
 
 from builders import (
-    ACTUAL, Conversation, CURRENT, DAMPING, drive, frame, GAIN, LIMIT, ORDER, RAMP, read, SPEED,
-    STATUS, TABLE, text_of, write,
+    ACTUAL, DAMPING, GAIN, LIMIT, ORDER, RAMP, read, SPEED, text_of, write,
 )
-from literal_drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
+from partners import DELAY, Partner, PARTNERS, run, warnings, worries
 import pytest
 from saying import may_run, says
 
-from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import (
-    DriveState, FrameRejected, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired,
+    DriveState, FrameRejected, ProcessDataReceived, RequestCompleted, SetpointsExpired,
     StationFound, StationLost)
 from drive_can_bridge.core.frame import Frame
-from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
 from drive_can_bridge.protocols.families import FAMILIES
-
-#: s between a request and its answer
-DELAY = 0.0005
-
-
-class Partner(ABC):
-    """
-    The drive at the other end of the bus: registers, and the family's telegrams.
-
-    ``registers`` go by the numbers of ``builders``, however the drives of a family address them.
-
-    :cvar sample: the raw integers of every sample.
-    :cvar unknown: what is said of a parameter that the drive does not have.
-    :cvar idle: state of a drive that has just been found.
-    :cvar words: disable and enable, where the control word is built in.
-    """
-
-    sample: tuple[int, ...] = (1000, 250, 1)
-    unknown = 'no answer'
-    idle = DriveState.NOT_ARMED
-    words: Mapping[str, int] = {}
-
-    device: ExtendedDrive | StandardDrive | PkwNode | ServoDrive
-
-    def __init__(self, **options: Any) -> None:
-        self.configuration = self.configure(**options)
-        self.talk = Conversation(self.configuration)
-        self.now = 10.0
-        self.mute = False
-        self.registers = {parameter.number or 0: 0 for parameter in TABLE}
-        self.registers.update({209: 1000, 210: 250, 211: 1})
-        self.frames: list[tuple[float, str]] = []
-
-    @abstractmethod
-    def configure(self, **options: Any) -> DriveConfiguration:
-        """Make a configuration with ``speed_setpoint`` as its only setpoint."""
-
-    @staticmethod
-    def own(parameter: Parameter) -> Parameter:
-        """Return a parameter of ``builders`` as drives of the family address it."""
-        return parameter
-
-    @staticmethod
-    def raw_name(number: int) -> str:
-        """Return the raw name of the parameter to which ``builders`` gives a number."""
-        return f'p{number}'
-
-    def answers(self, sent: str) -> list[str]:
-        """Do what the drive does with a frame; return what it answers."""
-        return [str(answer) for answer in self.device.takes(frame(sent))]
-
-    @abstractmethod
-    def setpoints(self, sent: str) -> list[int]:
-        """Return the raw setpoints that a frame carries; none if it carries none."""
-
-    def enable(self) -> None:  # noqa: B027  most have none
-        """Bring a drive that has a control word so far that it takes setpoints."""
-
-    # -- the bus ----------------------------------------------------------------------------------
-
-    def deliver(self, sent: list[str]) -> None:
-        for text in sent:
-            self.frames.append((self.now, text))
-            answers = [] if self.mute else self.answers(text)
-            for answer in answers:
-                self.now += DELAY
-                self.deliver(self.talk.hears(answer, self.now))
-
-    def live(self, duration: float) -> None:
-        """Let time pass, every timer in time."""
-        end = self.now + duration
-        for _ in range(100_000):
-            due = self.talk.session.next_timer()
-            if due > end:
-                self.now = max(self.now, end)
-                return
-            self.now = max(self.now, due)
-            self.deliver(self.talk.at(self.now))
-        raise AssertionError('the timer spins')
-
-    def reads(self, *parameters: Parameter) -> None:
-        """Have parameters read."""
-        self.deliver(self.talk.submits(read(*map(self.own, parameters)), self.now))
-
-    def writes(self, *items: tuple[Parameter, int]) -> None:
-        """Have raw integers written."""
-        self.deliver(self.talk.submits(
-            write(*((self.own(parameter), raw) for parameter, raw in items)), self.now))
-
-    def start(self) -> None:
-        self.deliver(self.talk.bus_up(self.now))
-        self.deliver(self.talk.activate(self.now))
-        self.live(0.2)
-
-    def take(self) -> list[tuple[float, str]]:
-        """Return the frames sent since the last call."""
-        frames, self.frames = self.frames, []
-        return frames
-
-    def commanded(self) -> Iterator[int]:
-        """Return the raw speed setpoints sent since the last call."""
-        for _, text in self.take():
-            yield from self.setpoints(text)
-
-
-class ExtendedPartner(Partner):
-    """DataModel with 29-bit identifiers."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.registers.update(zip(range(122, 130), (50, 0, 0, 0, 209, 210, 211, 0)))
-        self.device = ExtendedDrive(self.registers)
-
-    def configure(self, **options: Any) -> DriveConfiguration:
-        options.setdefault('request', (SPEED,))
-        return drive('datamodel_extended', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def setpoints(self, sent: str) -> list[int]:
-        return [int(sent[9:13], 16)] if sent.startswith('003FFFF0') else []
-
-
-class StandardPartner(Partner):
-    """DataModel with 11-bit identifiers."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.device = StandardDrive(self.registers)
-
-    def configure(self, **options: Any) -> DriveConfiguration:
-        options.setdefault('request', (SPEED,))
-        return drive('datamodel_standard', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def setpoints(self, sent: str) -> list[int]:
-        if not sent.startswith('3F1#063200'):
-            return []
-        return [int.from_bytes(bytes.fromhex(sent[10:14]), 'little')]
-
-
-class CannordPartner(Partner):
-    """CANnord, station 1; actual values are in parameters 209 and 210."""
-
-    sample = (0x0B31, 1000, 250)
-    idle = DriveState.DISABLED
-    words = {'disable': 0x047E, 'enable': 0x047F}
-
-    def enable(self) -> None:
-        self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
-        self.live(max(0.1, 2 * self.configuration.period))
-        assert self.talk.control_outcomes() == [('enable', True, 'operation enabled')]
-
-    def configure(self, **options: Any) -> DriveConfiguration:
-        options.setdefault('request', (SPEED,))
-        return drive('cannord', response=(ACTUAL, CURRENT), **options)
-
-    def answers(self, sent: str) -> list[str]:
-        identifier, _, text = sent.partition('#')
-        data = bytes.fromhex(text)
-        if identifier == '002':
-            status = 0x0B37 if text.startswith('7F04') else 0x0B31
-            self.registers[50] = int.from_bytes(data[2:4], 'little')
-            self.registers[51] = int.from_bytes(data[4:6], 'little')
-            words = (status, self.registers[209], self.registers[210], 0)
-            return ['003#' + b''.join(word.to_bytes(2, 'little') for word in words).hex()]
-        assert identifier == '202'
-        key = int.from_bytes(data[:2], 'little')
-        task, number = key >> 12, key & 0x7FF
-        if number not in self.registers:
-            return []
-        if task != 1:
-            assert task in (2, 14)
-            self.registers[number] = int.from_bytes(data[6:], 'little')
-        value = self.registers[number].to_bytes(2, 'little')
-        return ['203#' + ((1 << 12 | number).to_bytes(2, 'little') + bytes(4) + value).hex()]
-
-    def setpoints(self, sent: str) -> list[int]:
-        if not sent.startswith('002#'):
-            return []
-        return [int.from_bytes(bytes.fromhex(sent[8:12]), 'little')]
-
-
-class PkwPartner(Partner):
-    """PKW, node 1; obeys the rule that only a change of the function byte counts."""
-
-    unknown = 'refused by the drive: 06020000h (no such register or object)'
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.device = PkwNode(1, self.registers)
-
-    def configure(self, **options: Any) -> DriveConfiguration:
-        options.setdefault('request', (SPEED,))
-        return drive('canopen_pkw', response=(ACTUAL, CURRENT, STATUS), **options)
-
-    def setpoints(self, sent: str) -> list[int]:
-        if not sent.startswith(('501#3200002A', '501#320000AA')):
-            return []
-        return [int.from_bytes(bytes.fromhex(sent[12:16]), 'little')]
-
-
-class Cia402Partner(Partner):
-    """CiA 402 in mode vl, node 1; other parameters are manufacturer's objects of 16 bits."""
-
-    sample = (0x0231, 1000, 250)
-    unknown = 'refused by the drive: 06020000h (no such register or object)'
-    idle = DriveState.DISABLED
-    words = {'disable': 0x0006, 'enable': 0x007F}
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.device: ServoDrive = RegisterServo(self.registers)
-
-    @staticmethod
-    def own(parameter: Parameter) -> Parameter:
-        return replace(parameter, number=None, subindex=0, index=0x6042 if (
-            parameter.number == 50) else 0x2000 + (parameter.number or 0))
-
-    @staticmethod
-    def raw_name(number: int) -> str:
-        return f'x{0x6042 if number == 50 else 0x2000 + number:04x}.00'
-
-    def enable(self) -> None:
-        self.deliver(self.talk.asks(ControlAction.ENABLE, self.now))
-        self.live(max(0.1, 6 * self.configuration.period))
-        assert self.talk.control_outcomes() == [('enable', True, 'operation enabled')]
-
-    def configure(self, **options: Any) -> DriveConfiguration:
-        options = {
-            'request': (SPEED,), 'response': (ACTUAL, CURRENT), 'table': TABLE, 'mode': 'vl',
-            'request_pdos': (1, 2, 3), 'response_pdos': (1, 2), **options}
-        for key in ('request', 'response', 'table'):
-            options[key] = tuple(map(self.own, options[key]))
-        return drive('cia402', **options)
-
-    def setpoints(self, sent: str) -> list[int]:
-        if not sent.startswith('201#'):
-            return []
-        return [int.from_bytes(bytes.fromhex(sent[8:12]), 'little')]
-
-
-class RegisterServo(ServoDrive):
-    """A servo drive whose objects of 16 bits are the registers of a partner."""
-
-    def __init__(self, registers: dict[int, int]) -> None:
-        self.registers = registers
-        super().__init__(1, {self._place(number): raw.to_bytes(2, 'little')
-                             for number, raw in registers.items()})
-
-    @staticmethod
-    def _place(number: int) -> tuple[int, int]:
-        return (0x6042 if number == 50 else 0x2000 + number), 0
-
-    def takes(self, sent: Frame) -> list[Frame]:
-        for place in [place for place in self.objects if 0x2000 <= place[0] < 0x3000]:
-            del self.objects[place]
-        for number, raw in self.registers.items():
-            self.objects[self._place(number)] = raw.to_bytes(2, 'little')
-        return super().takes(sent)
-
-    def write(self, index: int, subindex: int, content: bytes) -> None:
-        super().write(index, subindex, content)
-        for number in self.registers:
-            if (index, subindex) == self._place(number):
-                self.registers[number] = int.from_bytes(content, 'little')
-
-
-PARTNERS: dict[str, type[Partner]] = {
-    'cia402': Cia402Partner,
-    'cannord': CannordPartner,
-    'canopen_pkw': PkwPartner,
-    'datamodel_extended': ExtendedPartner,
-    'datamodel_standard': StandardPartner,
-}
 
 
 def test_every_family_has_a_partner() -> None:
@@ -322,23 +42,6 @@ def _partner(make: type[Partner]) -> Partner:
     partner.take()
     partner.talk.events()
     return partner
-
-
-def run(partner: Partner) -> None:
-    """Have the drive run."""
-    partner.talk.commands(0, 0.0, partner.now)
-    partner.talk.commands(0, 100.0, partner.now)
-    partner.live(0.1)
-    assert partner.registers[50] == 1000
-    partner.talk.events()
-
-
-def warnings(partner: Partner) -> list[str]:
-    return [note.text for note in partner.talk.events(Noted) if note.warning]
-
-
-def worries(partner: Partner) -> list[str]:
-    return [text for text in warnings(partner) if 'may still be running' in text]
 
 
 # -- life cycle -----------------------------------------------------------------------------------

@@ -11,8 +11,8 @@ from itertools import count
 
 from builders import GAIN, RAMP, read
 from extent import some
+from partners import Partner, PARTNERS
 import pytest
-from test_contract import Partner, PARTNERS
 
 TIMEOUT = 0.2
 #: s that an answer takes: long enough to be under way when the process stops

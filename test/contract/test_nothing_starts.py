@@ -17,11 +17,12 @@ from typing import Any
 
 from any_order import PATIENCE
 from builders import (
-    ACTUAL, CONTROL, Conversation, CURRENT, drive, frame, INT16, INT32, LIMIT, parameter, RAM, RO,
-    SPEED, STATUS, WORD,
+    ACTUAL, CONTROL, CURRENT, drive, frame, INT16, INT32, LIMIT, parameter, RAM, RO, SPEED, STATUS,
+    WORD,
 )
+from conversation import Conversation
+from drives import ExtendedDrive, PkwNode, Registers, ServoDrive, StandardDrive
 from hypothesis import example, given, strategies as st
-from literal_drives import ExtendedDrive, PkwNode, Registers, ServoDrive, StandardDrive
 import pytest
 from timeline import Timeline
 

@@ -16,8 +16,8 @@ from typing import Any
 from builders import (
     ACTUAL, CONTROL, CURRENT, drive, frame, INT32, parameter, SPEED, STATUS, WORD,
 )
+from drives import ExtendedDrive, ServoDrive
 from extent import some
-from literal_drives import ExtendedDrive, ServoDrive
 import pytest
 
 from drive_can_bridge.core.configuration import DriveConfiguration

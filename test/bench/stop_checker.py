@@ -22,8 +22,8 @@ Nothing in here asks a session what it owes, and no codec of the package is used
 
 .. code-block:: console
 
-    $ python test/stop_checker.py                # all stories of three things, then longer ones
-    $ python test/stop_checker.py --seed 5 --kind 'CANnord'
+    $ python test/bench/stop_checker.py       # all stories of three things, then longer ones
+    $ python test/bench/stop_checker.py --seed 5 --kind 'CANnord'
 """
 
 import argparse
@@ -40,7 +40,7 @@ from typing import Any
 from builders import (
     ACTUAL, CONTROL, CURRENT, drive, frame, INT16, INT32, parameter, RAM, RO, SPEED, STATUS, WORD,
 )
-from literal_drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
+from drives import ExtendedDrive, PkwNode, ServoDrive, StandardDrive
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest

@@ -9,9 +9,9 @@ need, that a word and its setpoints go at once, and who is answered what.
 from typing import Any
 
 from builders import CONTROL, SPEED, WORD
+from partners import Partner, PARTNERS, worries
 import pytest
 from saying import may_run, says
-from test_contract import Partner, PARTNERS, worries
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-CiA 402 drives as real CANopen stacks and devices behave, on the literal drive of literal_drives.
+CiA 402 drives as real CANopen stacks and devices behave, on the literal drive of ``drives``.
 
 Each says what showed it. What they have in common stands in :class:`ServoDrive`.
 """
@@ -8,7 +8,7 @@ Each says what showed it. What they have in common stands in :class:`ServoDrive`
 import math
 from typing import Any
 
-from literal_drives import ServoDrive
+from drives import ServoDrive
 
 from drive_can_bridge.core.frame import Frame
 
