@@ -68,6 +68,7 @@ class Destroyable:
     """Something that may be destroyed while it is in use, and then is at the end of that."""
 
     here: ClassVar[Graph]
+    pointer = 0     # of each object another one
 
     def __init__(self) -> None:
         self.graph = self.here
@@ -543,6 +544,8 @@ class EventHandle(Destroyable):
 class RequestId:
     """Which question it was, and whose."""
 
+    sequence_number = 0     # of each object another one
+
     def __init__(self, client: 'Client', number: int) -> None:
         self.client = client
         self.sequence_number = number
@@ -550,6 +553,8 @@ class RequestId:
 
 class ServiceInfo:
     """What comes with a request or a response: the base, by which rclpy recognises it."""
+
+    request_id: RequestId | None = None
 
     def __init__(self, request: RequestId, stamp: int) -> None:
         self.request_id = request

@@ -28,6 +28,7 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.sentences import (
     client_by_rclpy, commands_by_executor, rclpy_lacks, requests_by_executor, requests_hold_up)
 from drive_can_bridge.ros import bridge_node
+from drive_can_bridge.ros.rcl import end, incoming, waiting
 from drive_can_bridge.ros.rcl.extension import Extension
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
@@ -124,8 +125,10 @@ NO_WAIT = requests_by_executor('rclpy has no WaitSet any more')
     ({'WaitSet': None}, Responses, [NO_WAIT]),
     ({'WaitSet': None}, Unfitting, [NO_WAIT]),
     ({'GuardCondition': other}, Responses, [requests_by_executor(WRONG)]),
-    ({'Service': without()}, Unfitting, [requests_by_executor(
+    ({'Service': without('pointer')}, Unfitting, [requests_by_executor(
         'rclpy has no Service.service_take_request any more')]),
+    ({'Service': without('service_take_request')}, Responses, [requests_by_executor(
+        'rclpy has no Service.pointer any more')]),
     ({'EventHandle': without('take_event')}, Responses, [commands_by_executor(
         'rclpy has no EventHandle.destroy_when_not_in_use any more')]),
     ({'EventHandle': None}, Responses, [commands_by_executor(
@@ -138,7 +141,7 @@ NO_WAIT = requests_by_executor('rclpy has no WaitSet any more')
      [commands_by_executor('rclpy has no Subscription.take_message any more'),
       commands_by_executor('rclpy has no Publisher.publish_raw any more'), NO_WAIT])],
     ids=['take, answers', 'wait set', 'wait set and take', 'wait set of another kind',
-         'take at all', 'letting go of events', 'events',
+         'take at all', 'where services are', 'letting go of events', 'events',
          'messages', 'bytes', 'all of them'])
 def test_a_bridge_without(
         bridge: StartBridge, client: Client, monkeypatch: pytest.MonkeyPatch,
@@ -170,6 +173,52 @@ def test_a_bridge_without(
         one.close()
 
 
+def gone(name: str) -> dict[str, Any]:
+    """Return what there is instead, where one member is gone."""
+    owner, _, member = name.partition('.')
+    kind = getattr(real, owner)
+    return {owner: without(*{*dir(kind)} - {member, *dir(SimpleNamespace)}) if member else None}
+
+
+@pytest.mark.parametrize('name', sorted({
+    *waiting.MEMBERS, *incoming.MEMBERS, 'Publisher.publish_raw'}))
+def test_each_member_that_a_bridge_does_without_is_named(
+        client: Client, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(bridge_node, 'RclServices', Responses)
+    with instead(monkeypatch, **gone(name)):
+        bridge_node._rcl_services([], client.node.context, told.append)
+    line, = told
+    assert f'rclpy has no {name} any more' in line
+
+
+@pytest.mark.parametrize('name', end.MEMBERS)
+def test_each_member_that_a_command_does_without_is_named(
+        client: Client, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    told: list[str] = []
+    with instead(monkeypatch, **gone(name)):
+        end.TopicEnd(client.node.context, 'end', told.append).close()
+    assert told == [f'rclpy has no {name} any more']
+
+
+def test_what_is_used_is_looked_for() -> None:
+    """Each member of the extension's things that is used stands in a text, too: its name."""
+    things = [kind for kind in vars(real).values() if inspect.isclass(kind) and (
+        issubclass(kind, real.Destroyable) or kind.__name__ in (
+            'rmw_service_info_t', 'rmw_request_id_t'))]
+    members = {name for kind in things for name in dir(kind) if not name.startswith('__')} - {
+        'name'}     # of messages, which have one, too
+    assert {'pointer', 'take_message', 'request_id'} <= members
+    used, named = set(), set()
+    for path in [*(ROS / 'rcl').glob('*.py'), ROS / 'bridge_node.py']:
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Attribute) and path.parent.name == 'rcl':
+                used.add(node.attr)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                named.update(node.value.split('.'))
+    assert used & members <= named
+
+
 @pytest.mark.parametrize(('owner', 'name'), [
     (Node, '_set_parameters_atomically_common'), (ParameterService, '_get_parameters_callback'),
     (ParameterService, '_set_parameters_callback'),
@@ -196,6 +245,21 @@ def test_what_nodes_are_to_have_is_told_at_the_start(
     with pytest.raises(DriveCanError) as told:
         bridge()
     assert str(told.value) == rclpy_lacks(f'LifecycleNode.{name}')
+
+
+@pytest.mark.parametrize('name', ['available_transitions', 'current_state'])
+def test_what_their_states_are_to_have_is_told_at_the_start(
+        bridge: StartBridge, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    begin = LifecycleNode.__init__
+
+    def begun(node: LifecycleNode, *arguments: Any, **options: Any) -> None:
+        begin(node, *arguments, **options)
+        machine: Any = node._state_machine
+        node._state_machine = without(*{*dir(machine)} - {name, *dir(SimpleNamespace)})
+    monkeypatch.setattr(LifecycleNode, '__init__', begun)
+    with pytest.raises(DriveCanError) as told:
+        bridge()
+    assert str(told.value) == rclpy_lacks(f'LifecycleNode._state_machine.{name}')
 
 
 #: where rclpy may be used, and where beyond what it promises

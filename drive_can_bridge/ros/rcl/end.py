@@ -22,6 +22,7 @@ MEMBERS = (
     'Client.send_request', 'Client.take_response', 'Publisher', 'Publisher.publish',
     'Subscription', 'Subscription.take_message', 'rclpy_get_service_names_and_types',
     'rclpy_get_topic_names_and_types', 'rclpy_get_subscriptions_info_by_topic',
+    'rmw_service_info_t.request_id', 'rmw_request_id_t.sequence_number',
     *(f'{kind}.destroy_when_not_in_use'
       for kind in ('Node', 'Client', 'Publisher', 'Subscription')))
 #: what something that is not made in this way raises, or not used in this way

@@ -26,7 +26,9 @@ _OF_CLASSES: tuple[tuple[type, tuple[str, ...]], ...] = (
     (Node, ('_set_parameters_atomically_common',)),
     (ParameterService, ('_get_node', '_get_parameters_callback', '_set_parameters_callback',
                         '_set_parameters_atomically_callback')))
-_OF_NODES = '_parameter_overrides', '_service_change_state', '_state_machine'
+_OF_NODES = (
+    '_parameter_overrides', '_service_change_state', '_state_machine.available_transitions',
+    '_state_machine.current_state')
 
 
 def look() -> None:
@@ -45,7 +47,19 @@ def look_at(node: LifecycleNode) -> None:
 
     :raises Unfit: it does not; it says what.
     """
-    _complain([f'LifecycleNode.{name}' for name in _OF_NODES if not hasattr(node, name)])
+    lacking = [_lacking(node, name) for name in _OF_NODES]
+    _complain([f'LifecycleNode.{name}' for name in dict.fromkeys(lacking) if name])
+
+
+def _lacking(owner: object, name: str) -> str:
+    """Return as much of a name with dots as has not been found any more; '': all is there."""
+    found: Any = owner
+    parts = name.split('.')
+    for place, part in enumerate(parts, 1):
+        if not hasattr(found, part):
+            return '.'.join(parts[:place])
+        found = getattr(found, part)
+    return ''
 
 
 def _complain(missing: Sequence[str]) -> None:

@@ -18,7 +18,7 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 
 MEMBERS = (
     'GuardCondition', 'GuardCondition.trigger_guard_condition',
-    'GuardCondition.destroy_when_not_in_use', 'Service',
+    'GuardCondition.destroy_when_not_in_use', 'Service', 'Service.pointer',
     'WaitSet', 'WaitSet.clear_entities', 'WaitSet.add_guard_condition', 'WaitSet.add_service',
     'WaitSet.wait', 'WaitSet.get_ready_entities')
 
