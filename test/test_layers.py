@@ -261,8 +261,8 @@ def test_ros_packages_are_declared() -> None:
 # -- names ----------------------------------------------------------------------------------------
 
 #: modules that each family has under the same name; those for all families stand above them
-FLOOR_PLAN = {'control', 'family', 'observer', 'procedures', 'scanner', 'session', 'states',
-              'transactor'}
+FLOOR_PLAN = {'control', 'family', 'observer', 'options', 'prober', 'procedures', 'scanner',
+              'session', 'states', 'transactor'}
 
 
 def test_a_name_of_a_class_stands_for_one_thing() -> None:

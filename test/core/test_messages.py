@@ -336,7 +336,7 @@ LITERALS = {
     'cli/jog.py': 'what goes on', 'cli/scan.py': 'counts of what was heard; the next command',
     'cli/simulate.py': 'a remark of the simulator', 'configuration/profiles.py': 'of a file',
     'configuration/yaml_nodes.py': 'of a file', 'protocols/cia402/observer.py': 'terms',
-    'protocols/cia402/scanner.py': 'what was read', 'ros/diagnostics.py': 'a state',
+    'protocols/cia402/prober.py': 'what was read', 'ros/diagnostics.py': 'a state',
     'ros/log.py': 'the end of a line', 'simulation/simulation.py': 'a line of the simulator',
     'trace/measured.py': 'a format', 'transport/adapters.py': 'the name of a module'}
 

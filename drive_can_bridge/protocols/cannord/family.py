@@ -2,9 +2,7 @@
 """The row of the family table for CANnord, the protocol of NORD inverters."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 import re
-from typing import Literal
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -15,12 +13,13 @@ from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject, route)
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
+from drive_can_bridge.protocols.cannord.options import CannordOptions, PROBED
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES)
-from drive_can_bridge.protocols.cannord.states import PARAMETER_SETS, STATUS_BITS
+from drive_can_bridge.protocols.cannord.states import STATUS_BITS
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, option, out_of_range, ScanEntry, Talk)
+    Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s that an inverter takes at most to answer process data (BU 0060 page 50)
@@ -40,32 +39,6 @@ _COMMON_WORDS = ('raw_limits', 'neutral_raw')
 _COMMANDS = ('position_command', 'velocity_command', 'effort_command')
 
 
-@dataclass(frozen=True, slots=True)
-class CannordOptions:
-    """How an inverter is addressed, and how its frames are laid out."""
-
-    extended_identifiers: bool = option(
-        False, 'Use 29-bit identifiers: the 11-bit ones followed by 18 zero bits.')
-    broadcast: Literal['none', 'group', 'all'] = option(
-        'none', 'Send control word and setpoints in one frame for several drives: to the group of '
-        '32 addresses, or to all. The drive with the lowest station takes the commands.')
-    value_order: Literal['high_first', 'low_first'] = option(
-        'high_first', 'Which half of a parameter value comes first in the parameter frame.')
-    index_byte: Literal['low', 'high'] = option(
-        'low', 'Which byte of IND carries the sub-index: low is byte 2, high byte 3.')
-    swap_setpoints_2_3: bool = option(
-        False, 'Words 3 and 4 of the 8-byte process frames change places (SK 300E, SK 700E, '
-        'SK 750E).')
-    extra_setpoints: bool = option(
-        False, 'SK 540E, SK 545E: setpoints and actual values 4 and 5 travel in a frame of 5 '
-        'bytes after the main one.')
-    parameter_set: int = option(
-        1, 'Parameter set that the control word chooses.', minimum=1, maximum=PARAMETER_SETS)
-    persist_writes: bool = option(
-        False, 'Write parameters without storage in the profile to EEPROM (true) or to RAM only '
-        '(false).')
-
-
 def _placeable(drives: Sequence[DriveConfiguration]) -> list[DriveConfiguration]:
     """Return the drives whose station exists; for the others there are no identifiers."""
     return [drive for drive in drives if 0 <= drive.station <= ADDRESS_MAX]
@@ -80,7 +53,7 @@ class Cannord(Family):
     builtin_names = frozenset((STATUS_NAME,))
     status_bits = STATUS_BITS
     options_type = CannordOptions
-    probed = ('value_order', 'index_byte')
+    probed = PROBED
     scan_entry = ScanEntry('inverter', 'nord_sk500e', ('frequency_setpoint',),
                            ('actual_frequency',))
 
@@ -153,7 +126,8 @@ class Cannord(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cannord.observer import CannordObserver
-        from drive_can_bridge.protocols.cannord.scanner import CannordProber, CannordScanner
+        from drive_can_bridge.protocols.cannord.prober import CannordProber
+        from drive_can_bridge.protocols.cannord.scanner import CannordScanner
         from drive_can_bridge.protocols.cannord.session import CannordSession
         return Talk(CannordSession, CannordObserver, CannordScanner, CannordProber)
 

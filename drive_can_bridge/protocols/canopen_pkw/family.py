@@ -2,52 +2,27 @@
 """The row of the family table for the CANopen PKW mailbox."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
+from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.process_image import control_word
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.addressing import (
-    node_claims, NodeOptions, predefined_set, reserved_claims, station_complaints)
+    node_claims, predefined_set, reserved_claims, station_complaints)
 from drive_can_bridge.protocols.canopen.masters import NMT_ROUTE, sdo_route
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
+from drive_can_bridge.protocols.canopen_pkw.options import PkwOptions, PROBED
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, ImportRules, option, ScanEntry, Talk)
+    Claim, Complaint, Family, ImportRules, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 from drive_can_bridge.protocols.polled_exchange import round_time
 
 #: of every frame of the mailbox
 FRAME_BITS = worst_bits(pkw.PAYLOAD, extended=False)
-
-
-@dataclass(frozen=True, slots=True)
-class PkwOptions(NodeOptions):
-    """Where the mailbox is, and how its bytes are laid out."""
-
-    layout: Literal['word_le', 'dword_swapped', 'word_be'] = option(
-        'word_le', 'Place of the bytes in the PDO: word_le (every word low byte first), '
-        'dword_swapped (words of each pair change places), word_be (every word high byte first).')
-    word_order: Literal['high_first', 'low_first'] = option(
-        'high_first', 'Which word of a 32-bit value comes first (lower register); a parameter of '
-        'the profile may override it.')
-    abort_code_order: Literal['auto', 'low_first', 'high_first'] = option(
-        'auto', 'Which half of an abort code word 3 holds; auto finds out.')
-    addressing: Literal['register', 'canopen'] = option(
-        'register', 'register: parameters are reached by number; canopen: by index and subindex.')
-    request_cob_id: int = option(
-        None, 'Identifier of requests to the device (receive PDO4); by default 500h + node.',
-        minimum=1, maximum=STANDARD_IDENTIFIER_MAX)
-    response_cob_id: int = option(
-        None, 'Identifier of responses (transmit PDO4); by default 480h + node.',
-        minimum=1, maximum=STANDARD_IDENTIFIER_MAX)
-    refresh_interval: float = option(
-        1.0, 's: unchanged values of cyclic_request are written again this often; 0: only on '
-        'change.', minimum=0, maximum=3600)
 
 
 class CanopenPkw(Family):
@@ -59,7 +34,7 @@ class CanopenPkw(Family):
     drive_defaults = {'parameter_timeout': 0.5}
     options_type = PkwOptions
     on_canopen = True
-    probed = ('layout', 'word_order', 'abort_code_order')
+    probed = PROBED
     scan_entry = ScanEntry('starter', 'tesys_t_ltmr', response=('system_status_1',))
     import_rules = ImportRules(
         choices=({'addressing': 'register'}, {'addressing': 'canopen'}), elements=False,
@@ -143,7 +118,8 @@ class CanopenPkw(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.canopen_pkw.observer import PkwObserver
-        from drive_can_bridge.protocols.canopen_pkw.scanner import CanopenScanner, PkwProber
+        from drive_can_bridge.protocols.canopen_pkw.prober import PkwProber
+        from drive_can_bridge.protocols.canopen_pkw.scanner import CanopenScanner
         from drive_can_bridge.protocols.canopen_pkw.session import PkwSession
         return Talk(PkwSession, PkwObserver, CanopenScanner, PkwProber)
 

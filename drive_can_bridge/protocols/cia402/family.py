@@ -2,8 +2,7 @@
 """The row of the family table for drives of CiA 402."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -13,16 +12,17 @@ from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
-    node_claims, NodeOptions, object_of_name, reserved_claims, station_complaints)
+    node_claims, object_of_name, reserved_claims, station_complaints)
 from drive_can_bridge.protocols.canopen.masters import NMT_ROUTE
 from drive_can_bridge.protocols.canopen.network import NODE_MAX
 from drive_can_bridge.protocols.cia402 import pdo
+from drive_can_bridge.protocols.cia402.options import Cia402Options, PROBED
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of,
     STATUS_BITS, STATUS_PARAMETER, STATUS_WORD)
 from drive_can_bridge.protocols.family import (
-    Claim, Complaint, Family, ImportRules, IntegerList, ModeKey, option, ScanEntry, Talk)
+    Claim, Complaint, Family, ImportRules, ModeKey, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
 
 #: s: periods of which the jitter of a process without a real-time kernel is a good part
@@ -36,50 +36,6 @@ _LISTS = (('request_pdos', 'cyclic_request', CONTROL_PARAMETER),
           ('response_pdos', 'cyclic_response', STATUS_PARAMETER))
 _HEARTBEAT = worst_bits(1, extended=False)
 _SYNC = worst_bits(0, extended=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Cia402Options(NodeOptions):
-    """What the drive does, how its PDOs travel, and who watches whom."""
-
-    mode: Literal['csp', 'csv', 'cst', 'pp', 'pv', 'tq', 'vl', 'ip'] = option(
-        None, 'Mode of operation, written to 6060h; its setpoint has to be in cyclic_request.')
-    mapping: Literal['configure', 'verify', 'assume'] = option(
-        'configure', 'What becomes of the PDOs: configure (written, each read back), verify '
-        '(read; not cycled where they differ), assume (not looked at).')
-    request_pdos: IntegerList = option(
-        (), 'Numbers of the receive PDOs to be filled, in order: control word, then '
-        'cyclic_request; none: as many as needed, from 1.', minimum=1, maximum=PDO_MAX)
-    response_pdos: IntegerList = option(
-        (), 'Numbers of the transmit PDOs to be filled, in order: status word, then '
-        'cyclic_response; none: as many as needed, from 1.', minimum=1, maximum=PDO_MAX)
-    transmission: Literal['sync', 'event'] = option(
-        'sync', 'sync: one SYNC a period and bus; event: the drive sends by its event timer.')
-    heartbeat_producer: float = option(
-        0.1, 's between heartbeats of the drive, written to 1017h; 0: left alone.', minimum=0,
-        maximum=65.535)
-    heartbeat_timeout: float = option(
-        0.35, 's without heartbeat until the drive counts as offline; 0: not watched.', minimum=0,
-        maximum=3600)
-    ramp_bits: bool = option(
-        True, 'Mode vl: enabled by 007Fh (ramp generator enabled, unlocked, its input taken); '
-        'false: by 000Fh.')
-    bridge_heartbeat: float = option(
-        0.2, 's between heartbeats of the bridge, which the drive watches (1016h) for three times '
-        'as long; 0: off.', minimum=0, maximum=20)
-    bridge_node: int = option(
-        NODE_MAX, 'Node-ID of the bridge, for its heartbeat.', minimum=1, maximum=NODE_MAX)
-    disable_word: Literal['disable_operation', 'shutdown', 'disable_voltage'] = option(
-        'disable_operation', 'What disable and the stop send to an enabled drive: 0007h (brakes '
-        'as its 605Ch says), 0006h (as 605Bh says, usually coasts), 0000h (coasts).')
-    homing: bool = option(False, 'Offer ~/home.')
-    homing_timeout: float = option(
-        60.0, 's until a homing that has not ended counts as failed.', minimum=0.1, maximum=3600)
-    nmt_start: bool = option(
-        True, 'Send NMT: pre-operational for the set-up, start behind it, again after a boot-up, '
-        'at most once a second while it is offline, and pre-operational before a stop to a node '
-        'that NMT has stopped. false: none, and the mapping is written only where the node is '
-        'found pre-operational.')
 
 
 class Cia402(Family):
@@ -96,7 +52,7 @@ class Cia402(Family):
         'target_position', 'interpolation_target', 'target_velocity', 'target_torque',
         'vl_target_velocity'))
     on_canopen = True
-    probed = ('mode', 'mapping', 'disable_word', 'bridge_heartbeat')
+    probed = PROBED
     scan_entry = ScanEntry('axis', 'cia402_servo', ('target_velocity',), ('actual_velocity',))
     import_rules = ImportRules(
         eds_objects=(CONTROL_WORD, STATUS_WORD), eds_profile=scan_entry.profile)
@@ -203,7 +159,8 @@ class Cia402(Family):
 
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.cia402.observer import Cia402Observer
-        from drive_can_bridge.protocols.cia402.scanner import Cia402Prober, Cia402Scanner
+        from drive_can_bridge.protocols.cia402.prober import Cia402Prober
+        from drive_can_bridge.protocols.cia402.scanner import Cia402Scanner
         from drive_can_bridge.protocols.cia402.session import Cia402Session
         return Talk(Cia402Session, Cia402Observer, Cia402Scanner, Cia402Prober)
 

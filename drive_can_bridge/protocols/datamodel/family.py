@@ -13,7 +13,7 @@ from drive_can_bridge.protocols.datamodel import standard_round
 from drive_can_bridge.protocols.datamodel.extended import (
     CYCLIC_PARAMETER, PAYLOAD, SLOTS, STATION_MASK, STATION_MAX, STATION_SHIFT)
 from drive_can_bridge.protocols.datamodel.options import (
-    ExtendedOptions, NUMBER_MAX, REQUEST_MAP_BASE, RESPONSE_MAP_BASE, StandardOptions)
+    ExtendedOptions, NUMBER_MAX, PROBED, REQUEST_MAP_BASE, RESPONSE_MAP_BASE, StandardOptions)
 from drive_can_bridge.protocols.family import (
     Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
 
@@ -115,7 +115,7 @@ class DataModelStandard(Family):
     cyclic = False
     widths = frozenset((16,))
     options_type = StandardOptions
-    probed = ('parameter_offset',)
+    probed = PROBED[:1]     # no cyclic telegrams, whose maps would count
     scan_entry = ScanEntry('drive_std')
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
@@ -145,7 +145,8 @@ class DataModelStandard(Family):
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.standard_session import StandardSession
         from drive_can_bridge.protocols.datamodel.observer import StandardObserver
-        from drive_can_bridge.protocols.datamodel.scanner import standard_prober, StandardScanner
+        from drive_can_bridge.protocols.datamodel.prober import standard_prober
+        from drive_can_bridge.protocols.datamodel.scanner import StandardScanner
         return Talk(StandardSession, StandardObserver, StandardScanner, standard_prober)
 
     def _check_station(self, drive: DriveConfiguration) -> Iterator[Complaint]:
@@ -184,7 +185,7 @@ class DataModelExtended(Family):
     cyclic = True
     widths = frozenset((16,))
     options_type = ExtendedOptions
-    probed = ('parameter_offset', 'cyclic_request', 'cyclic_response')
+    probed = PROBED
 
     def check(self, drive: DriveConfiguration) -> Iterator[Complaint]:
         yield from out_of_range('station', drive.station, 1, STATION_MAX, f' ({self.name})')
@@ -210,7 +211,8 @@ class DataModelExtended(Family):
     def talk(self) -> Talk:
         from drive_can_bridge.protocols.datamodel.extended_session import ExtendedSession
         from drive_can_bridge.protocols.datamodel.observer import ExtendedObserver
-        from drive_can_bridge.protocols.datamodel.scanner import extended_prober, ExtendedScanner
+        from drive_can_bridge.protocols.datamodel.prober import extended_prober
+        from drive_can_bridge.protocols.datamodel.scanner import ExtendedScanner
         return Talk(ExtendedSession, ExtendedObserver, ExtendedScanner, extended_prober)
 
     def _check_slots(self, drive: DriveConfiguration) -> Iterator[Complaint]:

@@ -21,6 +21,8 @@ from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.standard import REQUEST_ID_BASE, RESPONSE_ID_BASE
 from drive_can_bridge.protocols.family import option
 
+#: those that a prober settles
+PROBED = ('parameter_offset', 'cyclic_request', 'cyclic_response')
 REQUEST_MAP_BASE = 122
 RESPONSE_MAP_BASE = 126
 
