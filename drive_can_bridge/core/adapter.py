@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What of a CAN adapter decides whether drives can be driven through it."""
+"""The properties of a CAN adapter that decide whether drives can be driven through it."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from drive_can_bridge.core.frame import Route
 
 
 class Dropped(NamedTuple):
-    """Frames that an adapter takes, and never sends."""
+    """Frames that an adapter accepts and never sends."""
 
     what: str
     route: Route
@@ -17,7 +17,7 @@ class Dropped(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class AdapterTraits:
     """
-    What is known of the adapter of a bus.
+    The known properties of the adapter of a bus.
 
     :param title: what people call it.
     :param latency: s that it may keep what it has received.

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Which bridges commands may take for one: the same rules for all ways to them."""
+"""Which bridges a command may treat as one: the same rules for ROS and for the local way."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -9,11 +9,11 @@ from drive_can_bridge.core.text import is_pattern
 
 
 class UnknownDrive(DriveCanError):
-    """A word names no drive."""
+    """A word is the name of no drive."""
 
 
 def stand_apart(names: Sequence[str]) -> str:
-    """Say why bridges do not stand together; '': they do."""
+    """Return why bridges cannot be treated as one; '' if they can."""
     if len({name.rpartition('/')[0] for name in names}) > 1:
         return sentences.several_bridges(names)
     twice = next((name for name in names if names.count(name) > 1), '')
@@ -22,7 +22,7 @@ def stand_apart(names: Sequence[str]) -> str:
 
 def must_stand_together(names: Sequence[str]) -> None:
     """
-    Make sure that bridges are in one namespace, each with a name of its own.
+    Check that bridges are in one namespace, each with a name of its own.
 
     :raises WhichBridge: they are not.
     """
@@ -57,7 +57,7 @@ def chosen_drives(words: Sequence[str], namespace: str | None,
     :param words: names, patterns or full names; a full name says which bridge is meant.
     :param known: returns the full names of all drives in a namespace, or in those of a pattern;
         None: in the only one.
-    :param matches: tells whether a word means a drive.
+    :param matches: returns whether a word means a drive.
     :raises UnknownDrive: a word names none.
     """
     nodes: dict[str, None] = {}

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is said to people of buses and adapters: every sentence, by its code.
+Texts about buses and adapters, each with its code.
 
-Rows as in :mod:`.sentences`. What an adapter, its library or the kernel says itself stands in them
+Rows as in :mod:`.sentences`. The words of an adapter, its library or the kernel stand in them
 as it is.
 """
 
@@ -12,7 +12,7 @@ from drive_can_bridge.core.messages import catalogue, Text
 
 
 class BusLoss(Enum):
-    """What a reason why a bus is down says of its adapter."""
+    """What the reason of a lost bus shows of its adapter."""
 
     UNPLUGGED = 'it has gone, and the bus goes on when it is back'
 
@@ -101,7 +101,7 @@ controller_bus_off = Text(
     do='check cable, shield, termination and bit rate, then run these commands')
 not_read_yet = Text('not read yet', do='wait a moment')
 
-# -- buses and adapters: what to look at, and what becomes of frames ------------------------------
+# -- buses and adapters: what to check, and what happens to frames --------------------------------
 nobody_acknowledges = Text(
     'no other node acknowledges: check that one is switched on, cable, termination and bit rate',
     do='switch on a drive; check cable, termination (120 ohms at both ends) and bit rate')
@@ -131,7 +131,7 @@ more_not_shown = Text(
     '{line} (more like it are not shown)',
     do='see what the lines before say')
 
-# -- drive_can adapters: what it says of an adapter -----------------------------------------------
+# -- drive_can adapters: texts on an adapter ------------------------------------------------------
 switch_on = Text('switch it on: {how_up}', do='run that command as root')
 behind_port_unknown = Text(
     'what is behind this port does not show: an SLCAN adapter is written so',

@@ -31,7 +31,7 @@ def code_of(text: str) -> str:
 
 
 def make_ready() -> None:
-    """Make what saying takes now: who has to go on without new memory says things, too."""
+    """Prepare all texts now: some are written when no memory is left."""
     for rows in CODES.values():
         for row in rows.values():
             row.make_ready()

@@ -1,13 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-How old a command is, by the clocks of two hosts, which are no measure that stays.
+How old a command is, by the clocks of two hosts, whose difference does not stay the same.
 
 What its publisher's clock showed when a command was published, and this machine's when it
 arrived, differ by its way and by the clocks. So what counts is by how much that age exceeds the
-smallest of its topic: a command that waited somewhere (a process that stood still, a network that
-was away) is told from a fresh one by that. But quartzes differ (50 ppm are 0.25 s in 83 minutes),
+smallest of its topic: a command that waited somewhere (a stalled process, a network that
+was away) differs from a fresh one in that. But quartzes differ (50 ppm are 0.25 s in 83 minutes),
 and clocks are set: so the smallest age rises, and where nothing but a clock can be the reason, or
-nothing else comes, the topic begins again.
+nothing else comes, the topic starts over.
 """
 
 from enum import Enum
@@ -19,7 +19,7 @@ LATENESS_MAX = 250_000_000
 RISE = 5000
 #: ns for which everything that comes is too late, by figures so close, before it is the measure
 STEADY_TIME, STEADY_BAND = 10_000_000_000, 100_000_000
-#: publishers whose last stamp is kept; those that are gone are not known as such
+#: publishers whose last stamp is kept; one that has left is not recognised as such
 PUBLISHERS_MAX = 64
 
 #: stands for the gid of the only publisher of a topic, where the middleware names none
@@ -27,7 +27,7 @@ ALONE = b'alone'
 
 
 class Age(Enum):
-    """What the age of a command says."""
+    """The result of judging the age of a command."""
 
     FRESH = 'fresh'
     LATE = 'late'
@@ -40,7 +40,7 @@ class Age(Enum):
 
 
 class AgeVerdict(NamedTuple):
-    """What a command's age says, and the figure to it in s."""
+    """The judged age of a command, and the figure to it in s."""
 
     age: Age
     seconds: float
@@ -65,7 +65,7 @@ class CommandAges:
         self.forget()
 
     def forget(self) -> None:
-        """Record that nobody publishes here any more: the next one has a clock of its own."""
+        """Record that there is no publisher any more: the next one has a clock of its own."""
         self._smallest: int | None = None
         self._smallest_at = 0
         self._stamps: dict[bytes, int] = {}     # the last, by publisher
@@ -76,7 +76,7 @@ class CommandAges:
 
     def look(self, now: int, ahead: int) -> None:
         """
-        Begin a look at what waits.
+        Note the time before the waiting commands are judged.
 
         :param now: the steady time.
         :param ahead: by how much the time of the day is ahead of it.
@@ -136,7 +136,7 @@ class CommandAges:
         return before
 
     def _is_steady(self, lateness: int, now: int) -> bool:
-        """Take a command that is late; tell whether all were so for long, by the same figure."""
+        """Record a late command; return whether all were late for long, by the same figure."""
         if self._run is not None:
             since, least, most = self._run
             least, most = min(least, lateness), max(most, lateness)
@@ -148,7 +148,7 @@ class CommandAges:
 
     def _begin(self, why: Age, figure: int, source: int, arrived: int,
                publisher: bytes | None) -> AgeVerdict:
-        """Have a command be the first of its topic."""
+        """Start over with a command as the first of its topic."""
         self.forget()
         self._stamp(publisher, source)
         if not self._moved and self._now is not None:

@@ -3,9 +3,9 @@
 Whether the commands of users reach a drive.
 
 Setpoints move a drive only while its control word lets them: a drive that is commanded while it is
-disabled would jump at the moment of ``~/enable``. So commands are taken while the drive exchanges
-process data and operates, and everything is neutral otherwise. What is neutral for an axis that
-has to stay where it is depends on where it is, and on nothing driving it.
+disabled would jump at the moment of ``~/enable``. So commands are accepted while the drive
+exchanges process data and operates, and everything is neutral otherwise. What is neutral for an
+axis that has to stay where it is depends on where it is, and on nothing driving it.
 """
 
 from collections.abc import Sequence
@@ -21,14 +21,14 @@ from drive_can_bridge.core.setpoints import Setpoints
 
 
 class DriveStatus(Protocol):
-    """Where a session stands with its drive; the session itself."""
+    """The state of a drive, as its session knows it."""
 
     active: bool
     online: bool
 
     @property
     def error(self) -> Sentence:
-        """Why a drive that is online must not be driven; '' if it may."""
+        """Why a drive that is online must not be driven; '' if it may be."""
 
 
 class CommandInterlock:
@@ -69,11 +69,11 @@ class CommandInterlock:
 
     @property
     def position_unknown(self) -> bool:
-        """Nothing may be sent: where the axis is, nobody knows, and it would go there."""
+        """Whether nothing may be sent: the axis would jump, because its position is unknown."""
         return self._control is None and not self._setpoints.known
 
     def follow(self) -> None:
-        """Report what the control machine noted, and take commands as it lets them."""
+        """Report the notes of the control machine, and update whether commands are accepted."""
         if self._control is not None:
             for note in self._control.take_notes():
                 # during a stop, it is what everybody expects
@@ -81,13 +81,13 @@ class CommandInterlock:
         self._allow()
 
     def _allow(self) -> None:
-        """Take commands while they may move the drive, and only then: otherwise it is neutral."""
+        """Accept commands only while they may move the drive; otherwise it stays neutral."""
         presence, obeyed = self._presence, self.obeyed
         self._setpoints.allow(presence.online and presence.active and not self._held and (
             obeyed is None or obeyed.operating) and not presence.error)
 
     def hold(self, held: bool) -> None:
-        """Be neutral and disarmed, and take no commands, or take them again."""
+        """Go neutral and refuse commands while held; accept them again afterwards."""
         self._held = held
         self._allow()
 
@@ -101,9 +101,9 @@ class CommandInterlock:
 
     def status(self, raw: int | None, now: float) -> None:
         """
-        Take the status word of a response; None: it lacks it.
+        Handle the status word of a response; None: the response lacks it.
 
-        A drive that does not say any more whether it is enabled is not driven on.
+        A drive that no longer reports whether it is enabled is not driven any further.
         """
         control = self._control
         if control is None:
@@ -115,18 +115,18 @@ class CommandInterlock:
             control.drop(sentences.status_missing(self._lacking))
 
     def measured(self, raws: Sequence[int | None]) -> None:
-        """Take a sample, for setpoints that stay where the axis is; after its status word."""
+        """Handle a sample, for setpoints that follow the axis; after its status word."""
         if not self._setpoints.held:
             return
         control = self._control
-        # once the word may have started the drive, only a status as new as the position tells
+        # once the word may have started the drive, only a status as new as the position counts
         free = control is not None and control.loose and (
             control.at_rest and self._presence.active or self._status_in_sample)
         if self._setpoints.measure(raws, driven=not free):
             self._allow()
 
     def expire(self, now: float) -> bool:
-        """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
+        """Disarm setpoints that no fresh command keeps; return whether there were any."""
         expired = self._setpoints.expire(now)
         if expired:
             self._report.expired(expired)

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What commands, traces, imports and the panel say to people: every sentence, by its code.
+Texts of commands, traces, imports and the panel, each with its code.
 
-Rows as in :mod:`.sentences`; where a row says nothing else, what to do is part of its text. Help
+Rows as in :mod:`.sentences`; where a row has no advice, what to do is part of its text. Help
 texts stand with their options.
 """
 
@@ -158,7 +158,7 @@ not_writable = Text(
     do='choose another directory, or ask for the right to write there')
 is_a_directory = Text('{file}: is a directory', do='write the name of a file')
 
-# -- drive_can backup, restore, compare: what they say of settings --------------------------------
+# -- drive_can backup, restore, compare: texts on settings ----------------------------------------
 no_file_written = Text(
     '{drive}: no file was written{advice}',
     do='see why these could not be read; --partial writes what was read')
@@ -237,7 +237,7 @@ waiting_for_drive = Text(
     '{drive}: answers no more; waiting up to {patience:g} s for it, so that {aim}',
     do='see what it does; power it up again where it stays silent')
 
-# -- drive_can scan, record, monitor: what they say of a bus --------------------------------------
+# -- drive_can scan, record, monitor: texts on a bus ----------------------------------------------
 probe_unacknowledged = Text(
     'bus {bus}: {error}: no other node acknowledges',
     do='switch on the drive; check cable, termination and bit rate')
@@ -289,7 +289,7 @@ internal_error_of_bridge = Text(
     'drive_can_bridge: internal error, please report it: {kind}: {text}',
     do='report it, with the log of the bridge')
 
-# -- traces: what is wrong with a file, and what a recorder says ----------------------------------
+# -- traces: what is wrong with a file, and messages of a recorder --------------------------------
 trace_bytes_damaged = Text(
     '{count} bytes are damaged',
     do='nothing: the rest is read; record again where these matter')

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What can be wrong with a configuration or a profile: every sentence, by its code.
+What can be wrong with a configuration or a profile, each with its code.
 
 Rows as in :mod:`.sentences`; what to do is part of the text, which says what is allowed. The
 place of the problem is not part of it.
@@ -755,13 +755,13 @@ def _meant(word: str, known: Iterable[str]) -> str | None:
 
 
 def hint(word: str, known: Iterable[str]) -> Sentence:
-    """Write the known word that is meant as a remark in brackets, or nothing."""
+    """Return the known word that was probably meant, in brackets; empty if there is none."""
     match = _meant(word, known)
     return near(word=match) if match else NOTHING
 
 
 def suggestion(word: str, known: Iterable[str]) -> Sentence:
-    """Write the end of a sentence on an unknown word: the nearest known one, or all."""
+    """Return the end of a sentence on an unknown word: the nearest known one, or all."""
     words = list(known)
     match = _meant(word, words)
     if match is not None:
@@ -773,7 +773,7 @@ def suggestion(word: str, known: Iterable[str]) -> Sentence:
 
 
 def suggestion_of_profile(word: str, known: Iterable[str], profile: str) -> Sentence:
-    """Write the same about a name that a profile lacks, of which there may be hundreds."""
+    """Return the same about a name that a profile lacks, where there may be hundreds."""
     words = list(known)
     if len(words) <= _NAMES_MAX or _meant(word, words) is not None:
         return suggestion(word, words)

@@ -2,7 +2,7 @@
 """
 The checked configuration, as the rest of the program receives it.
 
-Times are seconds. Everything in here has passed every check: nobody downstream checks again. A
+Times are seconds. Everything in here has passed every check and is not checked again. A
 joint has SI units: angles in rad, speeds in rad/s; effort stays in the profile's unit.
 """
 
@@ -45,12 +45,12 @@ class BusConfiguration:
 
     @property
     def place(self) -> str:
-        """Name the bus as people do, printable: ``slcan /dev/ttyACM0``."""
+        """The bus as shown to people, printable: ``slcan /dev/ttyACM0``."""
         return printable(f'{self.interface} {self.channel}')
 
     @property
     def wire(self) -> str:
-        """What is the same for buses that are one for sure; an option may name an adapter."""
+        """Equal for two entries that are certainly the same bus; an option may name an adapter."""
         return f'{self.interface} {self.channel} {sorted(self.options.items())}'
 
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The position of an axis that turns on and on, of a counter that wraps.
+The position of an axis that turns without end, from a counter that wraps.
 
 Differences from sample to sample are taken modulo the width of the counter and added up, so that a
-joint goes on where the counter begins again. Between two samples the axis turns by less than half
-of that; configuration checks see to it.
+joint goes on where the counter wraps. Between two samples the axis turns by less than half
+of that; the configuration is checked for it.
 """
 
 from drive_can_bridge.core.configuration import JointConfiguration
@@ -13,7 +13,7 @@ from drive_can_bridge.core.parameters import Parameter
 
 def steps_of(parameter: Parameter, continuous: bool | int) -> int:
     """
-    Return after how many raw steps a counter begins again.
+    Return after how many raw steps a counter wraps.
 
     :param continuous: the key of the joint: an integer is their number; else the width counts.
     """
@@ -38,7 +38,7 @@ class ContinuousPosition:
         self.begun_again = False
 
     def take(self, raw: int) -> int:
-        """Return the raw integer without wraps that a sample stands for."""
+        """Add a raw sample; return its position without wraps."""
         last, self._last = self._last, raw
         self.begun_again = last is None and self._begun
         if last is None:
@@ -49,5 +49,5 @@ class ContinuousPosition:
         return self._sum
 
     def begin_again(self) -> None:
-        """Take the drive's own value with the next sample: it was away, or was homed."""
+        """Start over from the next sample: the drive was offline, or was homed."""
         self._last = None

@@ -3,20 +3,20 @@
 What can be asked of a drive beyond parameters: ``~/enable``, ``~/reset_fault``, ``~/quick_stop``.
 
 What a request does, step by step, is a table, :data:`STEPS`: which control word is sent, what the
-status has to say, and what follows then. Which of two requests gives way is another,
+status has to show, and what follows then. Which of two requests gives way is another,
 :data:`MEETINGS`. :class:`.ControlMachine` goes by them; here stands why they are as they are.
 
-Which word serves an action, the profile's table says. Where the next word depends on what the
+The profile's table has the word for each action. Where the next word depends on what the
 drive reports (CiA 402: 0007h before 000Fh), a family hands in rules of its own.
 
 Every other end of a request (time-out, fault, withdrawal, replacement) is a failure and leaves
-``disable``; but a drive that says that it still brakes when the time is over keeps its quick
-stop until it lets go: ``disable`` may let it coast. So ``enable`` is on the bus only for the sake
+``disable``; but a drive that reports that it still brakes when the time is over keeps its quick
+stop until it lets go: ``disable`` may let it coast. So ``enable`` is on the bus only because
 of an ENABLE that nothing has ended since; a fault, or a drive that drops out of ``enabled`` by
 itself, ends it like a stop does.
 
 *Which status counts.* A status word confirms something only if it arrived after the current
-control word had left; what was on its way before that tells of older times. A fault counts
+control word had left; what was on its way before is older. A fault counts
 always. For the same reason an enabled drive is found "enabled already" only while the control
 word is ``enable``: under ``disable`` such a status is about to be outdated, and ENABLE waits for
 the drive to let go first.
@@ -25,25 +25,25 @@ the drive to let go first.
 answered together, at the first one's deadline at the latest. Of two different ones:
 
 * DISABLE and QUICK_STOP take effect at once, whatever they interrupt, each other included: the
-  newest word of somebody who wants the drive to stop is the one to obey.
+  newest request to stop the drive is obeyed.
 * ENABLE and RESET_FAULT are refused while a DISABLE or QUICK_STOP is under way: no start cuts a
   stop short. (A RESET_FAULT with nothing to reset succeeds without disturbing the stop.)
 * RESET_FAULT replaces an ENABLE, and the other way round as far as there is no fault.
 
 A request that is refused changes nothing.
 
-*Quick stop of a drive without a word for it* is a DISABLE, which the answer says.
+*Quick stop of a drive without a word for it* is a DISABLE, and the answer reports so.
 
 *Quick stop of a drive that does not run* is a DISABLE: answered at once where that is known, and
 otherwise as soon as the drive confirms it. The same goes for a faulted drive, whose control word
 is ``disable`` in any case; but not for others that share its control word, as long as they run.
 
-*What a profile does not tell.* Where a condition is missing in the profile, having sent the word
-is all the confirmation there is, and the answer says so. A quick stop then keeps its word for the
+*What a profile leaves out.* Where a condition is missing in the profile, having sent the word is
+all the confirmation there is, and the answer reports so. A quick stop then keeps its word for the
 whole time-out, although it is answered at once: ``disable`` right after it would end the braking
 before it began. A drive that does not report faults gets the reset pulse in any case.
 
-*The pulse.* What nobody acknowledges may get lost, and a drive may look at its control word
+*The pulse.* What is not acknowledged may get lost, and a drive may look at its control word
 seldom: so the word leaves :data:`RESET_CYCLES` times, and its sender lets little time pass
 between them (:attr:`.ControlMachine.pulsing`). Where a write is acknowledged, one is enough. The
 pulse is the same whether or not the fault goes meanwhile; what counts is the status after it.
@@ -52,10 +52,10 @@ pulse is the same whether or not the fault goes meanwhile; what counts is the st
 (:mod:`.status_reports`). ENABLE wants all of them to be there, and ends when one is lost.
 
 *A drive that takes no notice.* A word that is written when it changes may get lost on the way.
-:attr:`.ControlMachine.unconfirmed` tells the session that the drive, by what it reports since,
-does not do as the word says: then the word is written again. A drive that goes on running under
-a word that stops it for longer than a request may take is told of
-(:attr:`.ControlMachine.disregard`). One that says that it refuses the word
+:attr:`.ControlMachine.unconfirmed` shows the session that the drive, by what it reports since,
+does not follow the word: then the word is written again. A drive that goes on running under
+a word that stops it for longer than a request may take is reported
+(:attr:`.ControlMachine.disregard`). One that reports that it refuses the word
 (:meth:`.ControlMachine.word_refused`) ends what is under way, with its reason.
 """
 
@@ -68,7 +68,7 @@ from drive_can_bridge.core.profile import ControlTable
 
 
 class ControlAction(Enum):
-    """What can be asked of a drive; also names the control words of a profile."""
+    """The control actions of a drive; also the names of control words in a profile."""
 
     ENABLE = 'enable'
     DISABLE = 'disable'
@@ -80,7 +80,7 @@ class ControlAction(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlRequest:
-    """Somebody asks for something; answered exactly once. Equal only to itself."""
+    """A request for a control action; answered exactly once. Equal only to itself."""
 
     action: ControlAction
 
@@ -108,7 +108,7 @@ class Seen(Enum):
     """
     What a step waits for.
 
-    What the status has to say counts from drives that know the current word; where the profile
+    The status counts from drives that know the current word; where the profile
     has no condition for it, that the word has left is all there is.
     """
 
@@ -122,7 +122,7 @@ class Seen(Enum):
 
 
 class Then(Enum):
-    """What follows."""
+    """What a step does when all its conditions are seen."""
 
     SEND_ENABLE = 'enable becomes the word'
     SEND_RESET = 'the pulse becomes the word'
@@ -167,7 +167,7 @@ STEPS: tuple[ControlStep, ...] = (
 
 
 class Meeting(Enum):
-    """What becomes of a request while another is under way."""
+    """What happens to a request while another is under way."""
 
     JOINS = 'both are answered together'
     REPLACES = 'the one under way fails'
@@ -176,7 +176,7 @@ class Meeting(Enum):
 
 _JOINS, _REPLACES, _REFUSED = Meeting.JOINS, Meeting.REPLACES, Meeting.REFUSED
 
-#: (request, the one under way) -> what becomes of it
+#: (request, the one under way) -> what happens to it
 MEETINGS: dict[tuple[ControlAction, ControlAction], Meeting] = {
     (request, under_way): meeting
     for request, row in {
@@ -195,7 +195,7 @@ class TableRules:
     One word for each action, as the table has them.
 
     :ivar known: the actions that there is a word for.
-    :ivar may_run: whatever the drive reports, it may be as old as before a word that started it.
+    :ivar may_run: a status may be older than the word that started the drive.
     """
 
     def __init__(self, table: ControlTable) -> None:
@@ -215,7 +215,7 @@ class TableRules:
         return self._words[sending]
 
     def rests(self, word: int) -> bool:
-        """Return whether a word tells the drive to stand still."""
+        """Return whether a word commands the drive to stand still."""
         return word == self._words[ControlAction.DISABLE]
 
     def left(self, word: int) -> None:
@@ -223,17 +223,17 @@ class TableRules:
 
     def reported(self, raw: int, *, behind: bool) -> None:
         """
-        Take a status word.
+        Record a status word.
 
         :param behind: it arrived after the current word had left.
         """
 
     def forget(self) -> None:
-        """Record that nothing is known of the drive."""
+        """Record that the state of the drive is unknown."""
 
     @property
     def holds(self) -> Sentence:
-        """What is answered to a quick stop in which the drive stays; '' if it does not."""
+        """The answer to a quick stop in which the drive stays; '' if it does not."""
         return NOTHING
 
     @property
@@ -242,14 +242,14 @@ class TableRules:
         return NOTHING
 
     def remark(self, sending: ControlAction) -> Sentence:
-        """Say what else is known of why a drive does not do what is wanted; '' for nothing."""
+        """Return why a drive does not follow, as far as the family knows; '' for nothing."""
         return NOTHING
 
     def proviso(self) -> Sentence:
-        """Say, once, what is not known of a request that succeeds; '' for nothing."""
+        """Return, once, what is not known of a request that succeeds; '' for nothing."""
         return NOTHING
 
     @property
     def loose(self) -> bool:
-        """Nothing holds the axis in its place although the drive is enabled."""
+        """Whether nothing holds the axis in its place although the drive is enabled."""
         return False

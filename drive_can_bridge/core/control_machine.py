@@ -4,7 +4,7 @@ The machine behind ``~/enable``, ``~/reset_fault`` and ``~/quick_stop`` of one d
 
 It decides which control word is sent now. The session of the drive sends that word, reports that
 it left (:meth:`~ControlMachine.word_sent`) and what status words come back, and hands the outcome
-of each request to the caller. What it makes of a request stands in :mod:`.control`.
+of each request to the caller. The rules for requests stand in :mod:`.control`.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,19 +20,19 @@ from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.status_reports import (
     disregard_text, state_text, StatusReports, stuck_text, success_text, Wording)
 
-#: s that a drive may go on running under ``disable`` at least until that is told
+#: s that a drive may go on running under ``disable`` at least until that is reported
 RUNNING_ON_MAX = 1.0
-#: how often the reset word leaves where nobody acknowledges it
+#: how often the reset word leaves where it is not acknowledged
 RESET_CYCLES = 3
 _STOPS = (ControlAction.DISABLE, ControlAction.QUICK_STOP)
 
 
 class Disregard:
     """
-    Notice that something lasts.
+    Notices a condition that lasts.
 
     :param timeout: s that a caller of a stop waits, ramps included: it may last so long.
-    :ivar text: what people were told of it; '': nothing.
+    :ivar text: what was reported of it; '': nothing.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -41,7 +41,7 @@ class Disregard:
         self._since = math.inf
 
     def lasts(self, now: float, *, so: bool) -> bool:
-        """Record whether it is so now; tell whether it is to be told."""
+        """Record whether the condition holds now; return whether it is to be reported."""
         if not so:
             self.forget()
             return False
@@ -56,7 +56,7 @@ class Disregard:
 @dataclass(slots=True)
 class Operation:
     """
-    What is under way.
+    The request that is under way.
 
     :ivar requests: those that wait for it; a quick stop for which there is no word waits for
         ``disable``.
@@ -72,19 +72,19 @@ class Operation:
 
 
 class ControlAnswers:
-    """The outcomes of requests until somebody takes them."""
+    """The outcomes of requests until they are fetched."""
 
     def __init__(self) -> None:
         self._completed: list[ControlCompleted] = []
 
     def complete(self, request: ControlRequest, success: bool, message: Sentence, *,
                  by_fault: bool = False) -> None:
-        """Answer one request."""
+        """Record the outcome of one request."""
         self._completed.append(ControlCompleted(request, success, message, by_fault))
 
     def answer(self, operation: Operation, success: bool, message: Sentence, *,
                by_fault: bool = False) -> None:
-        """Answer all that wait for an operation."""
+        """Record the outcome of all requests that wait for an operation."""
         for request in operation.requests:
             instead = request.action is not operation.action
             self.complete(
@@ -102,7 +102,7 @@ class ControlAnswers:
 
 class ControlMachine:
     """
-    Bring one drive to the state that was asked for, by the words and conditions of a table.
+    Brings one drive to the requested state, by the words and conditions of a table.
 
     After any call, look at :attr:`word`, :attr:`take_completed`, :meth:`take_notes`,
     :attr:`due`. Time is that of a steady clock, in s.
@@ -110,13 +110,13 @@ class ControlMachine:
     :param timeout: seconds until an unconfirmed request fails.
     :param pulse: how often the reset word leaves: once where writes are acknowledged.
     :param members: names of the drives, where several share the control word.
-    :param unheard: says which of them may run without answering any more; '' if none.
+    :param unheard: returns which of them may run without answering any more; '' if none.
     :param wording: what the family knows of status words.
-    :param rules: which word serves what is wanted; None: the table says it.
+    :param rules: choose the word for what is wanted; None: the table does.
     :ivar word: control word to send now.
-    :ivar word_left_at: when it left first. A status that was asked for before says nothing of it.
+    :ivar word_left_at: when it left first. A status requested earlier does not count for it.
     :ivar table: the words and conditions.
-    :ivar fault_text: which fault it is, if somebody knows.
+    :ivar fault_text: which fault it is, if that is known.
     :ivar take_completed: returns the outcomes since the last call; asked after every frame.
     """
 
@@ -139,7 +139,7 @@ class ControlMachine:
         self._fault: bool | None = None         # None: not known
         self.fault_text = ''
         self._reached = False                   # enabled was confirmed for this enable word
-        self._seen_enabled: set[str] = set()    # who reported it, knowing that word
+        self._seen_enabled: set[str] = set()    # which members reported it, knowing that word
         self._disregard = Disregard(timeout)
         self._operation: Operation | None = None
         self._answers = ControlAnswers()
@@ -150,44 +150,44 @@ class ControlMachine:
 
     @property
     def at_rest(self) -> bool:
-        """The current word tells the drive to stand still: it has the bits of ``disable``."""
+        """Whether the current word stops the drive: it has the bits of ``disable``."""
         return self._rules.rests(self.word)
 
     @property
     def loose(self) -> bool:
-        """Nothing drives the axis, by what the drive reports, enabled though it may be."""
+        """Whether nothing drives the axis, by what the drive reports, even if it is enabled."""
         return self.off or self._rules.loose
 
     @property
     def stopping(self) -> bool:
-        """The current word is there to stop a drive: it waits for nobody."""
+        """Whether the current word stops a drive, and so is sent without waiting."""
         return self._sending in _STOPS
 
     @property
     def starts(self) -> bool:
-        """The current word starts a drive, or has it run on, or resets its fault."""
+        """Whether the current word starts a drive, or lets it run on, or resets its fault."""
         return not (self.at_rest or self.stopping)
 
     @property
     def pulsing(self) -> bool:
-        """The current word is a pulse: it has to leave again soon."""
+        """Whether the current word is a pulse, which has to leave again soon."""
         return self._sending is ControlAction.RESET_FAULT
 
     @property
     def operating(self) -> bool:
-        """``enable`` is the word sent, and the drive reports enabled (or cannot report it)."""
+        """Whether ``enable`` was sent, and the drive reports enabled (or cannot report it)."""
         return self._reached
 
     @property
     def off(self) -> bool:
-        """The drive reports that it does not drive anything, or cannot and was told so."""
+        """Whether the drive reports that it drives nothing, or cannot and was commanded so."""
         if self._table.enabled is None:
             return self._sending is ControlAction.DISABLE and self._sent
         return self._reports.off
 
     @property
     def word_due(self) -> bool:
-        """The current word has not left since it changed, :meth:`withdraw`, or a new stop."""
+        """Whether the word has not left since it changed, :meth:`withdraw`, or a new stop."""
         return not self._sent or self._again
 
     @property
@@ -197,17 +197,17 @@ class ControlMachine:
 
     @property
     def fault(self) -> bool:
-        """The drive reports a fault, or did when it was last heard."""
+        """Whether the drive reports a fault, or did with its last status."""
         return self._fault is True
 
     @property
     def pending(self) -> bool:
-        """A request, or a quick stop that is answered already, is under way."""
+        """Whether a request, or a quick stop that is answered already, is under way."""
         return self._operation is not None
 
     @property
     def unconfirmed(self) -> bool:
-        """The drive has reported since the current word left, but not what the word wants."""
+        """Whether the drive has reported since the word left, but not what the word wants."""
         if not self._sent or not self._reports.answered:
             return False
         if self._sending is ControlAction.DISABLE:
@@ -217,21 +217,21 @@ class ControlMachine:
 
     @property
     def unseen(self) -> bool:
-        """Whether it runs, the drive does not report."""
+        """Whether the drive does not report whether it runs."""
         return self._table.enabled is None
 
     @property
     def holds(self) -> Sentence:
-        """That the drive stands in a quick stop that does not end by itself; '' if not."""
+        """Text for a drive in a quick stop that does not end by itself; '' if it is in none."""
         return self._rules.holds
 
     @property
     def disregard(self) -> Sentence:
-        """How the drive goes on running although it shall not, and what to do; '' if not."""
+        """Text for a drive that runs on under a stop, with advice; '' for others."""
         return self._disregard.text
 
     def take_notes(self) -> list[Sentence]:
-        """Return what the log should say of the drive since the last call."""
+        """Return the lines for the log since the last call."""
         notes = self._notes
         if notes:   # seldom, and asked for with every status
             self._notes = []
@@ -240,7 +240,7 @@ class ControlMachine:
     # -- inputs -----------------------------------------------------------------------------------
 
     def request(self, request: ControlRequest, now: float) -> None:
-        """Take a request; its outcome may be there when this returns."""
+        """Handle a request; its outcome may be there when this returns."""
         self.handle_timer(now)
         action = request.action
         if action is ControlAction.QUICK_STOP and action not in self._known:
@@ -293,10 +293,10 @@ class ControlMachine:
 
     def status_received(self, raw: int | None, now: float, member: str = '') -> None:
         """
-        Take a status word.
+        Handle a status word.
 
         :param raw: None when a response arrived that should hold a status word, but did not.
-        :param member: whose it is, where several drives share the control word.
+        :param member: which drive's it is, where several drives share the control word.
         """
         self.handle_timer(now)
         if self._reports.take(member, raw, counts=self._sent) and raw is not None:
@@ -310,7 +310,7 @@ class ControlMachine:
             self._watch_disabled(now)
 
     def rules_changed(self) -> None:
-        """Record that the rules know something else of what is wanted: by no status word."""
+        """Handle a change of the rules' choice that no status word has caused."""
         self._choose()
 
     def member_found(self, name: str) -> None:
@@ -332,14 +332,14 @@ class ControlMachine:
         """
         Record that the drive refused a control word: what is under way fails.
 
-        :param reason: what the drive says, in words.
+        :param reason: the drive's reason, in words.
         """
         self.handle_timer(now)
         if word == self.word and self._operation is not None:
             self._end(False, sentences.word_refused(word, reason))
 
     def handle_timer(self, now: float) -> None:
-        """End what is overdue. Calling it early or late does no harm."""
+        """End what is overdue. May be called early or late."""
         under_way = self._operation
         if under_way is None or now < under_way.deadline:
             return
@@ -356,11 +356,11 @@ class ControlMachine:
 
     @property
     def due(self) -> float:
-        """When :meth:`handle_timer` has something to do; infinity: never."""
+        """When :meth:`handle_timer` is to be called; infinity: never."""
         return math.inf if self._operation is None else self._operation.deadline
 
     def drop(self, reason: Sentence, whom: str = 'the drive') -> None:
-        """End what is under way, and what was reached: no user wants that."""
+        """End what is under way, and what was reached, without a user's request."""
         if self._reached:
             self._notes.append(sentences.enable_withdrawn(reason, whom))
         self._end(False, reason)
@@ -369,7 +369,8 @@ class ControlMachine:
         """
         Go back to ``disable``: the drive went offline or restarted, or the bridge stops.
 
-        Open requests fail, the word is :attr:`word_due`; of one that is ``lost`` nothing is known.
+        Open requests fail, the word is :attr:`word_due`; the state of one that is ``lost`` is
+        unknown.
         """
         self.handle_timer(now)
         self.drop(reason)
@@ -380,7 +381,7 @@ class ControlMachine:
             self._rules.forget()
             self._choose()
         self._disregard.forget()
-        self._fault = self._fault or None   # a known one stands until the drive says otherwise
+        self._fault = self._fault or None   # a known one stands until the drive reports otherwise
 
     # -- rules ------------------------------------------------------------------------------------
 
@@ -391,7 +392,7 @@ class ControlMachine:
         return action is ControlAction.RESET_FAULT and self._fault is False
 
     def _refusal(self, action: ControlAction) -> Sentence | None:
-        """Return why a request cannot be taken, in words."""
+        """Return why a request cannot be accepted, in words; None if it can."""
         if action not in self._known:
             return sentences.no_reset_word()
         if action is ControlAction.ENABLE and self._reports.missing:
@@ -408,7 +409,7 @@ class ControlMachine:
             sentences.still_braking() if self._reports.braking else NOTHING))
 
     def _advance(self) -> None:
-        """Take the next step of what is under way, if what it waits for is seen."""
+        """Perform the next step of what is under way, if its conditions are seen."""
         under_way = self._operation
         if under_way is not None:
             for step in STEPS:
@@ -459,7 +460,7 @@ class ControlMachine:
                 self._end(not unheard, unheard or self._success(under_way))
 
     def _success(self, under_way: Operation) -> Sentence:
-        """Name what was reached, or say that nobody knows."""
+        """Return the text of a success: what was reached, or that it is not reported."""
         if under_way.action is not ControlAction.RESET_FAULT:
             return together((
                 success_text(self._table, self._sending, self.state), self._rules.proviso()))
@@ -467,12 +468,12 @@ class ControlMachine:
                 sentences.state_reached(self.state))
 
     def _watch_fault(self, raw: int) -> None:
-        """Note a fault that comes or goes; it ends everything but stops and resets."""
+        """Record a fault that comes or goes; it ends everything but stops and resets."""
         if self._table.fault is None:
             return
         fault = self._table.fault.matches(raw)
         if not fault and (self._fault is False or self._reports.faulted):
-            return      # nothing new; or rid of it when the last of them is
+            return      # nothing new; or its fault ends with that of the last member
         had_fault, self._fault = self._fault, fault
         if not self._fault:
             if had_fault:
@@ -532,14 +533,14 @@ class ControlMachine:
         return self._sent if self._table.fault is None else self._reports.resettable
 
     def _send(self, action: ControlAction) -> None:
-        """Make the word of this name the current one."""
+        """Set which action the current word serves."""
         self._sending = action
         self._seen_enabled.clear()
         self._reached = self._reached and action is ControlAction.ENABLE
         self._choose()
 
     def _choose(self) -> None:
-        """Take the word that serves what is wanted; another one has yet to leave."""
+        """Choose the word for what is wanted; a new one has yet to leave."""
         under_way = self._operation
         word = self._rules.word(
             self._sending, asked=None if under_way is None else under_way.action)
@@ -551,7 +552,7 @@ class ControlMachine:
 
     def _end(self, success: bool, message: Sentence, *, stays: bool = False,
              by_fault: bool = False) -> None:
-        """Answer what is under way, if anything; unless its word stays, ``disable`` follows."""
+        """Complete what is under way, if anything; unless its word stays, ``disable`` follows."""
         under_way, self._operation = self._operation, None
         if under_way is not None:
             self._answers.answer(under_way, success, message, by_fault=by_fault)

@@ -21,7 +21,7 @@ _ACCESS = (AccessMode.READ_ONLY, AccessMode.WRITE_ONLY, AccessMode.READ_WRITE)
 _STORAGE = (Storage.EEPROM, None, Storage.RAM)
 #: bits of an integer that are looked at; no type has as many
 _BITS_MAX = 64
-#: characters of a name that nobody knows: it stands beside another in one line
+#: characters of an unknown name: it stands beside another in one line
 NAME_SHOWN = 80
 
 
@@ -64,7 +64,7 @@ class ParameterDirectory:
         return [other for other in self.listed.values() if _place(other) == _place(parameter)]
 
     def unknown(self, name: str, *, hint: bool = True) -> Sentence:
-        """Say that a name is unknown, with the nearest known one (which takes milliseconds)."""
+        """Return that a name is unknown, with the nearest known one (which takes milliseconds)."""
         near = nearest(name, self.listed) if hint else None
         shown = printable(name, NAME_SHOWN) or "''"
         return sentences.unknown_parameter(shown, near)
@@ -100,7 +100,7 @@ class ParameterDirectory:
             raise ValueRefused(sentences.not_in_bits(
                 value, parameter.type.bits, -(high + 1) // 2, high))
         if not parameter.width_known:
-            return value  # how many bits its two's complement has, the drive tells
+            return value  # how many bits its two's complement has, only the drive knows
         word = parameter.word_from_raw(value)
         for twin in self.twins(parameter):
             try:
@@ -113,14 +113,14 @@ class ParameterDirectory:
 
 def contradictions(items: Sequence[tuple[Parameter, int]]) -> list[Sentence]:
     """
-    Say of each parameter that is to be set which other one gives it another value; '' of none.
+    Return, for each parameter to be set, which other one gives it another value; '' of none.
 
-    Of two values that are written one after the other the first would be told to be written, and
+    Of two values that are written one after the other the first would be reported as written, and
     be overwritten.
 
     :param items: found by name, with raw integers.
     """
-    wanted: dict[object, dict[int, Parameter]] = {}     # by place: who wants which word there
+    wanted: dict[object, dict[int, Parameter]] = {}     # by place, by word: the first parameter
     asked = []
     for parameter, raw in items:
         addressed = parameter.number is not None or parameter.index is not None

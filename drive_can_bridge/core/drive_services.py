@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What users want of one drive: commands, requests, control; and why they cannot have it.
+What users want of one drive: commands, requests, control; and why they are refused.
 
 A command is judged at once. A request is answered by exactly one event: refused at once, or when
 it has been served, or when the control machine says so.
@@ -32,20 +32,20 @@ class RequestServer(Protocol):
 
     @property
     def waiting(self) -> int:
-        """How many wait behind the one being served."""
+        """How many requests wait behind the one being served."""
 
     def serve(self, request: Request, done: Callable[[Outcomes], None], now: float) -> None:
         """Queue a request; ``done`` gets an outcome for each name."""
 
     def cancel(self) -> None:
-        """Forget all of them; nobody is told."""
+        """Forget all requests without completing them."""
 
     def known(self, request: Request) -> Outcomes:
-        """Return what became of the first names of one that was forgotten."""
+        """Return the outcomes of the first names of a forgotten request."""
 
 
 class Conversation(Protocol):
-    """What users can have, by where it stands with their drive; the session itself."""
+    """What users can request depends on the drive's session: the part of it that is read here."""
 
     activated: bool
     active: bool
@@ -67,10 +67,10 @@ class Conversation(Protocol):
         """The state in one word."""
 
     def home(self, request: ControlRequest, now: float) -> None:
-        """Have the axis look for its reference."""
+        """Start homing the axis."""
 
     def request_control(self, request: ControlRequest, now: float) -> None:
-        """Take what is asked of the drive by its control word."""
+        """Handle a request for a control action."""
 
     def request_refusal(self, now: float) -> Failure | None:
         """Return what of the drive itself forbids requests for parameters."""
@@ -80,7 +80,7 @@ class Conversation(Protocol):
 
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:
-        """Say why a control action cannot be asked for, where something else is usually said."""
+        """Return why a control action is refused, where a family has another text than usual."""
 
 
 class DriveServices:
@@ -99,7 +99,7 @@ class DriveServices:
 
     def command(self, index: int, value: Value, now: float) -> CommandOutcome:
         """
-        Take a setpoint command (index into ``setpoints.items``).
+        Handle a setpoint command (index into ``setpoints.items``).
 
         :raises ValueRefused: the value cannot be sent; counted, nothing else changes.
         """
@@ -118,7 +118,7 @@ class DriveServices:
 
     def submit(self, request: Request | ControlRequest, now: float) -> None:
         """
-        Take a request.
+        Handle a request.
 
         It is answered by exactly one ``RequestCompleted``, or ``ControlCompleted``.
         """
@@ -145,9 +145,9 @@ class DriveServices:
 
     def fail_all(self, failure: Failure) -> None:
         """
-        Forget the requests for parameters that are under way, and answer them.
+        Complete all pending parameter requests with a failure, and forget them.
 
-        What was written is not taken back by that: whoever asked has to know of it.
+        What was already written stays written, so its outcomes are reported.
         """
         self._server.cancel()
         requests = self._open.copy()
@@ -174,7 +174,7 @@ class DriveServices:
         self._session.request_answered(request, outcomes)
 
     def _refuse(self, request: Request, failure: Failure, known: Outcomes = ()) -> None:
-        """Answer a request with the same failure for every name behind those that are known."""
+        """Complete a request with the same failure for every name without a known outcome."""
         self._complete(request, (*known, *(failure,) * (len(request) - len(known))))
 
     def _complete(self, request: Request, outcomes: Outcomes) -> None:
@@ -198,7 +198,7 @@ class DriveServices:
         return NOTHING if session.bus_available else sentences.bus_down()
 
     def control_refusal(self, action: ControlAction) -> Sentence:
-        """Say why a control action cannot be asked for now; '' if it can."""
+        """Return why a control action cannot be requested now; '' if it can."""
         session = self._session
         if action is ControlAction.HOME and not session.homes:
             return sentences.no_homing()
@@ -217,7 +217,7 @@ class DriveServices:
         return session.control_refusal(action, refusal, offline=offline)
 
     def write_refusal(self, parameter: Parameter) -> Sentence:
-        """Say why users may not write this parameter now; '' if they may."""
+        """Return why users may not write this parameter now; '' if they may."""
         session = self._session
         return session.roles.write_refusal(
             parameter, exchanging=session.active and not session.serving)

@@ -14,8 +14,8 @@ The errors of the package.
      +-- BusMisconfigured       unknown interface, driver missing, impossible bit rate
      +-- NoBridge               none is running
      +-- SilentBridge           one is in the graph, or holds drives on this host; none answers
-     +-- WhichBridge            several are running, and nobody has said which one is meant
-     +-- NoAnswer               a node does not answer, or has gone
+     +-- WhichBridge            several are running, and none was chosen
+     +-- NoAnswer               a node does not answer, or has left
 
 Every message is a sentence for a user, without a trailing period, in the manuals' own terms.
 """
@@ -27,11 +27,11 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 
 
 class DriveCanError(Exception):
-    """Base of everything this package raises on purpose."""
+    """The base of all errors that this package raises on purpose."""
 
     @property
     def sentence(self) -> Sentence:
-        """What is wrong, with its code; none where it was raised with a mere text."""
+        """The message with its code; without one where a mere text was raised."""
         text = self.args[0] if self.args else NOTHING
         return text if isinstance(text, Sentence) else sentences.uncoded(str(self))
 
@@ -49,7 +49,7 @@ class ConfigurationError(DriveCanError):
 
 
 class LocalProtocolError(DriveCanError, ValueError):
-    """We were asked to send what the protocol does not allow."""
+    """This side was about to send what the protocol does not allow."""
 
 
 class RemoteProtocolError(DriveCanError):
@@ -57,7 +57,7 @@ class RemoteProtocolError(DriveCanError):
 
 
 class Unasked(DriveCanError):
-    """A received frame is in order, but answers nothing that was asked just now."""
+    """A received frame is valid, but answers no open request."""
 
 
 class ValueRefused(DriveCanError, ValueError):
@@ -72,7 +72,7 @@ class BusUnavailable(DriveCanError, OSError):
     """
     The device is absent, busy or lost. Worth another attempt.
 
-    :param taken: another process has it: no reason to wait for it at the beginning.
+    :param taken: another process has it: start-up does not wait for it.
     """
 
     def __init__(self, text: str, *, taken: bool = False) -> None:
@@ -93,12 +93,12 @@ class SilentBridge(DriveCanError):
 
 
 class WhichBridge(DriveCanError):
-    """Several bridges are running, and nobody has said which one is meant."""
+    """Several bridges are running, and none was chosen."""
 
 
 class NoAnswer(DriveCanError):
     """
-    A node does not answer, or has gone.
+    A node does not answer, or has left.
 
     :ivar asked: it was sent the question, and may have done what it was asked.
     """

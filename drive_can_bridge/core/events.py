@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a session tells the outside: events, and the state of its drive in one word.
+The events that a session reports, and the state of its drive in one word.
 
 Times are ``now`` of the call that caused the event.
 """
@@ -39,7 +39,7 @@ class StationLost:
     """
     The drive is offline; ``reason`` says in words what was missing.
 
-    :param ordered: nothing was: it was deactivated, and its stop has run its course.
+    :param ordered: nothing was: the drive was deactivated, and its stop is complete.
     """
 
     reason: Sentence
@@ -48,7 +48,7 @@ class StationLost:
 
 @dataclass(frozen=True)
 class DriveFailed:
-    """A defect of this program: the drive is stopped, and offline; ``reason`` has the words."""
+    """The drive is stopped and offline after an internal error; ``reason`` has the words."""
 
     reason: Sentence
 
@@ -70,9 +70,9 @@ class MappingWritten:
 @dataclass(frozen=True)
 class SetpointsExpired:
     """
-    No fresh command: these setpoints went neutral and want re-arming.
+    No fresh command: these setpoints went neutral and must be armed again.
 
-    :param orderly: each of them was at neutral already: whoever commanded them has ended.
+    :param orderly: each of them was at neutral already: their publisher has ended.
     """
 
     names: tuple[str, ...]
@@ -96,14 +96,14 @@ class FrameRejected:
 
 @dataclass(frozen=True)
 class AnswerLate:
-    """Answers come after the time of their question; ``seconds``: by how much the last one did."""
+    """Answers come after their time-out; ``seconds``: by how much the last one did."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class ForeignMasterSeen:
-    """Somebody else sends requests to this drive."""
+    """Another master sends requests to this drive."""
 
     text: Sentence
 
@@ -111,12 +111,12 @@ class ForeignMasterSeen:
 @dataclass(frozen=True)
 class Noted:
     """
-    Anything else that belongs into the log.
+    Any other line for the log.
 
-    :param warning: somebody should do something about it.
+    :param warning: something should be done about it.
     :param danger: at once: a drive may be running that should not.
-    :param error: what is told is more than a warning.
-    :param new: it tells of something else than the one before: a drive may have any number.
+    :param error: it is more than a warning.
+    :param new: it differs from the one before: a drive may have any number.
     """
 
     text: Sentence

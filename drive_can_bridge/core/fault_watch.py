@@ -2,7 +2,7 @@
 """
 Which fault it is: the number that the drive has for it, by the profile's section ``fault``.
 
-It is looked for once, when a fault shows: in samples where it is mapped, otherwise by one read,
+It is read once, when a fault shows: from samples where it is mapped, otherwise by one read,
 like that of a user.
 """
 
@@ -27,10 +27,10 @@ from drive_can_bridge.core.requests import Failure, FailureKind, ReadRequest, Re
 
 
 class Desk(Protocol):
-    """Where reads are asked for."""
+    """Accepts read requests."""
 
     def submit(self, request: ReadRequest, now: float) -> None:
-        """Take a request."""
+        """Handle a request."""
 
 
 class Watched(Protocol):
@@ -46,11 +46,11 @@ class Watched(Protocol):
 
     @property
     def shows_fault(self) -> bool:
-        """Its own status says so."""
+        """Whether its own status reports a fault."""
 
     @property
     def services(self) -> Desk:
-        """Where it is asked which one."""
+        """Where reads of the fault number are requested."""
 
 
 #: 603Fh: manuals write what is in it, as in emergencies, with four hexadecimal digits
@@ -61,7 +61,7 @@ class FaultWatch:
     """
     Watches one drive for faults.
 
-    :ivar shows: the drive says that it has a fault.
+    :ivar shows: the drive reports a fault.
     :ivar text: number and name of the fault, ``7 overcurrent``; '' without a fault, or where the
         number could not be read.
     :ivar unread: why it could not be read.
@@ -87,7 +87,7 @@ class FaultWatch:
 
     def look(self, events: list[Event]) -> None:
         """
-        Look at what has happened; there may be more to be told, and to be sent, then.
+        Handle what has happened; there may be more to report, and to send, afterwards.
 
         What a fault has ended is answered as soon as its number is known, or cannot be read; or
         after ``control_timeout``: the read waits for those of users, which may be many.
@@ -111,13 +111,13 @@ class FaultWatch:
 
     @property
     def _is_told_soon(self) -> bool:
-        """Which fault it is will be known, or why it is not."""
+        """Whether the number of the fault, or why it is unknown, will be known soon."""
         session = self._session
         return session.active and session.online and session.shows_fault and (
             not self.shows or self._wanted or self._request is not None)
 
     def take(self, event: RequestCompleted) -> bool:
-        """Take the end of a request; tell whether it was ours."""
+        """Handle a completed request; return whether it was this watch's own."""
         if self._request is None or event.request is not self._request:
             return False
         self._request = None
@@ -134,7 +134,7 @@ class FaultWatch:
         return True
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:
-        """Look at a sample; None stands for what the drive refused."""
+        """Check a sample for a fault; None stands for what the drive refused."""
         self._now = now
         if self._session.control is not None:
             shows = self._session.shows_fault
@@ -155,7 +155,7 @@ class FaultWatch:
             self._session.services.submit(self._request, now)
         if not self.text:
             raw = _at(self._place, raws)
-            # some drives say what it is a moment later
+            # some drives report the number a moment later
             if raw is not None and (raw or raw in self._names):
                 self._known(raw)
 
@@ -185,5 +185,5 @@ class FaultWatch:
 
 
 def _at(place: int | None, raws: Sequence[int | None]) -> int | None:
-    """Return what stands at a place of a sample, if it has that."""
+    """Return the value at a place of a sample; None where the sample lacks it."""
     return raws[place] if place is not None and place < len(raws) else None

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The CAN data frame, as the protocols see it; a record of a trace, as anything may be seen."""
+"""The CAN data frame, as the protocols see it; a record of a trace, which may be any frame."""
 
 from enum import Enum
 from typing import NamedTuple, Union
@@ -63,7 +63,7 @@ def worst_bits(length: int, *, extended: bool) -> int:
 
 class RecordKind(Enum):
     """
-    What was seen.
+    The kinds of records.
 
     A frame that an error has destroyed, and a state in words, are in traces of other makers only.
     """
@@ -81,7 +81,7 @@ class Record(NamedTuple):
     One entry of a trace.
 
     Unlike a ``Frame`` it may be anything that adapters report: no protocol here has remote or CAN
-    FD frames, but who looks for the reason of a failure wants to see them.
+    FD frames, but they help to find the reason of a failure.
 
     :param time: s, since 1970 or since the start of the trace.
     :param channel: what the trace calls the bus: a name, a number, or '' where it has none.
@@ -104,5 +104,5 @@ DATA = RecordKind.DATA
 
 
 def state_record(time: float, channel: str | int, words: str, *, well: bool = False) -> Record:
-    """Return an entry that tells a state of the bus, or of a controller, in words."""
+    """Return an entry with a state of the bus, or of a controller, in words."""
     return Record(time, channel, 0 if well else 1, words.encode(), False, RecordKind.STATE)

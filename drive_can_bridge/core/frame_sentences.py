@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is said to people of single frames, and of what scan and probe find: each by its code.
+Texts about single frames, and about the results of scan and probe, each with its code.
 
 Rows as in :mod:`.sentences`.
 """

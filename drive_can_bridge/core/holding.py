@@ -19,7 +19,7 @@ it was armed, and is still driven            is latched at what was *sent* last:
                                              never left would be a jump
 ============================================ ==================================================
 
-When the drive was lost, nobody knows where the axis is: the position is to be measured anew. What
+When the drive was lost, the position is unknown and has to be measured again. What
 is measured is not limited by ``minimum..maximum``: an axis outside of them stays there, too.
 
 A :class:`Limit` travels with the setpoints, but moves nothing.
@@ -57,7 +57,7 @@ class Setpoint:
 
     @property
     def known(self) -> bool:
-        """The neutral value is known: it may be sent, and commands may arm."""
+        """Whether the neutral value is known: it may be sent, and commands may arm."""
         return True
 
     def armed_by(self, value: Value) -> bool:
@@ -81,7 +81,7 @@ class Setpoint:
         self.commanded_at = None
 
     def expire(self) -> None:
-        """Disarm it, because no fresh command keeps it."""
+        """Disarm the setpoint, because no fresh command keeps it."""
         self.expired_at_neutral = self.raw == self.neutral
         self.disarm()
 
@@ -92,7 +92,7 @@ class HeldSetpoint(Setpoint):
 
     :param measured: the actual value whose name ``neutral_from`` is.
     :param place: where it stands in a sample.
-    :param sent: what the drive was told last.
+    :param sent: what the drive was commanded last.
     :ivar ever_known: since the last ``reset``, its position was known at least once.
     """
 
@@ -115,7 +115,7 @@ class HeldSetpoint(Setpoint):
 
     @property
     def told(self) -> bool:
-        """The drive was told its neutral value since that is known."""
+        """Whether the drive was commanded its neutral value since that is known."""
         return self._known and self._sent.times[self._sent_place] > self._known_from
 
     def armed_by(self, value: Value) -> bool:
@@ -125,14 +125,14 @@ class HeldSetpoint(Setpoint):
         return abs(value - neutral) <= self.parameter.arming_tolerance
 
     def disarm(self) -> None:
-        """Stay where the drive was sent last."""
+        """Stay at the value that was sent last."""
         if self.armed:
             last = self._sent.raws[self._sent_place]
             self.neutral = self.neutral if last is None else last
         super().disarm()
 
     def reset(self) -> None:
-        """Record that nothing was ever known."""
+        """Forget that the position was ever known."""
         self.forget()
         self.ever_known = False
         self.neutral = 0
@@ -144,7 +144,7 @@ class HeldSetpoint(Setpoint):
 
     def measure(self, raw: int) -> bool:
         """
-        Take the position of the axis, unless it is on its way by command.
+        Follow the position of the axis, unless a command moves it.
 
         :param raw: of the actual value. One that the setpoint cannot represent makes the position
             unknown: something else must not be sent in its place.
@@ -178,15 +178,15 @@ class Limit(Setpoint):
         self.reset()
 
     def disarm(self) -> None:
-        """Stay as it is: a stop may need that torque to brake."""
+        """Leave the limit as it is: a stop may need that torque to brake."""
 
     def reset(self) -> None:
-        """Be what an activation begins with."""
+        """Set the value that an activation starts with."""
         self.take(self.parameter.neutral_raw)
         self.armed = True
 
     def take(self, raw: int) -> bool:
-        """Take a command; tell whether something else is to be sent."""
+        """Set a commanded value; return whether it differs from the one before."""
         changed = self.raw != raw
         self.raw = self.neutral = raw
         return changed
@@ -198,7 +198,7 @@ def make_setpoint(parameter: Parameter, sample: tuple[Parameter, ...],
     Return the setpoint of a parameter.
 
     :param sample: what is measured, in the order of ``ProcessDataReceived.raws``.
-    :param sent: what the drive was told last; needed for ``neutral_from``.
+    :param sent: what the drive was commanded last; needed for ``neutral_from``.
     """
     if parameter.limit:
         return Limit(parameter)

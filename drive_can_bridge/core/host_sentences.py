@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What processes of this host say before the catalogue may be imported: its rows, by their codes.
+Texts of processes of this host before the catalogue may be imported: its rows, by their codes.
 
 Their texts stand in :mod:`drive_can_bridge.host_texts`; the rows add what to do.
 """

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What makes answers late: one drive, or what all drives of a bus have in common."""
+"""Why answers are late: one drive, or what all drives of a bus have in common."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -16,7 +16,7 @@ _ANSWERING = 0.005
 
 class AnswerTiming(NamedTuple):
     """
-    How the answers of a drive come.
+    Count and delay of a drive's late answers.
 
     :param late: how many were late since the start.
     :param late_by: s by which the last of them was.
@@ -30,9 +30,9 @@ class AnswerTiming(NamedTuple):
 
 class Lateness:
     """
-    Of the drives of one bus.
+    Compares the late answers of all drives of one bus.
 
-    :ivar shared: since the look before, the answers of all of them came late, by the same time.
+    :ivar shared: since the update before, the answers of all of them came late, by the same time.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class Lateness:
         self._before: dict[str, int] = {}
 
     def look(self, drives: Mapping[str, AnswerTiming]) -> None:
-        """Take the answers of all drives of the bus as they are now."""
+        """Update with the present answers of all drives of the bus."""
         here = {name: each for name, each in drives.items() if each.online}
         late = [each.period + each.late_by for name, each in here.items()
                 if each.late > self._before.get(name, 0)]
@@ -49,7 +49,7 @@ class Lateness:
                        and max(late) - min(late) <= max(_SPREAD, _SHARE * max(late)))
 
     def told(self, bus: str, answers: AnswerTiming, traits: AdapterTraits | None) -> Sentence:
-        """Say of an answer that was late what makes it so."""
+        """Return the text for a late answer, with its probable cause."""
         if traits is not None and traits.latency > 0.001 and (
                 answers.period + answers.late_by <= traits.latency + _ANSWERING):
             return sentences.answer_kept(

@@ -5,7 +5,7 @@ How texts for people are written as rows of data.
 The rows stand in :mod:`.sentences` (of drives, requests and stops) and :mod:`.complaints` (of
 files): the text, and what to do about it. The name of a row is the *code*, and what stands in
 braces are the *fields*. A row is called with its fields, and returns a :class:`Sentence`: text
-wherever text is wanted, which tells programs and tests what it says without being read:
+wherever text is wanted, with a code for programs and tests, which need not read it:
 
 .. code-block:: python
 
@@ -33,7 +33,7 @@ class Sentence(str):
     """
     A text for people that programs need not read.
 
-    :ivar code: what it says, as a stable word.
+    :ivar code: its meaning, as a stable word.
     :ivar fields: of what, by name.
     :ivar kind: what it is for programs, where they have to know.
     :ivar row: of the catalogue; None: it is made of others.
@@ -65,12 +65,12 @@ _DIGITS = 20
 #: letters that a text with something else in it has in common with one of a row
 _ENOUGH = 6
 
-#: where there is nothing to be said
+#: the empty sentence
 NOTHING = Sentence()
 
 
 def together(said: Iterable[Sentence]) -> Sentence:
-    """Put several sentences in one line; its code is that of the first, all are in its fields."""
+    """Join several sentences in one line; its code is that of the first, all are in its fields."""
     parts = [part for part in said if part]
     if len(parts) < 2:
         return parts[0] if parts else NOTHING
@@ -78,7 +78,7 @@ def together(said: Iterable[Sentence]) -> Sentence:
 
 
 def around(said: str, before: str = '', behind: str = '') -> Sentence:
-    """Put a place before a sentence, or something behind it; it stays what it is to programs."""
+    """Return a sentence with text before and behind it; it keeps its code for programs."""
     text = f'{before}{said}{behind}'
     return (Sentence(text, said.code, said.fields, said.kind) if isinstance(said, Sentence)
             else Sentence(text))
@@ -90,7 +90,7 @@ class Text:
 
     In braces stand fields, and behind a colon how they are written: as :func:`format` has it,
     ``{n:#byte}`` counts, ``{names:, }`` joins several, ``{ran:?}`` writes nothing; ``{value!r}``
-    writes a value as a user would recognise it. Of several texts the first is taken whose fields
+    writes a value as a user would recognise it. Of several texts the first is used whose fields
     are all there: given, and neither empty nor false. The last one is for all other cases.
 
     :ivar code: its name in the catalogue.
@@ -105,10 +105,10 @@ class Text:
         self.code, self.do, self.texts = '', do, texts
         self._order, self._kinds, self._how = fields, kinds, how
 
-    # made when they are wanted: a command says one sentence of some hundreds
+    # made at the first use: a command writes one sentence of some hundreds
 
     def make_ready(self) -> None:
-        """Make now what is made when it is said first."""
+        """Compute now what is otherwise computed at the first use."""
         _ = self.fields, self.optional
 
     @cached_property
@@ -144,7 +144,7 @@ class Text:
 
     def places(self, text: str, *, whole: bool = False) -> frozenset[int]:
         """
-        Return where the letters of this row stand in a text; nothing: it is not made of it.
+        Return where the letters of this row stand in a text; empty: the text is not from this row.
 
         :param whole: nothing else is to stand there.
         """
@@ -185,14 +185,14 @@ def _spans(patterns: Sequence[str], text: str, at: int, *,
     """
     Return where patterns match, with something of one line between two; None: they do not.
 
-    Each is looked for once, where it comes first behind the one before. One expression of all of
-    them would try each place of one with each place of the others, and whoever sends a text that
-    is made for it would have a command hang.
+    Each is searched for once, from the end of the one before. One expression of all of
+    them would try each place of one with each place of the others, and a text
+    made for it could hang a command.
     """
     spans: list[tuple[int, int]] = []
     last = len(patterns) - 1
     for number, pattern in enumerate(patterns):
-        if at > len(text):      # nothing is left for the field
+        if at > len(text):      # no text is left for the field
             return None
         compiled = re.compile(rf'{pattern}\Z' if whole and number == last else pattern)
         found = (compiled.match if whole and not number else compiled.search)(text, at)
@@ -230,9 +230,9 @@ class _Variant:
 
 def catalogue(module: dict[str, Any], do: str = '') -> dict[str, Text]:
     """
-    Give the rows of a module their codes, and return them.
+    Set the codes of a module's rows, and return them by code.
 
-    :param do: what to do about those that do not say it.
+    :param do: what to do about rows without advice.
     """
     rows = {code: row for code, row in module.items() if isinstance(row, Text)}
     for code, row in rows.items():

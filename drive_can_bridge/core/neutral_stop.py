@@ -2,7 +2,7 @@
 """
 ``~/quick_stop`` of a drive without a control word: everything neutral, at once.
 
-From the request on nothing but neutral is handed out, and commands arm nothing, until the drive
+From the request on only neutral is sent, and commands arm nothing, until the drive
 has answered an exchange that carried all of it, or has not in time.
 """
 
@@ -20,7 +20,7 @@ from drive_can_bridge.core.setpoints import Setpoints
 
 
 class Commanded(Protocol):
-    """A drive that goes where its setpoints tell it to; the session itself."""
+    """A drive that follows its setpoints; the session itself."""
 
     configuration: DriveConfiguration
     setpoints: Setpoints
@@ -28,15 +28,15 @@ class Commanded(Protocol):
     report: Reporter
 
     def hand_out_neutral(self, now: float) -> None:
-        """Have all setpoints sent at once, neutral as they are."""
+        """Send all setpoints at once, neutral as they are."""
 
 
 @dataclass(frozen=True)
 class Wait:
     """
-    A stop that is waited for.
+    A stop that is not confirmed yet.
 
-    :ivar requests: who waits; others join the first.
+    :ivar requests: the requests that wait; others join the first.
     :ivar lacking: names of what has not left since.
     """
 
@@ -46,9 +46,9 @@ class Wait:
 
 class NeutralStop:
     """
-    Those that wait until one drive has everything neutral; nobody does most of the time.
+    The requests that wait until one drive has everything neutral; usually none.
 
-    :ivar due: when it has lasted too long; infinity: nobody waits.
+    :ivar due: when it has lasted too long; infinity: no request waits.
     """
 
     def __init__(self, session: Commanded) -> None:
@@ -58,7 +58,7 @@ class NeutralStop:
 
     @property
     def pending(self) -> bool:
-        """Somebody waits."""
+        """Whether a request waits."""
         return self._wait is not None
 
     def request(self, request: ControlRequest, now: float) -> None:
@@ -97,7 +97,7 @@ class NeutralStop:
         self.fail(sentences.may_still_be_running(why))
 
     def fail(self, reason: Sentence) -> None:
-        """Answer those that wait: there is no stop to be waited for any more."""
+        """Complete the waiting requests: the stop they wait for is over."""
         self._end(False, reason)
 
     def handle_timer(self, now: float) -> None:

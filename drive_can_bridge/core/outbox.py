@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Frames on their way out, and who wants to know whether they left.
+Frames to be sent, with callbacks for whether they left.
 
 A bus may refuse a frame. What was refused was not sent: it is no stop cycle, no control word, no
-write. So nothing counts when a frame is made, but when the driver of the session says what became
-of it:
+write. So nothing counts when a frame is made, but when the driver of the session reports what
+happened to it:
 
 .. code-block:: python
 
@@ -24,7 +24,7 @@ class Outbox:
     """
     The frames of one session, in order.
 
-    :ivar frames: those that wait. Looked at after every step, so nobody is called for that.
+    :ivar frames: those that wait. Read after every step, so it is a plain attribute.
     """
 
     __slots__ = ('_leaving', '_left', 'frames')
@@ -35,12 +35,12 @@ class Outbox:
         self._leaving: list[Left | None] = []
 
     def put(self, frame: Frame, left: Left | None = None) -> None:
-        """Have a frame sent now; ``left`` is told what became of it."""
+        """Queue a frame; ``left`` is called with whether it was sent."""
         self.frames.append(frame)
         self._left.append(left)
 
     def drop(self, unwanted: Callable[[Frame], bool], now: float) -> None:
-        """Leave out what waits and is not to be sent any more: it counts as refused."""
+        """Drop waiting frames that are not to be sent any more: they count as refused."""
         waiting = list(zip(self.frames, self._left))
         self.clear()
         for frame, left in waiting:
@@ -59,7 +59,7 @@ class Outbox:
 
     def left(self, now: float, refused: Collection[int] = ()) -> None:
         """
-        Report what became of the frames last taken.
+        Record which of the frames last taken were sent.
 
         :param refused: places, in the list last taken, of what the bus did not take.
         """
@@ -69,12 +69,12 @@ class Outbox:
                 left(place not in refused, now)
 
     def take_over(self, other: 'Outbox') -> None:
-        """Have the frames sent that wait elsewhere, behind those that wait here."""
+        """Append the frames that wait in another outbox."""
         self.frames += other.frames
         self._left += other._left
         other.clear()
 
     def clear(self) -> None:
-        """Forget frames that nobody has fetched; their maker is about to forget, too."""
+        """Forget frames that were not fetched; their sender is about to forget them, too."""
         self.frames.clear()
         self._left.clear()

@@ -38,7 +38,7 @@ def is_misplaced_integer(value: Value) -> bool:
     """
     Return whether a double is so small that it is none: an integer was put into its field.
 
-    Message classes check no types, and so what stands in its place is taken: the size of the
+    Message classes check no types, and so the bytes in its place are used: the size of the
     integer. 300 arrives as 5e-324, from Python 3.12 on as 4e-323, and 0 as 5e-324.
     """
     return isinstance(value, float) and 0.0 < abs(value) < _NORMAL_MIN
@@ -74,7 +74,7 @@ class ParameterType(Enum):
 
 
 class ValueKind(Enum):
-    """The one rule for types everywhere: topics, commands, services."""
+    """The kinds of values, by one rule for topics, commands and services."""
 
     DOUBLE = 'double'
     INTEGER = 'integer'
@@ -82,7 +82,7 @@ class ValueKind(Enum):
 
     @property
     def words(self) -> str:
-        """What is a value of this kind, for a refusal: ``a number``."""
+        """A value of this kind in words, for a refusal: ``a number``."""
         return _KIND_WORDS[self]
 
 
@@ -115,7 +115,7 @@ class Parameter:
     :param scale: physical units per raw step; not zero.
     :param offset: physical value of raw 0.
     :param unit: unit of the physical value, as written in the profile.
-    :param storage: None means the profile does not say.
+    :param storage: None: not in the profile.
     :param minimum: smallest allowed physical value.
     :param maximum: largest allowed physical value.
     :param neutral: value sent while there is no fresh command; None means what encodes to raw 0.
@@ -128,9 +128,9 @@ class Parameter:
     :param subindex: array index (CANnord) or CANopen sub-index.
     :param index: CANopen index.
     :param listed: stands in the profile; False for a parameter addressed by its raw name.
-    :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive says.
-    :param protected: a restored backup leaves it alone unless told otherwise.
-    :param verified: what the profile says about its own entry; None: nothing.
+    :param word_order: 32-bit values: ``high_first`` or ``low_first``; None: as the drive reports.
+    :param protected: a restored backup leaves it alone unless requested otherwise.
+    :param verified: the profile's own mark on the entry; None: there is none.
     :param width_known: False for a raw name whose width only the drive knows; ``type`` is then the
         widest possible.
     """
@@ -163,7 +163,7 @@ class Parameter:
 
     @property
     def kind(self) -> ValueKind:
-        """Double, integer or bool (one rule, everywhere)."""
+        """The kind of its values: double, integer or bool."""
         if self.scaled:
             return ValueKind.DOUBLE
         if self.type is ParameterType.BOOL:
@@ -172,27 +172,27 @@ class Parameter:
 
     @property
     def readable(self) -> bool:
-        """Can be read by a service."""
+        """Whether a service can read it."""
         return self.access is not AccessMode.WRITE_ONLY
 
     @property
     def writable(self) -> bool:
-        """Can be written by a service or command."""
+        """Whether a service or command can write it."""
         return self.access is not AccessMode.READ_ONLY
 
     @property
     def stores(self) -> bool:
-        """Stores what the drive has in its RAM when it is written: 1010h of CANopen."""
+        """Whether a write makes the drive store what it has in its RAM: 1010h of CANopen."""
         return self.index == 0x1010
 
     def text(self, value: Value) -> str:
-        """Write a value for people: a device type of CANopen (1000h) in hexadecimal, as EDS do."""
+        """Return a value for people: a CANopen device type (1000h) in hexadecimal, as EDS do."""
         if self.index == _DEVICE_TYPE and not self.scaled:
             return f'{value:08X}h'
         return value_text(value)
 
     def shown(self, raw: int) -> str:
-        """Write a value as the drive's manual does: with as many decimals as a raw step has."""
+        """Return a value as the manual writes it: with as many decimals as a raw step has."""
         value = self.value_from_raw(raw)
         decimals = max(0, -math.floor(math.log10(abs(self.scale)) + 1e-9)) if self.scaled else 0
         return f'{value:.{decimals}f}' if decimals <= 6 else value_text(value)
@@ -203,13 +203,13 @@ class Parameter:
                      if self.value_from_raw(raw) == value), '') if self.values else ''
 
     def value_named(self, name: str) -> Value | None:
-        """Return the value that a name stands for; None: none has it."""
+        """Return the value of a name; None: there is no such name."""
         return next((self.value_from_raw(raw) for raw, known in self.values if known == name),
                     None)
 
     @property
     def address(self) -> str:
-        """Name the parameter as the drive's manual does: ``P30``, ``P613.5``, ``2004h.06h``."""
+        """The address as in the drive's manual: ``P30``, ``P613.5``, ``2004h.06h``."""
         if self.number is not None:
             # with an index, the sub-index belongs to that one
             array = self.subindex is not None and self.index is None
@@ -221,7 +221,7 @@ class Parameter:
 
     @property
     def neutral_raw(self) -> int:
-        """Raw integer that is sent while there is no fresh command."""
+        """The raw integer that is sent while there is no fresh command."""
         return 0 if self.neutral is None else self.raw_from_value(self.neutral)
 
     # -- raw <-> word -----------------------------------------------------------------------------
@@ -294,7 +294,7 @@ class Parameter:
 
     def raw_nearest(self, value: Value) -> int | None:
         """
-        Return the raw integer nearest to a physical value, whatever ``minimum..maximum`` say.
+        Return the raw integer nearest to a physical value, whatever ``minimum..maximum`` are.
 
         :return: None where the type cannot represent it.
         """
@@ -306,7 +306,7 @@ class Parameter:
     @cached_property
     def raw_limits(self) -> tuple[int, int]:
         """
-        Smallest and largest raw integer whose value lies in ``minimum..maximum``.
+        The smallest and largest raw integer whose value lies in ``minimum..maximum``.
 
         They bound what is sent, however a value was rounded. The first is the larger one where
         the type has no value between the limits.
@@ -319,14 +319,14 @@ class Parameter:
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
-        """The profile's limits, with the slack that rounding needs."""
+        """The profile's limits, with slack for rounding."""
         slack = abs(self.scale) * STEP_TOLERANCE
         return (-math.inf if self.minimum is None else self.minimum - slack,
                 math.inf if self.maximum is None else self.maximum + slack)
 
     @cached_property
     def _carried_limits(self) -> tuple[float, float]:
-        """What of that the type can carry; nothing where a number is no value at all."""
+        """The limits within the range of the type; empty where no number is a value."""
         if self.type is ParameterType.BOOL:
             return math.inf, -math.inf
         (low, high), (least, most) = self._limits, self.value_range
@@ -334,7 +334,7 @@ class Parameter:
 
     @cached_property
     def value_range(self) -> tuple[float, float]:
-        """Smallest and largest physical value that the type can carry, whatever the limits."""
+        """The smallest and largest physical value of the type, whatever the limits."""
         first, last = (raw * self.scale + self.offset for raw in self.type.raw_range)
         return (first, last) if first <= last else (last, first)
 
@@ -355,7 +355,7 @@ class Parameter:
 
     @property
     def range_text(self) -> str:
-        """Allowed physical range in words, ``-3000 to 3000 rpm``."""
+        """The allowed physical range in words, ``-3000 to 3000 rpm``."""
         if self.minimum is not None and self.maximum is not None:
             text = _in_words((self.minimum, self.maximum))
         elif self.minimum is not None:

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What a drive is told, and tells, in every exchange, as parameters in order; what was sent."""
+"""What is exchanged with a drive in every cycle, as parameters in order; and what was sent."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ STATUS_NAME = 'status_word'
 
 def control_word(drive: DriveConfiguration, *, controlled: bool) -> Parameter | None:
     """
-    Return the control word as a parameter of the profile; None: users may have it as any other.
+    Return the control word as a parameter of the profile; None: users may write it as any other.
 
-    :param controlled: a control machine looks after it.
+    :param controlled: a control machine writes it.
     """
     table = drive.profile.control
     if table is None or not controlled:
@@ -35,9 +35,9 @@ class ProcessImage:
     The process data of one drive.
 
     :param setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
-    :param request: all that the drive is told: what is sent cyclically, and a control word that
-        has no slot there.
-    :param sample: what the drive tells, in the order of ``ProcessDataReceived.raws``. What is
+    :param request: all that the drive is commanded: what is sent cyclically, and a control word
+        that has no slot there.
+    :param sample: what the drive reports, in the order of ``ProcessDataReceived.raws``. What is
         built in comes first: a short telegram lacks the last values, never the status.
     """
 
@@ -51,7 +51,7 @@ class ProcessImage:
         """
         Return that of a configured drive.
 
-        :param controlled: a control machine looks after the control word.
+        :param controlled: a control machine writes the control word.
         :param word: the control word of a telegram that has it built in.
         :param status: the status word, likewise.
         """
@@ -66,7 +66,7 @@ class LastSent:
     """
     Setpoints and control word as they stood in the frames that carried them last.
 
-    :ivar parameters: all that a drive can be told, in the order of its frames.
+    :ivar parameters: all that a drive can be commanded, in the order of its frames.
     :ivar raws: the raw integer of each; None: not sent since activation. Another tuple after each
         change, and the same one as long as nothing changes.
     :ivar times: how often frames with new contents have carried each, for those who wait for one.

@@ -31,7 +31,7 @@ class ControlTable:
     :param status_parameter: name of the parameter that carries the status word, or None.
     :param running: the drive does not stand still yet; None: the same as ``enabled``.
     :param reaction: there is a fault, but it cannot be reset yet; None: it always can.
-    :param braking: a quick stop is under way; None: the status word does not say.
+    :param braking: a quick stop is under way; None: the status word does not report it.
     """
 
     parameter: str
@@ -55,7 +55,7 @@ class FaultTable:
 
     :param parameter: name of the parameter that carries the number.
     :param codes: names of faults, (raw integer, name).
-    :param bit: (parameter, mask): says that there is a fault where no control section does.
+    :param bit: (parameter, mask): reports a fault where there is no control section.
     """
 
     parameter: str
@@ -84,7 +84,7 @@ class RestoreTable:
     The ``restore`` section of a profile.
 
     :param before: written in this order before the settings of a backup.
-    :param after: written in this order afterwards, whatever became of them.
+    :param after: written in this order afterwards, whether they were written or not.
     """
 
     before: tuple[RestoreStep, ...] = ()
@@ -98,13 +98,13 @@ class RestoreTable:
 @dataclass(frozen=True)
 class Profile:
     """
-    What is known of a drive type.
+    The description of a drive type.
 
     :param name: file name without ``.yaml``.
     :param path: where it was read from.
     :param protocols: the families the drive type speaks.
     :param parameters: the table, in the order of the file, by name.
-    :param identity: names of the parameters that tell a drive from another one of its type.
+    :param identity: names of the parameters that identify one drive among others of its type.
     :param sha256: of the file, hexadecimal.
     """
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a session has to tell: events, in order, and what is missing while its drive is offline.
+What a session reports: events, in order, and what is missing while its drive is offline.
 
 It is the counterpart of the outbox: frames go to the drive, this goes to people.
 """
@@ -17,12 +17,12 @@ from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.sentences import may_still_be_running
 from drive_can_bridge.core.statistics import DriveStatistics
 
-#: s between two answers that are told to be late
+#: s between two answers that are reported to be late
 TELL_LATE = 10.0
 
 
 class AdviceKind(Enum):
-    """What an advice on a drive that is not online rests on."""
+    """The basis of the advice on a drive that is not online."""
 
     CAUSE = 'on what was seen'
     GUESS = 'on nothing but that it does not answer: what to look at when it was never seen'
@@ -55,14 +55,14 @@ class Reporter:
         return events
 
     def advise(self, text: Sentence, kind: AdviceKind = AdviceKind.CAUSE) -> None:
-        """Say what is missing, and what to look at."""
+        """Set what is missing, and what to check."""
         self.advice, self.advice_kind = text, kind
 
     def guess(self, text: Sentence, *, unless: Sentence = NOTHING) -> None:
         """
-        Say what to look at, of a drive of which is only known that it does not answer.
+        Set advice for a drive of which is only known that it does not answer.
 
-        :param unless: what is known of it; '' if nothing is.
+        :param unless: what is known of it; '' for nothing.
         """
         self.advise(unless or text, AdviceKind.CAUSE if unless else AdviceKind.GUESS)
 
@@ -74,21 +74,21 @@ class Reporter:
         """
         Report what is not as it should be.
 
-        :param may_run: the drive may be running for that reason, which is said.
+        :param may_run: the drive may be running for that reason, which is added.
         """
         self.events.append(Noted(
             may_still_be_running(text) if may_run else text, warning=True, danger=may_run))
 
     def reject(self, text: Sentence) -> None:
-        """Count and tell a frame of the drive that is malformed or unasked."""
+        """Count and report a frame of the drive that is malformed or unasked."""
         self._statistics.rejected += 1
         self.events.append(FrameRejected(text))
 
     def unasked(self, text: Sentence, late: float | None, now: float) -> None:
         """
-        Count and tell an answer that nobody waits for: rejected, or late.
+        Count and report an answer without an open request: rejected, or late.
 
-        :param late: by how many s it came too late; 0: it is not wanted any more; None: it
+        :param late: by how many s it came too late; 0: its request was dropped; None: it
             answers nothing that was asked.
         """
         if late is None:
@@ -106,7 +106,7 @@ class Reporter:
         self.events.append(StationFound())
 
     def lost(self, reason: Sentence, *, was_online: bool, ordered: bool = False) -> None:
-        """Report why the drive is offline; people hear of it when it was not."""
+        """Report why the drive is offline; as an event only if it was online."""
         self.advise(reason)
         if was_online:
             self.events.append(StationLost(reason, ordered))

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Acyclic requests of users, what became of each parameter in them, and how often a drive is asked.
+Acyclic requests of users, the outcome of each parameter in them, and how often a drive is asked.
 
 A request holds the parameters of one service call. It is answered exactly once, by a
 :class:`~drive_can_bridge.core.events.RequestCompleted` event with one outcome per parameter in
@@ -30,12 +30,12 @@ class FailureKind(Enum):
 
     @property
     def unheard(self) -> bool:
-        """No frame of the drive came: it may have done it all the same, or not be there."""
+        """Whether no frame of the drive came: it may have done it all the same, or be absent."""
         return self not in (FailureKind.REFUSED, FailureKind.ABSENT, FailureKind.INVALID)
 
     @property
     def of_bridge(self) -> bool:
-        """It is no fault of the parameter: all others would have failed alike."""
+        """Whether it is no fault of the parameter: all others would have failed alike."""
         return self in (FailureKind.OFFLINE, FailureKind.UNAVAILABLE)
 
 
@@ -65,7 +65,7 @@ class Written:
     note: str = ''
 
 
-#: refusals of CANopen that say that there is nothing: no such object, no such sub-index
+#: refusals of CANopen that mean that there is no such object, or no such sub-index
 ABSENT_CODES = frozenset((0x06020000, 0x06090011))
 NOT_SENT = Failure(FailureKind.NOT_SENT, sentences.not_sent())
 
@@ -93,21 +93,21 @@ def refused(code: int, reason: Sentence) -> Failure:
 
 
 def is_answer(outcome: Outcome) -> bool:
-    """Return whether an outcome rests on something that the drive said."""
+    """Return whether an outcome rests on an answer of the drive."""
     if isinstance(outcome, Failure):
         return not outcome.kind.unheard
     return not (isinstance(outcome, Written) and outcome.note)
 
 
 def kind_of(reason: str) -> FailureKind:
-    """Return the kind of a failure whose reason came as mere text: through ROS."""
+    """Return the kind of a failure whose reason came as mere text, through ROS."""
     return next((kind for text, kind in _TEXTS.items() if reason.startswith(text)),
                 FailureKind.REFUSED)
 
 
 @dataclass(frozen=True, eq=False)
 class ReadRequest:
-    """Read parameters, each one if need be alone."""
+    """A request to read parameters, each one by itself if need be."""
 
     parameters: tuple[Parameter, ...]
 
@@ -118,11 +118,11 @@ class ReadRequest:
 @dataclass(frozen=True, eq=False)
 class WriteRequest:
     """
-    Write parameters in order.
+    A request to write parameters in order.
 
     :param items: (parameter, raw integer).
     :param atomic: all in one frame, or none.
-    :param blind: sent although nobody answers: the drive may hear although its answers get lost.
+    :param blind: sent without an answer: the drive may receive although its answers get lost.
     """
 
     items: tuple[tuple[Parameter, int], ...]
@@ -143,11 +143,11 @@ def _never() -> bool:
 @dataclass(slots=True)
 class RetryPolicy:
     """
-    What everybody who asks a drive has to know; one for each drive, whose time-out may change.
+    How long and how often a drive is asked; one for each drive, whose time-out may change.
 
     :param timeout: s to wait for an answer.
     :param attempts: how often a read is sent before it counts as unanswered.
-    :param offline: tells whether nobody is there; then one unanswered frame ends a request.
+    :param offline: returns whether the drive is absent; then one unanswered frame ends a request.
     """
 
     timeout: float
@@ -155,7 +155,7 @@ class RetryPolicy:
     offline: Callable[[], bool] = _never
 
     def unanswered(self, attempts: int | None = None, timeout: float | None = None) -> Failure:
-        """Say that nobody answered; None: as often, and in so many s, as configured."""
+        """Return the failure for no answer; None: as often, and in so many s, as configured."""
         if self.offline():
             return Failure(FailureKind.OFFLINE, sentences.no_answer_offline())
         return Failure(FailureKind.NO_ANSWER, sentences.no_answer(

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Who a drive's parameters belong to, by what they address, and so which of them users may write.
+Which parameters the bridge itself uses, by what they address, and so which ones users may write.
 
-A name says little: a profile may list one parameter twice, a raw name reaches it as well, and a
+A name is not enough: a profile may list one parameter twice, a raw name reaches it as well, and a
 double word covers its neighbour. So each family says which *cells* of the drive a parameter
 addresses (words of its memory, by whatever marks them), and what shares a cell with the control
 word, a setpoint or a map is the bridge's own.
@@ -19,7 +19,7 @@ from drive_can_bridge.core.parameters import Parameter
 if TYPE_CHECKING:   # a command that wants to know a role needs no configuration
     from drive_can_bridge.core.configuration import DriveConfiguration
 
-#: what a parameter addresses; empty: nothing that acyclic frames reach
+#: cells that a parameter addresses; empty: none that acyclic frames reach
 Cells = frozenset[Hashable]
 
 
@@ -32,25 +32,25 @@ class Role(Enum):
 
 
 def by_number(parameter: Parameter) -> Cells:
-    """Return what a parameter addresses where its number says it all."""
+    """Return the cells of a parameter that its number addresses completely."""
     return frozenset() if parameter.number is None else frozenset([parameter.number])
 
 
 def publish_it(parameter: Parameter) -> Sentence:
-    """Say why a setpoint is not written by request."""
+    """Return why a setpoint is not written by request."""
     return sentences.sent_cyclically(parameter.name)
 
 
 class Roles:
     """
-    What the bridge itself writes on one drive.
+    The parameters that the bridge itself writes on one drive.
 
     :param controlled: a control machine looks after the control word.
     :param cells: what a parameter addresses.
-    :param maps: what tells the drive how cyclic telegrams are to be read.
+    :param maps: what defines for the drive how cyclic telegrams are read.
     :param cyclic_refusal: why a setpoint is not written by request.
-    :param built_in: what the bridge controls a drive by, whatever profiles call it.
-    :param refusal: why a parameter that is nobody's cannot be written for other reasons.
+    :param built_in: what the bridge controls a drive by, whatever its name in profiles.
+    :param refusal: why a parameter that the bridge does not use cannot be written.
     """
 
     def __init__(self, drive: 'DriveConfiguration', *, controlled: bool,
@@ -72,9 +72,9 @@ class Roles:
 
     def owner(self, parameter: Parameter) -> tuple[Role, Parameter] | None:
         """
-        Return what a parameter is written for by the bridge, and as which parameter.
+        Return what the bridge writes a parameter for, and as which parameter.
 
-        The control word goes before setpoints, and those before maps; None: users may have it.
+        The control word goes before setpoints, and those before maps; None: users may write it.
         """
         cells = self.cells(parameter)
         for role, other, others in self._own:
@@ -83,7 +83,7 @@ class Roles:
         return (Role.MAP, parameter) if cells & self._maps else None
 
     def role(self, parameter: Parameter) -> Role | None:
-        """Say what the bridge uses a parameter for that users cannot set for that reason."""
+        """Return what the bridge uses a parameter for, if users cannot set it for that reason."""
         owner = self.owner(parameter)
         if owner is not None:
             return owner[0]
@@ -94,7 +94,7 @@ class Roles:
 
     def write_refusal(self, parameter: Parameter, *, exchanging: bool) -> Sentence:
         """
-        Say why users may not write a parameter; '' if they may.
+        Return why users may not write a parameter; '' if they may.
 
         :param exchanging: the bridge is in exchange with the drive, and needs its maps.
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is said to people of drives, requests and stops: every sentence, by its code.
+Texts about drives, requests and stops, each with its code.
 
 Each row is a text with its fields in braces, and what to do about it (:class:`.Text`).
 docs/messages.md is made of them.
@@ -13,7 +13,7 @@ from drive_can_bridge.core.messages import catalogue, Text
 
 
 class Absence(Enum):
-    """What a sentence on a drive that is not online says of what arrives from it."""
+    """What an offline drive still sends, as far as a sentence shows."""
 
     SILENT = 'nothing, as far as is known'
     NO_HEARTBEAT = 'no heartbeat'
@@ -29,7 +29,7 @@ def _by_name(raws: Mapping[str, int | None]) -> str:
                      for name, raw in raws.items())
 
 
-#: in the words of something else
+#: the same in other words
 uncoded = Text('{text}', do='what the text says')
 
 # -- requests: why a parameter was not read or written --------------------------------------------
@@ -588,7 +588,7 @@ other_master_broadcasts = Text(
     '(P509): {frame}',
     do='end the other master; there must be one only')
 
-# -- what a drive says of itself, or does not take ------------------------------------------------
+# -- reports and refusals of a drive -------------------------------------------------------------
 booted = Text('boot-up: the device has started', do='nothing')
 emergency = Text(
     'emergency {text}',
@@ -951,7 +951,7 @@ jog_neutral_unseen = Text(
 jog_interrupted = Text('interrupted', do='nothing: the drive got neutral')
 jog_done = Text('{value} was sent and answered, then neutral', do='nothing')
 
-# -- the bridge, its topics and its services: what the log and answers say ------------------------
+# -- the bridge, its topics and its services: texts of log and answers ----------------------------
 possible_are = Text('possible are {possible:, }', do='ask for one of these')
 being_stopped = Text('the bridge is being stopped', do='start the bridge again when it has ended')
 transition_failed = Text(

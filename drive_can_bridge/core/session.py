@@ -14,10 +14,10 @@ and collects frames to send and events:
     for event in session.take_events(): ...
 
 A session never blocks, never raises on anything a drive sends, and sends nothing before
-``activate``, after ``deactivate`` has run its course, or while the bus is down.
+``activate``, after the stop of ``deactivate``, or while the bus is down.
 
-What is the same for all families stands here: when a drive is found and lost, what is taken back
-then, how a stop begins and what is said when it was not acknowledged, whose turn it is when. A
+What is the same for all families stands here: when a drive is found and lost, what is withdrawn
+then, how a stop begins and what is reported when it was not acknowledged, which part acts when. A
 family fills in what the exchange of its drives is: :meth:`Session.begin`,
 :meth:`Session.begin_stop`, frames, and a few occasions to act (below "what a family may add").
 What goes on beside that stands in the parts that a session is put together from
@@ -54,38 +54,38 @@ from drive_can_bridge.core.stop_duty import Do, Happened, StopDuty
 
 
 class Timed(Protocol):
-    """What acts at times of its own."""
+    """Something with a timer."""
 
     @property
     def due(self) -> float:
-        """When it has something to do; infinity: not planned."""
+        """When its timer expires; infinity: never."""
 
 
 class Part(Timed, Protocol):
-    """What goes on in a conversation beside other things."""
+    """A part of a session that acts beside the others."""
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due, which may be nothing."""
+        """Do what is due, if anything."""
 
     def stop(self) -> None:
-        """Plan nothing any more. The channel was cleared."""
+        """Cancel everything planned. The channel was cleared."""
 
 
 class AcyclicPart(Timed, Protocol):
     """The acyclic channel."""
 
     def advance(self, now: float) -> None:
-        """Do all that is possible now."""
+        """Do everything that is possible now."""
 
     def time_lost(self, now: float) -> None:
-        """Record that nobody listened until now."""
+        """Record that the process was stalled until now."""
 
     def clear(self) -> None:
         """Forget everything under way."""
 
 
 class Stage(Enum):
-    """What a session is doing for its drive."""
+    """The stages of a session."""
 
     #: serving requests at most
     IDLE = 'idle'
@@ -97,25 +97,25 @@ class Stage(Enum):
 
 class Session(ABC):
     """
-    What all families share: the life cycle, and the parts that everything else is left to.
+    What all families share: the life cycle, and the parts that do everything else.
 
     :param image: what is exchanged, where more is built into telegrams than the profile says.
-    :param roles: what users may not write, where a number alone does not say what is what.
+    :param roles: what users may not write, where a number alone is not enough to know.
     :param leader: the machine of the drive whose control word this one obeys, if another's.
     :ivar configuration: of the drive.
     :ivar control: the control and status word machine, or None.
     :ivar setpoints: every ``cyclic_request`` parameter but the control word, in slot order.
     :ivar interlock: whether commands reach the drive.
-    :ivar fault_watch: knows which fault the drive has; None: the profile does not say how.
+    :ivar fault_watch: knows which fault the drive has; None: not in the profile.
     :ivar neutral_stop: the quick stop of a drive without a control word.
     :ivar roles: what the bridge uses parameters for.
     :ivar sample_parameters: of a sample, in the order of ``ProcessDataReceived.raws``.
-    :ivar sent: what the drive was told last.
-    :ivar duty: whether the drive may be running by our word, and was told to stop.
+    :ivar sent: what the drive was commanded last.
+    :ivar duty: whether the drive may be running by command, and was commanded to stop.
     :ivar retry: how long and how often the drive is asked.
-    :ivar users: what they want of the drive; the family says who serves that.
+    :ivar users: serves requests of users; the family provides the server.
     :ivar report: events, and what is missing while the drive is offline.
-    :ivar remedy: says what to do about a drive whose state is ``mapping differs``.
+    :ivar remedy: what to do about a drive whose state is ``mapping differs``.
     :ivar stage: what is being done for the drive.
     :ivar activated: the bridge is active; ``active``: and does not leave the drive alone.
     :ivar online: the drive exchanges process data.
@@ -131,7 +131,7 @@ class Session(ABC):
     services: DriveServices
     #: it can look for its reference
     homes = False
-    #: what came with a frame is to be taken before anything is sent because of that
+    #: what came with a frame is handled before anything is sent because of that
     looks_ahead = False
     _acyclic: AcyclicPart
 
@@ -172,7 +172,7 @@ class Session(ABC):
         self._timed: list[tuple[Timed, Callable[[float], None]]] = []
 
     def look_after(self, *parts: Part, channel: AcyclicPart) -> None:
-        """Name the parts, in the order in which they act; then come control word and channel."""
+        """Set the parts, in the order in which they act; then come control word and channel."""
         self._parts, self._acyclic = parts, channel
         self._timed = [(part, part.handle_timer) for part in parts]
         if self.control is not None:
@@ -184,29 +184,29 @@ class Session(ABC):
     # -- life cycle -------------------------------------------------------------------------------
 
     def activate(self, now: float) -> None:
-        """Begin to exchange (as soon as the bus is there)."""
+        """Start the exchange (as soon as the bus is there)."""
         self.activated = self.active = True
         self.defect = NOTHING
         self.ever_online = False
         self.sent.clear()
         self.setpoints.reset()
-        self.duty.happened(Happened.ACTIVATED)  # what one before told is not ours to undo
+        self.duty.happened(Happened.ACTIVATED)  # not responsible for previous ones
         if self.bus_available:
             self.bus_up(now)
 
     def serve(self) -> None:
         """
-        Serve parameter requests and do nothing else, instead of ``activate``.
+        Serve parameter requests only, instead of ``activate``.
 
-        No exchange, no setpoint, no control word, nothing that nobody asked for: so there is
+        No exchange, no setpoint, no control word, nothing unasked: so there is
         nothing to be stopped either, and no ``deactivate``.
         """
         self.active = self.serving = True
 
     def deactivate(self, now: float) -> None:
-        """Begin the safe stop: neutral setpoints, ``disable``; then silence."""
+        """Start the safe stop: neutral setpoints, ``disable``; then silence."""
         self.activated = False
-        # left alone for a defect, and not told with success: it may hear this one
+        # left alone after an internal error, and its stop not acknowledged: this one may arrive
         if self.defect and self.stopped and self.bus_available and any(
                 each.owed for each in (self, *self.partners)):
             self.stage = Stage.RUNNING
@@ -214,19 +214,19 @@ class Session(ABC):
 
     def fail(self, reason: Sentence, now: float) -> None:
         """
-        Stop the drive as at the end: this program has a defect, and nobody knows what it spoilt.
+        Stop the drive after an internal error: the state of the session cannot be trusted.
 
         It is offline from now on, and left alone until :meth:`begin_anew`.
 
         :param reason: in words.
         """
         if self.defect or self.stage is Stage.IDLE and not self.active:
-            return      # its stop takes its course
+            return      # its stop goes on
         self.defect = reason
         self._begin_end(reason, now)
 
     def begin_anew(self, now: float) -> None:
-        """Look for the drive again, after a defect."""
+        """Look for the drive again, after an internal error."""
         self.defect = NOTHING
         self.active = True
         if self.bus_available:
@@ -248,21 +248,21 @@ class Session(ABC):
 
     def stop_left(self, why: Sentence = NOTHING) -> None:
         """
-        End a stop that was not enough: send nothing more.
+        End a stop that was not acknowledged: send nothing more.
 
-        :param why: what is wrong with it; by default, nobody acknowledges it.
+        :param why: what is wrong with it; by default, that it is not acknowledged.
         """
         self._leave_owing(why or sentences.stop_not_answered())
         self.go_idle()
 
     def stop_ended(self) -> None:
-        """End a stop by writes, if this one was for that: what it could not do, it has told."""
+        """End a stop by writes, if the session is stopping: its failures are reported already."""
         if self.stage is Stage.STOPPING:
             self.go_idle()
 
     @property
     def stopped(self) -> bool:
-        """The stop has run its course (also: it never had to)."""
+        """Whether the stop is complete (also: none was needed)."""
         return self.stage is Stage.IDLE
 
     @property
@@ -271,7 +271,7 @@ class Session(ABC):
         """How many s the stop takes at most."""
 
     def bus_up(self, now: float) -> None:
-        """Begin to use the bus: it was opened."""
+        """Start using the bus: it was opened."""
         self.bus_available = True
         if self.active and not self.serving:
             self.report.guess(sentences.looked_for())
@@ -290,7 +290,7 @@ class Session(ABC):
         self._leave_owing(sentences.bus_lost_before_stop())
 
     def give_up(self, now: float) -> None:
-        """Handle a stop that did not come to its end in time: the bus takes nothing."""
+        """Handle a stop that did not end in time: the bus accepts nothing."""
         self.duty.happened(Happened.SILENT)     # what has left of it was not answered
         self._leave_owing(sentences.stop_not_possible())
         self.go_idle()
@@ -307,14 +307,14 @@ class Session(ABC):
         self.be_offline(lost or sentences.deactivated(), ordered=not lost)
 
     def time_lost(self, now: float) -> None:
-        """Handle a process that stood still: nothing stale goes out, setpoints want re-arming."""
+        """Handle a stall of the process: nothing late is sent, setpoints must be armed again."""
         self._acyclic.time_lost(now)
         if self.stage is Stage.RUNNING:
             self.stood_still(now)
             self.start_over(now)
 
     def start_over(self, now: float) -> None:
-        """Begin anew: nothing is known of the drive."""
+        """Restart the exchange: the state of the drive is unknown."""
         reason = sentences.reconnected()
         if self.online:
             self.lose(reason, now)
@@ -325,7 +325,7 @@ class Session(ABC):
         self.begin(now)
 
     def lose(self, reason: Sentence, now: float) -> None:
-        """Make the drive offline, if it is not."""
+        """Set the drive offline, if it is not."""
         was_online = self.online
         self.withdraw(reason, now)
         self.setpoints.forget()
@@ -335,7 +335,7 @@ class Session(ABC):
         self.lost(now, was_online=was_online)
 
     def stood_still(self, now: float) -> None:
-        """Make the drive offline after a stall: nobody has looked after it meanwhile."""
+        """Set the drive offline after a stall: nothing was exchanged meanwhile."""
         self.lose(sentences.bridge_stood_still(), now)
 
     def withdraw(self, reason: Sentence, now: float) -> None:
@@ -357,7 +357,7 @@ class Session(ABC):
         self.went_offline()
 
     def _leave_owing(self, why: Sentence) -> None:
-        """Say that the drive is left as it is, if it was told to run and not to stop."""
+        """Warn if the drive is left running: commanded to run, and not to stop."""
         if self.duty.happened(Happened.LEFT_ALONE) is Do.WARN:
             self.report.warn(why, may_run=True)
 
@@ -365,16 +365,16 @@ class Session(ABC):
 
     @abstractmethod
     def begin(self, now: float) -> None:
-        """Begin the exchange; nothing is known of the drive."""
+        """Start the exchange; the state of the drive is unknown."""
 
     @abstractmethod
     def begin_stop(self, now: float) -> bool:
-        """Begin to tell the drive to stand still; False: there is no way to tell it."""
+        """Start commanding the drive to stand still; False: there is no way to."""
 
     # -- what a family may add --------------------------------------------------------------------
 
     def prepare_stop(self, now: float) -> bool:
-        """Forget what the stop will not need; tell whether there is anything to be stopped."""
+        """Forget what the stop will not need; return whether there is anything to be stopped."""
         self._acyclic.clear()
         return self.stage is not Stage.IDLE
 
@@ -394,7 +394,7 @@ class Session(ABC):
             self.lose(reason, now)
 
     def exchange_ended(self) -> None:  # noqa: B027  optional
-        """Forget what belongs to an exchange that has ended, answered or not."""
+        """Forget the state of an exchange that has ended, answered or not."""
 
     def commands_expired(self, now: float) -> None:  # noqa: B027  optional
         """Record that setpoints went neutral because no fresh command keeps them."""
@@ -403,17 +403,17 @@ class Session(ABC):
         """Record that the drive is lost."""
 
     def went_offline(self) -> None:  # noqa: B027  optional
-        """Forget what belongs to a drive that is online."""
+        """Forget the state of a drive that is online."""
 
     def withdrawn(self, now: float) -> None:
         """Record that the control word is ``disable`` again."""
         self.see_to_control_word(now)
 
     def hand_out_neutral(self, now: float) -> None:  # noqa: B027  where there may be no control
-        """Have all setpoints sent at once, neutral as they are: a drive without a control word."""
+        """Send all setpoints at once, neutral as they are: a drive without a control word."""
 
     def request_control(self, request: ControlRequest, now: float) -> None:
-        """Take what is asked of the drive by its control word."""
+        """Handle a request for a control action."""
         if self.control is not None:
             self.control.request(request, now)
             self.control_changed(now)
@@ -421,40 +421,40 @@ class Session(ABC):
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:
         """
-        Say why a control action cannot be asked for; '' if it can.
+        Return why a control action cannot be requested; '' if it can.
 
-        :param refusal: what is usually said.
-        :param offline: that is that the drive is offline.
+        :param refusal: the usual text.
+        :param offline: that the drive is offline is that text.
         """
         return refusal
 
     def request_refusal(self, now: float) -> Failure | None:
-        """Return what of the drive itself forbids requests for parameters; None: nothing."""
+        """Return why the drive itself takes no parameter requests now; None if it does."""
         return None
 
     def request_answered(self, request: Request, outcomes: Outcomes) -> None:  # noqa: B027
         """Record a request for parameters that was served, and answered."""
 
     def home(self, request: ControlRequest, now: float) -> None:
-        """Have the axis look for its reference; answered by exactly one ``ControlCompleted``."""
-        raise NotImplementedError   # nobody gets here but where ``homes`` is true
+        """Start homing; answered by exactly one ``ControlCompleted``."""
+        raise NotImplementedError   # only called where ``homes`` is true
 
     def see_to_control_word(self, now: float) -> None:  # noqa: B027  optional
-        """Have a control word sent that has changed."""
+        """Send a control word that has changed."""
 
     # -- traffic ----------------------------------------------------------------------------------
 
     @abstractmethod
     def receive_frame(self, frame: Frame, now: float, age: float = 0.0) -> None:
         """
-        Take a frame that one of the drive's routes matched.
+        Handle a frame that one of the drive's routes matched.
 
         :param age: s since it was received. That counts for stamps and latencies only: whatever
             is sent in answer to it leaves now.
         """
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due. Safe to call at any time."""
+        """Do what is due. May be called at any time."""
         for part, act in self._timed:
             if now >= part.due:
                 act(now)
@@ -494,7 +494,7 @@ class Session(ABC):
         return self.report.take()
 
     def control_changed(self, now: float) -> None:
-        """React to a control word, or a state, that may have changed."""
+        """Handle a control word, or a state, that may have changed."""
         self.interlock.follow()
         self.see_to_control_word(now)
 
@@ -525,12 +525,12 @@ class Session(ABC):
 
     @property
     def shows_fault(self) -> bool:
-        """Its own status says that it has a fault."""
+        """Whether its own status reports a fault."""
         return self.control is not None and self.control.fault
 
     @property
     def warning(self) -> Sentence:
-        """Why all is not well although the drive is online, and what to do; '' otherwise."""
+        """Why a drive that is online needs attention, and what to do; '' otherwise."""
         return NOTHING
 
     @property
@@ -540,7 +540,7 @@ class Session(ABC):
 
     @property
     def busy(self) -> Sentence:
-        """What the drive is about that nobody commands, and nothing arms meanwhile; '' if not."""
+        """What the drive does by itself, during which nothing arms; '' if nothing."""
         return NOTHING
 
     def facts(self) -> dict[str, str]:
@@ -551,25 +551,25 @@ class Session(ABC):
 
     @property
     def may_run(self) -> bool:
-        """Nothing has shown yet that the drive does not run by our word."""
+        """Whether the drive may still be running by command."""
         return self.duty.may_run
 
     @property
     def owed(self) -> bool:
-        """The drive was told to run, and to stop since only in vain."""
+        """Whether the drive was commanded to run, and since then to stop only in vain."""
         return self.duty.owed
 
     @property
     def unshown(self) -> bool:
-        """The drive was told to run, and has not shown to have heard that it was told to stop."""
+        """Whether the drive was commanded to run, and has not acknowledged its stop."""
         return self.duty.unshown
 
     @property
     def offline_advice(self) -> Sentence:
-        """While not online: what is missing and what to look at; '' while online."""
+        """While not online: what is missing and what to check; '' while online."""
         return self.defect or self.report.advice
 
     @property
     def guesses(self) -> bool:
-        """That rests on nothing but that the drive does not answer."""
+        """Whether the advice rests only on the drive's not answering."""
         return not self.defect and self.report.advice_kind is AdviceKind.GUESS

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Setpoints: what the drive is told to do, and whether anybody still means it.
+Setpoints: what the drive is commanded, and whether the commands are still fresh.
 
 A setpoint is *armed* when commands go through, and then it is *fresh* for ``command_timeout``
 seconds after each accepted command. Whatever is not armed or not fresh is sent as its neutral
@@ -22,7 +22,7 @@ from drive_can_bridge.core.sentences import position_not_told, would_jump
 
 
 class CommandOutcome(Enum):
-    """What became of a command that is valid in itself."""
+    """The outcome of a command that is valid in itself."""
 
     ACCEPTED = 'accepted'
     ARMED = 'armed'
@@ -37,13 +37,13 @@ class Setpoints:
     :param timeout: s without a fresh command until a setpoint goes neutral; 0: never.
     :param rearm_immediate: any valid command arms, not only a neutral one.
     :param sample: what is measured, in the order of samples.
-    :param sent: what the drive was told last.
+    :param sent: what the drive was commanded last.
     :ivar held: those that stay where the axis is.
-    :ivar forgotten: how often all that was known of positions became void.
+    :ivar forgotten: how often all known positions became invalid.
     :ivar changed: some ``raw`` is not what it was; cleared when the telegram is encoded.
-    :ivar enabled: commands are taken at all: the drive is online, nothing is stopping, and a drive
-        with control is enabled.
-    :ivar ignored_at: ``now`` of the last command that came while they were not taken.
+    :ivar enabled: commands are accepted at all: the drive is online, nothing is stopping, and a
+        drive with control is enabled.
+    :ivar ignored_at: ``now`` of the last command that came while they were not accepted.
     :ivar expires_at: when to call ``expire``; it may be too early, never too late.
     """
 
@@ -59,14 +59,14 @@ class Setpoints:
         self.enabled = False
         self.ignored_at = -math.inf
         self._timeout = timeout
-        self._expired: list[Setpoint] = []  # found overdue by a command, not told yet
+        self._expired: list[Setpoint] = []  # found overdue by a command, not reported yet
 
     def command(self, index: int, value: Value, now: float, *,
                 active: bool = True) -> CommandOutcome:
         """
-        Take a command for one setpoint. The newest one wins.
+        Handle a command for one setpoint. The newest one wins.
 
-        :param active: the bridge is: a limit is taken, whatever the drive is doing.
+        :param active: the bridge is active: then a limit is set, whatever the drive does.
         :raises ValueRefused: the value cannot be sent. Nothing changes then, the age included; but
             what may have been meant to be 0 disarms.
         """
@@ -99,7 +99,7 @@ class Setpoints:
         return outcome
 
     def old_command(self, index: int, value: Value) -> None:
-        """Take a command that is too old to move anything: one that equals neutral disarms."""
+        """Handle a command that is too old to move anything: one that equals neutral disarms."""
         setpoint = self.items[index]
         if setpoint.armed and (setpoint.armed_by(value) or is_misplaced_integer(value)):
             self.disarm_one(index)
@@ -130,7 +130,7 @@ class Setpoints:
 
     @property
     def timeout(self) -> float:
-        """How old a command may become, in s; 0: as old as it likes."""
+        """How old a command may become, in s; 0: any age."""
         return self._timeout
 
     @timeout.setter
@@ -152,9 +152,9 @@ class Setpoints:
 
     def allow(self, taken: bool) -> None:
         """
-        Take commands from now on, or not; while they are not taken, everything is neutral.
+        Accept commands from now on, or not; while they are not accepted, everything is neutral.
 
-        They are not taken before all neutral values are known, either.
+        They are not accepted before all neutral values are known, either.
         """
         taken = taken and self.known
         if taken is not self.enabled:
@@ -167,34 +167,34 @@ class Setpoints:
 
     @property
     def known(self) -> bool:
-        """All neutral values are known."""
+        """Whether all neutral values are known."""
         return all(setpoint.known for setpoint in self.held)
 
     @property
     def unknown(self) -> list[str]:
-        """Names of those whose neutral value is not known: they are not to be written."""
+        """Names of those whose neutral value is unknown: they are not to be written."""
         return [setpoint.parameter.name for setpoint in self.held if not setpoint.known]
 
     @property
     def ever_known(self) -> bool:
-        """All neutral values were known at least once since the last ``reset``."""
+        """Whether all neutral values were known at least once since the last ``reset``."""
         return all(setpoint.ever_known for setpoint in self.held)
 
     @property
     def untold(self) -> list[HeldSetpoint]:
-        """Those of which the drive does not have the present position."""
+        """Those whose present position the drive was not sent."""
         return [setpoint for setpoint in self.held if not setpoint.told]
 
     @property
     def untold_text(self) -> Sentence:
-        """Why an axis cannot be driven yet: the drive does not have its position; '' if it has."""
+        """Why an axis cannot be driven yet: the drive was not sent its position; '' if it was."""
         why = together(
             position_not_told(setpoint.parameter.name, setpoint.measured.name, setpoint.known)
             for setpoint in self.untold)
         return would_jump(why) if why else NOTHING
 
     def reset(self) -> None:
-        """Begin anew: nothing was ever measured, and limits are neutral."""
+        """Start over: no position was ever measured, and limits are neutral."""
         for setpoint in self.items:
             if isinstance(setpoint, (HeldSetpoint, Limit)):
                 setpoint.reset()
@@ -208,7 +208,7 @@ class Setpoints:
 
     def measure(self, raws: Sequence[int | None], *, driven: bool) -> bool:
         """
-        Take the positions of a sample; None: of those that are missing.
+        Follow the positions of a sample; None: of those that are missing.
 
         :param driven: the drive may be holding its axes: what is known stays as it is.
         :return: something else is to be sent, or may be sent now.
@@ -228,7 +228,7 @@ class Setpoints:
 
     @property
     def at_rest(self) -> bool:
-        """Everything that is to be sent is neutral."""
+        """Whether everything that is to be sent is neutral."""
         for setpoint in self.items:     # asked in every cycle: a generator costs twice as much
             if setpoint.raw != setpoint.neutral:
                 return False

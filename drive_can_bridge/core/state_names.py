@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The states of drives by the names that users see, and what each means: power, and what next.
+The states of drives by the names that users see, and what each means: power, and what to do.
 
 Services answer with these names. Of two, the first is that of CiA 402, the second that of NORD.
 """

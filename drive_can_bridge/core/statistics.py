@@ -12,7 +12,7 @@ class Statistic:
     """
     Mean and maximum since the start, 99th percentile over the last 1,024 samples.
 
-    Somebody asks for the percentile about once a second, for thirty windows in a row, while the
+    The percentile is asked for about once a second, for thirty windows in a row, while the
     exchange goes on: sorting them all would keep the interpreter busy for 6 ms. So only those are
     sorted that are not far below the last answer.
     """
@@ -27,7 +27,7 @@ class Statistic:
         self._floor = 0.0
 
     def add(self, sample: float) -> None:
-        """Take one sample."""
+        """Add one sample."""
         self._window[self.count % WINDOW] = sample
         self.count += 1
         self.total += sample
@@ -63,7 +63,7 @@ class Statistic:
 @dataclass
 class DriveStatistics:
     """
-    What a session counts. Times in s.
+    The counts of a session. Times in s.
 
     :ivar exchanges: complete request/response exchanges.
     :ivar missed: responses that did not come in time.

@@ -17,7 +17,7 @@ from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 @dataclass(slots=True)
 class _Member:
-    """What is known of one drive."""
+    """The last reports of one drive."""
 
     raw: int | None = None      # the last status word
     answer: int | None = None   # the last one since the current control word left
@@ -56,12 +56,12 @@ class StatusReports:
         self._present[name] = _Member()
 
     def lose(self, name: str) -> bool:
-        """Record that a member is offline; tell whether it was not."""
+        """Record that a member is offline; return whether it was online."""
         return self._present.pop(name, None) is not None
 
     def take(self, name: str, raw: int | None, *, counts: bool) -> bool:
         """
-        Take a status word.
+        Record a status word.
 
         :param raw: None where a response arrived that should hold one, but did not.
         :param counts: it arrived after the current control word had left.
@@ -81,7 +81,7 @@ class StatusReports:
             member.answer = None
 
     def forget(self) -> None:
-        """Record that nothing is known any more."""
+        """Forget all reports."""
         for member in self._present.values():
             member.raw = member.answer = None
 
@@ -89,17 +89,17 @@ class StatusReports:
 
     @property
     def missing(self) -> list[str]:
-        """The members that are not there."""
+        """The members that are offline."""
         return [name for name in self._members if name not in self._present]
 
     @property
     def answered(self) -> bool:
-        """One of them has reported since the current control word left."""
+        """Whether one of them has reported since the current control word left."""
         return any(member.answer is not None for member in self._present.values())
 
     @property
     def telling(self) -> int | None:
-        """The status word that says most: of a fault, else of a member that lags behind."""
+        """The status word that matters most: of a fault, else of a member that lags behind."""
         raws = [member.raw for member in self._present.values() if member.raw is not None]
         faults = [raw for raw in raws if _matches(self._table.fault, raw)]
         behind = [raw for raw in raws if not _matches(self._running, raw)]
@@ -107,7 +107,7 @@ class StatusReports:
 
     @property
     def faulted(self) -> bool:
-        """One of them reports a fault, as far as is known."""
+        """Whether one of them reports a fault, as far as is known."""
         fault = self._table.fault
         if fault is not None:
             for member in self._present.values():
@@ -116,19 +116,19 @@ class StatusReports:
         return False
 
     def says(self, pattern: StatusPattern | None) -> bool:
-        """Return whether the status word that says most fulfils a condition."""
+        """Return whether the status word that matters most fulfils a condition."""
         raw = self.telling
         return raw is not None and _matches(pattern, raw)
 
     @property
     def braking(self) -> bool:
-        """One of them says that it is in a quick stop, which ``disable`` would end."""
+        """Whether one of them reports a quick stop, which ``disable`` would end."""
         return any(member.raw is not None and _matches(self._table.braking, member.raw)
                    for member in self._present.values())
 
     @property
     def sound_ones_run(self) -> bool:
-        """One of them reports that it runs, and no fault."""
+        """Whether one of them reports that it runs, and no fault."""
         running = self._running
         return running is not None and any(
             member.raw is not None and running.matches(member.raw)
@@ -141,12 +141,12 @@ class StatusReports:
 
     @property
     def standing(self) -> bool:
-        """All of them, knowing the current word, report that they do not run."""
+        """Whether all of them, knowing the current word, report that they do not run."""
         return self._running is not None and self.confirmed(self._running, False)
 
     @property
     def off(self) -> bool:
-        """All of them report that they do not run, whatever word they know."""
+        """Whether all of them report that they do not run, whatever word they know."""
         running = self._running
         return running is not None and all(
             member.raw is not None and not running.matches(member.raw)
@@ -154,8 +154,8 @@ class StatusReports:
 
     @property
     def running_on(self) -> bool:
-        """One of them, knowing the current word, reports that it runs."""
-        # they may answer in turn: who has not answered yet says nothing
+        """Whether one of them, knowing the current word, reports that it runs."""
+        # they may answer in turn: one without an answer yet does not count
         running = self._running
         if running is not None:
             for member in self._present.values():
@@ -165,7 +165,7 @@ class StatusReports:
 
     @property
     def resettable(self) -> bool:
-        """There is a fault, and all of them, knowing the current word, can have it reset."""
+        """Whether there is a fault, and all, knowing the current word, can have it reset."""
         table = self._table
         return (self._all(lambda answer: not _matches(table.reaction, answer))
                 and any(_matches(table.fault, member.answer)
@@ -233,7 +233,7 @@ def stuck_text(reports: StatusReports, table: ControlTable, wording: Wording | N
                timeout: float, sending: ControlAction, word: int, *, sent: bool, pulsed: bool,
                acknowledged: bool, fault: str = '', more: Sentence = NOTHING) -> Sentence:
     """
-    Say that nothing was confirmed in time, and as much as is known of the reason.
+    Return that nothing was confirmed in time, and as much as is known of the reason.
 
     :param sending: what the current control word is for.
     :param pulsed: the pulse that resets a fault has left.
@@ -270,5 +270,5 @@ def success_text(table: ControlTable, sending: ControlAction, state: str) -> Sen
 
 def disregard_text(reports: StatusReports, state: str, sending: ControlAction,
                    word: int) -> Sentence:
-    """Say that a drive runs on although it shall not, and what to do."""
+    """Return that a drive runs on although commanded to stop, and what to do."""
     return sentences.disregards(state, reports.text, sending.value, word)

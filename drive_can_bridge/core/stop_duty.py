@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The rule book of stops: what a drive was told to do, and whether it is owed a stop.
+The rule book of stops: what a drive was commanded, and whether a stop is pending.
 
-*Whatever was told to run is told to stop.* May a drive be running by our word, and has it been
-told to stop? It is told separately by cycles, by a control word that is written by number, by
-setpoints that are. Each of these *channels* has a :class:`Debt`. Sessions say what has
-:class:`Happened`; the table :data:`ROWS` says what the debt is from then on, and what the session
-has to :class:`Do`. Nobody else decides that, and nobody else changes a debt. What is not in the
+*Whatever was commanded to run is commanded to stop.* May a drive be running by command, and was
+it commanded to stop? Cycles command it, and separately an acyclic control word, and
+acyclic setpoints. Each of these *channels* has a :class:`Debt`. Sessions report what has
+:class:`Happened`; the table :data:`ROWS` has the debt from then on, and what the session
+has to :class:`Do`. That is decided, and a debt changed, nowhere else. What is not in the
 table changes nothing.
 
 .. code-block:: text
@@ -19,10 +19,10 @@ table changes nothing.
                        RUNS_UNHEARD ─────────► UNHEARD ──────────────┘ that was confirmed
                                     a stop left
 
-``OWED`` is the only debt of a drive that acknowledges what it is told, until it has acknowledged
+``OWED`` is the only debt of a drive that acknowledges its commands, until it has acknowledged
 what stops it.
 
-``test/rule_checker.py`` lives through all sequences of events against a motor that obeys whatever
+``test/rule_checker.py`` runs all sequences of events against a motor that obeys whatever
 arrives, and is red when a single row is changed.
 """
 
@@ -30,14 +30,14 @@ from collections.abc import Hashable
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
-#: what a drive is told by cycles
+#: the channel of cycles
 CYCLE = 'cycle'
 #: the control word, where it travels by itself
 CONTROL_WORD = 'control word'
 
 
 class Debt(Enum):
-    """What a drive is owed by one of the things that it is told separately."""
+    """The pending stop of one channel that commands the drive separately."""
 
     __hash__ = object.__hash__      # in C: looked up with every frame
 
@@ -77,12 +77,12 @@ class Do(IntEnum):
 
     NOTHING = 0
     #: by cycles where the request map is known to agree, else by number; a stop by number that is
-    #: not confirmed is told
+    #: a stop that is not confirmed is commanded again
     STOP = 1
-    #: not by cycles: it has not heard them; families without numbers say at once that it may still
+    #: not by cycles: they do not reach it; families without acyclic writes warn at once
     #: be running
     STOP_BY_NUMBER = 2
-    #: say that it may still be running
+    #: warn that it may still be running
     WARN = 3
 
 
@@ -92,7 +92,7 @@ class DutyRow(NamedTuple):
 
     :ivar debts: it holds for these.
     :ivar becomes: the debt from then on; None: it stays.
-    :ivar carries: the sentence of the contract.
+    :ivar carries: the rule of the contract behind it.
     """
 
     debts: tuple[Debt, ...]
@@ -103,7 +103,7 @@ class DutyRow(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """What follows for one debt."""
+    """The outcome of an event for one debt."""
 
     becomes: Debt
     do: Do
@@ -111,13 +111,13 @@ class Rule(NamedTuple):
 
 _NONE, _OWED, _RUNS = Debt.NONE, Debt.OWED, Debt.RUNS
 _RUNS_UNHEARD, _STOP_SENT, _UNHEARD = Debt.RUNS_UNHEARD, Debt.STOP_SENT, Debt.UNHEARD
-#: told to run, and not to stop since, as far as anybody knows
+#: commanded to run, and not to stop since, as far as is known
 OWING = (_OWED, _RUNS, _RUNS_UNHEARD, _UNHEARD)
-#: told to run, and not to stop since, for certain
+#: commanded to run, and not to stop since, for certain
 RUNNING = (_OWED, _RUNS, _RUNS_UNHEARD)
 #: what stopped it has not been shown to have arrived
 UNSHOWN = (_RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
-#: what tells of whatever was told last
+#: what concerns the command that was sent last
 OF_THE_LAST = (Happened.ANSWERED, Happened.UNANSWERED)
 _ANY = (_OWED, _RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
 
@@ -156,7 +156,7 @@ ROWS: tuple[DutyRow, ...] = (
     DutyRow(_ANY, Happened.LOST, None, Do.STOP, _WHATEVER),
     DutyRow(OWING, Happened.UNANSWERED, None, Do.STOP, _WHATEVER),  # neutral cycles go on
     DutyRow((_STOP_SENT,), Happened.UNANSWERED, _UNHEARD, Do.STOP_BY_NUMBER, _SILENT),
-    # what the session turns to is told to stop before
+    # stopped before the session turns to something else
     DutyRow((_STOP_SENT,), Happened.MISROUTED, _RUNS, Do.NOTHING, _ROUTE),
     DutyRow((_RUNS, _STOP_SENT), Happened.MAPS_DIFFER, None, Do.STOP, _ROUTE),
     DutyRow((_RUNS_UNHEARD, _UNHEARD), Happened.MAPS_DIFFER, None, Do.STOP_BY_NUMBER, _ROUTE),
@@ -178,31 +178,31 @@ RULES: dict[tuple[Debt, Happened], Rule] = {
 
 class StopDuty:
     """
-    What one drive is owed, channel by channel: the only place where that is written.
+    The pending stops of one drive, channel by channel: the only place where they are kept.
 
-    :ivar owed: it was told to run by at least one channel, and to stop since only in vain.
-    :ivar unshown: what was told to run by something that nobody acknowledges has not shown that
-        what stopped it has arrived.
+    :ivar owed: it was commanded to run by at least one channel, and to stop since only in vain.
+    :ivar unshown: a channel without acknowledgements commanded it to run, and nothing shows that
+        its stop has arrived.
     """
 
     __slots__ = ('_debts', '_rules', 'owed', 'unshown')
 
     def __init__(self, rules: dict[tuple[Debt, Happened], Rule] = RULES) -> None:
         self._rules = rules
-        self._debts: dict[Hashable, Debt] = {}      # those of whom anything is owed
+        self._debts: dict[Hashable, Debt] = {}      # channels with a pending stop
         self.owed = self.unshown = False
 
     @property
     def may_run(self) -> bool:
-        """Nothing has shown that it does not run by our word."""
+        """Whether nothing has shown that the drive does not run by command."""
         return bool(self._debts)
 
     def runs(self, channel: Hashable) -> bool:
-        """Return whether a channel has told it to run, and not to stop since."""
+        """Return whether a channel has commanded it to run, and not to stop since."""
         return self._debts.get(channel) in RUNNING
 
     def channel(self, channel: Hashable, happened: Happened) -> Do:
-        """Take what happened to one channel; return what has to be done."""
+        """Record what happened to one channel; return what has to be done."""
         debt = self._debts.get(channel, _NONE)
         rule = self._rules.get((debt, happened))
         if rule is None:
@@ -213,11 +213,11 @@ class StopDuty:
         return rule.do
 
     def happened(self, happened: Happened) -> Do:
-        """Take what happened to the drive; return what has to be done."""
+        """Record what happened to the drive; return what has to be done."""
         do, debts, changed = Do.NOTHING, self._debts, False
         if not debts:
             return do
-        # as long as it is told to run as well, an answer shows nothing of a stop, nor does silence
+        # while another channel commands it to run, neither an answer nor silence is about the stop
         blind = happened in OF_THE_LAST and any(debt in RUNNING for debt in debts.values())
         for channel, debt in list(debts.items()):
             rule = self._rules.get((debt, happened))

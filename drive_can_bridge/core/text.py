@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Text: what others bring, made printable; values, types and misspelt names as users read them.
+Text: foreign names made printable; values, types and misspelt names as users read them.
 
 A name with a line feed in it forges a line of the log, one with escape sequences writes elsewhere
 on the screen, and one of two megabytes fills both.
@@ -44,7 +44,7 @@ def printable(text: str, limit: int | None = TEXT_MAX) -> str:
 def column_lines(headings: Sequence[str], rows: Sequence[Sequence[str]], *,
                  numbers: Sequence[str] = ()) -> list[str]:
     """
-    Write a table as lines of columns; nothing is cut.
+    Return a table as lines of columns; nothing is cut.
 
     :param numbers: headings of columns that are aligned to the right.
     """
@@ -75,12 +75,12 @@ def show(value: Any) -> str:
 
 
 def seems_limit(*texts: str) -> bool:
-    """Return whether names and descriptions speak of something that bounds."""
+    """Return whether names and descriptions mention something that bounds."""
     return any(word in text.lower() for text in texts for word in ('limit', 'max'))
 
 
 def describe_type(value: Any) -> str:
-    """Name the type of a value in words."""
+    """Return the type of a value in words."""
     if isinstance(value, bool):
         return 'a bool'
     if isinstance(value, str):
@@ -138,7 +138,7 @@ def is_ros_name(name: str) -> bool:
 
 def duration_text(seconds: float) -> str:
     """
-    Write how long something takes, as people do.
+    Return a duration as people write it.
 
     >>> duration_text(0.0182), duration_text(4295)
     ('0.018 s', '1.2 h')
