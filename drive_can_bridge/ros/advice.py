@@ -9,7 +9,7 @@ from drive_can_bridge.core.session import Session
 
 def _by_hand(command: str, drive: str, node: Node) -> str:
     """
-    Return the command line that does something to a drive.
+    Return the command line that acts on a drive.
 
     :param node: of a drive of the same bridge.
     """
@@ -18,13 +18,13 @@ def _by_hand(command: str, drive: str, node: Node) -> str:
 
 
 def how_to_enable(session: Session, node: Node) -> str:
-    """Say what to do about a drive that is disabled."""
+    """Return what to do about a drive that is disabled."""
     lead, whom = _leader(session)
     return sentences.call_enable(whom=whom, command=_by_hand('enable', lead, node))
 
 
 def how_to_reset(session: Session, node: Node) -> str:
-    """Say what to do about a drive in fault, when its cause is gone."""
+    """Return what to do about a drive in fault, when its cause is gone."""
     if session.control is None:
         return sentences.reset_at_drive()
     lead, whom = _leader(session)
@@ -33,7 +33,7 @@ def how_to_reset(session: Session, node: Node) -> str:
 
 
 def _leader(session: Session) -> tuple[str, str]:
-    """Return the drive that takes the commands for this one, and what is said of it."""
+    """Return the drive that handles the commands of this one, and a remark that names it."""
     lead = session.enabled_by
     return lead, ('' if lead == session.configuration.name
                   else f' of {lead}, which leads the broadcast group')

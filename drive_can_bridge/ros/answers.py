@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Answers to callers, whether they can be reached or not.
+Answers to service clients, whether they can be reached or not.
 
 Sending takes the middleware a tenth of a second where it has discovered a caller only halfway, or
-where caller and service do not match, which nobody tells the caller. The interpreter is not held
-meanwhile (:mod:`.rcl.services`). The thread that answers is, once for each such client: what is
+where caller and service do not match, which the caller never learns. The interpreter is not held
+meanwhile (:mod:`.rcl.services`). The answering thread is, once for each such client: what is
 for it afterwards is left to a thread of their own, until one of them arrives.
 """
 
@@ -32,8 +32,8 @@ class ServiceAnswers:
     """
     Sends answers. From any thread.
 
-    :param rcl: the way past rclpy; None: there is none.
-    :param warn: takes topic and text of a warning for the log, which may come again and again.
+    :param rcl: direct access to rcl; None: through rclpy only.
+    :param warn: logs a warning by topic and text; may be called again and again.
     """
 
     def __init__(self, rcl: RclServices | None, warn: Callable[[str, str], None],
@@ -58,7 +58,7 @@ class ServiceAnswers:
         """
         Send an answer, in place of ``Service.send_response``.
 
-        :raises TypeError: the message is none of its answers.
+        :raises TypeError: the message is of another type than the service's answers.
         :raises InvalidHandle: the service is gone.
         :raises RCLError: the context is gone.
         """
@@ -68,7 +68,7 @@ class ServiceAnswers:
         rcl = self._rcl
         try:
             response = rcl.prepare(service, message, header) if rcl else None
-        except Unfit:   # rclpy has taken the request
+        except Unfit:   # the request came through rclpy
             response = None
         if rcl is None or response is None:
             Service.send_response(service, message, header)
@@ -78,14 +78,14 @@ class ServiceAnswers:
             self._deliver(rcl, response)
 
     def stop(self) -> None:
-        """End; what waits for clients out of reach is not sent."""
+        """Stop the thread; answers to unreachable clients that still wait are dropped."""
         with self._lock:
             self._ending = True
         self._late.put(None)
         self._thread.join(5.0)
 
     def _defer(self, rcl: RclServices, response: ReadyResponse) -> None:
-        """Leave an answer to the thread that may wait; enough wait there: it is lost."""
+        """Queue an answer for the thread that may wait; drop it when too many wait there."""
         caller = response.caller
         with self._lock:
             waiting = self._waiting.get(caller, 0)
@@ -115,7 +115,7 @@ class ServiceAnswers:
     def _tell(self, service: Service) -> None:
         try:
             name = service.service_name
-        except GONE:    # meanwhile; nobody misses the answer
+        except GONE:    # meanwhile; the answer is not missed
             return
         self._warn(f'answer of {name}', sentences.answer_not_delivered(name))
 
@@ -126,7 +126,7 @@ class ServiceAnswers:
             pass
 
     def _do_one_job(self) -> bool:
-        """Do what comes next, and forget it then."""
+        """Run the next job, then release it; return False at the end."""
         job = self._late.get()
         if job is None or self._ending:
             return False

@@ -13,9 +13,9 @@ cleanup    buses closed, drive nodes gone, locks released
 shutdown   deactivate and cleanup as far as needed
 ========== ====================================================================================
 
-Parameter files say what they are (``overrides``); once that has been checked, every key is
-declared with its value in effect, so that ``ros2 param get`` tells it. Four of them may be changed
-while the bridge runs; all others are read-only and say so.
+Parameter files give their values (``overrides``); once those are checked, every key is
+declared with its value in effect, so that ``ros2 param get`` returns it. Four of them may be
+changed while the bridge runs; all others are read-only and described so.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -80,11 +80,11 @@ FAILURE = TransitionCallbackReturn.FAILURE
 
 class NodeParameters:
     """
-    Declares, checks and passes on. The node must have no parameter services of its own.
+    Declares, checks and passes on parameters. The node must have no parameter services of its own.
 
-    :param changed: takes (name, value) of each parameter that was changed.
-    :param refusal: says why a value that is allowed in itself cannot be set now; '' if it can.
-    :param current: returns a value that is made when it is asked for; None: it is none of these.
+    :param changed: called with (name, value) of each changed parameter.
+    :param refusal: returns why a valid value cannot be set now; '' if it can.
+    :param current: returns a value that is computed on request; None: not one of these.
     """
 
     def __init__(self, node: Node, changed: Callable[[str, Any], None],
@@ -105,20 +105,20 @@ class NodeParameters:
 
     @property
     def overrides(self) -> dict[str, Any]:
-        """What parameter files and command line say, by dotted name."""
+        """The values from parameter files and command line, by dotted name."""
         return {name: parameter.value
                 for name, parameter in overrides(self._node).items()}
 
     @property
     def current(self) -> dict[str, Any]:
-        """The same with what has been changed since."""
+        """The same with later changes applied."""
         current = self.overrides
         for name in self._dynamic:
             current[name] = self._node.get_parameter(name).value
         return current
 
     def declare(self, configuration: BridgeConfiguration) -> None:
-        """Declare every key of a configuration, or tell what it says now, with new profiles."""
+        """Declare every key of a configuration, or update its value, with new profiles."""
         for name, value, description, dynamic in declared_parameters(configuration):
             if self._node.has_parameter(name):
                 if not dynamic:
@@ -132,12 +132,12 @@ class NodeParameters:
                 ignore_override=True)
 
     def pass_on(self) -> None:
-        """Pass on what may have been changed when there was nobody to take it."""
+        """Pass on values that may have changed before their receivers existed."""
         for name in self._dynamic:
             self._changed(name, self._node.get_parameter(name).value)
 
     def _prepare(self, names: Sequence[str]) -> None:
-        """Have a value that is being asked for: looking at the graph is not cheap."""
+        """Update computed values that are requested: reading the graph is not cheap."""
         if BRIDGES in names:
             self.announce(BRIDGES, self.bridges())
         for name in dict.fromkeys(names):
@@ -146,7 +146,7 @@ class NodeParameters:
                 self.announce(name, made)
 
     def bridges(self) -> list[str]:
-        """Return the full names of all bridges that are seen, one as often as there are some."""
+        """Return the full names of all bridges that are seen; equal names are repeated."""
         return self._bridges_of(self._node.get_service_names_and_types())
 
     def around(self) -> tuple[list[str], list[str]]:
@@ -162,11 +162,11 @@ class NodeParameters:
             max(1, self._node.count_services(f'{name}/change_state'))))
 
     def get(self, request: Any, response: Any) -> Any:
-        """Do what ``get_parameters`` does, for who came another way. In the executor's thread."""
+        """Handle ``get_parameters`` for a caller by the local way. In the executor's thread."""
         return self._services.get(request, response)
 
     def announce(self, name: str, value: Any) -> None:
-        """Change a read-only parameter: what the bridge itself has found out."""
+        """Change a read-only parameter to a value that the bridge itself has found."""
         if self._node.get_parameter(name).value == value:
             return
         self._announcing = True
@@ -198,7 +198,7 @@ class BridgeNode(LifecycleNode):
     The managed node.
 
     :param spinner: serves this node and all drive nodes.
-    :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    :param fatal: called with the reason when the bridge cannot go on; from any thread.
     :param open_bus: opens a bus; None: python-can, by its configuration.
     :param files: the parameter files that were given to this process.
     """
@@ -235,7 +235,7 @@ class BridgeNode(LifecycleNode):
         self._open_bus = open_bus
         self._spinner = spinner
         self._fatal = fatal
-        # now: later on, somebody may have edited or removed them
+        # now: the files may be edited or removed later
         self._unseen = unseen_problems(map(Path, files), self.get_fully_qualified_name())
         self._files = list(files)
         self._transition_lock = clock.lock()
@@ -260,14 +260,14 @@ class BridgeNode(LifecycleNode):
                              relay=Relay(spinner.later) if self._relayed else None, **more)
 
     def create_service(self, *arguments: Any, **options: Any) -> Service:
-        """Create a service whose requests and answers hold up nobody else."""
+        """Create a service whose requests and answers block no others."""
         service = super().create_service(*arguments, **options)
         if self._own is not None:   # else it is made by a base class, and adopted soon
             self._own.adopt([service])
         return service
 
     def destroy_service(self, service: Service) -> bool:
-        """Destroy a service, as soon as what it has answered is sent."""
+        """Destroy a service, as soon as its last answer is sent."""
         destroy = super().destroy_service
         if self._own is None or self._ended:
             return destroy(service)
@@ -285,17 +285,17 @@ class BridgeNode(LifecycleNode):
 
     @property
     def overrides(self) -> dict[str, Any]:
-        """What parameter files and command line say, by dotted name."""
+        """The values from parameter files and command line, by dotted name."""
         return self._node_parameters.overrides
 
     @property
     def autostart(self) -> bool:
-        """Configure and activate without being asked (anything but an explicit ``false``)."""
+        """Whether to configure and activate by itself (anything but an explicit ``false``)."""
         return self.overrides.get('autostart', True) is not False
 
     @property
     def is_empty(self) -> bool:
-        """No parameter file reached this node: neither buses nor drives."""
+        """Whether no parameter file reached this node: neither buses nor drives."""
         return not any(name.startswith(('buses.', 'drives.')) for name in self.overrides)
 
     def _parameter_refusal(self, name: str, value: Any) -> str:
@@ -328,7 +328,7 @@ class BridgeNode(LifecycleNode):
         return self._transition('configure', self._configure)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin the exchange."""
+        """Start the exchange."""
         return self._transition('activate', self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -347,7 +347,7 @@ class BridgeNode(LifecycleNode):
         return self._transition('shutdown', shut_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Get back to a state from which configure works."""
+        """Return to a state from which configure works."""
         def stop_and_clean_up() -> None:
             try:
                 self._stop_drives()     # activate may have failed when some had begun
@@ -376,7 +376,7 @@ class BridgeNode(LifecycleNode):
         :raises ConfigurationError: with all problems.
         """
         problems, garbled = map(report, self._unseen)
-        if garbled:     # what else there is to be said would mislead
+        if garbled:     # the other problems would mislead
             raise ConfigurationError(garbled)
         try:
             configuration = configuration_from_overrides(
@@ -415,7 +415,7 @@ class BridgeNode(LifecycleNode):
             raise
 
     def _control_thread_of(self, bus: str) -> ServiceThread:
-        """Return what serves the stops of a bus: one that hangs holds up those of no other."""
+        """Return the thread that serves the stops of a bus: one that hangs blocks no other's."""
         if bus not in self._control_threads:
             self._control_threads[bus] = self._service_thread(
                 f'control {bus}', self._spinner.of_drives, _prepare_control, share=1.0)
@@ -436,9 +436,9 @@ class BridgeNode(LifecycleNode):
             gc.collect()    # see scheduling.PASSES
 
     def _dismiss(self, drives: Iterable[DriveNode] = ()) -> None:
-        """Take drives out of the graph, each as soon as its last caller has an answer."""
+        """Remove drives from the graph, each as soon as its last caller has an answer."""
         self._leaving = [drive for drive in (*self._leaving, *drives) if not _gone(drive)]
-        if self._leaving:   # who answers needs the interpreter meanwhile
+        if self._leaving:   # those that answer need the interpreter meanwhile
             self._steady.wait(self._steady.now() + DISMISS_PAUSE)
             self._spinner.later(self._dismiss)
 
@@ -448,7 +448,8 @@ class BridgeNode(LifecycleNode):
         """
         Configure and activate; False when the configuration is wrong (it was logged).
 
-        :param unwanted: nobody wants it any more: nothing is begun that would have to be stopped.
+        :param unwanted: it is not wanted any more: nothing is started that would have to be
+            stopped.
         """
         with self._transition_lock:
             if self.trigger_configure() is not SUCCESS:
@@ -458,7 +459,7 @@ class BridgeNode(LifecycleNode):
     def stop(self) -> None:
         """Stop the drives and publish a last diagnostic message; for the end of the process."""
         self._ending = True
-        # a transition under way may take longer, such as a stop by writes that nobody answers
+        # a transition under way may take longer, such as a stop by unacknowledged writes
         alone = self._transition_lock.acquire(timeout=5.0)
         try:
             self._stop_drives()
@@ -482,14 +483,14 @@ class BridgeNode(LifecycleNode):
         self._answers.stop()
 
     def destroy_node(self) -> None:
-        """Take the node out of the graph, when everything is written that it had to say."""
+        """Destroy the node, after its log is written."""
         self.log.close()
         self._ended = True      # rclpy goes on until no service is left
         super().destroy_node()
 
     @property
     def configuration(self) -> BridgeConfiguration | None:
-        """What is in effect, from configure to cleanup."""
+        """The configuration in effect, from configure to cleanup."""
         return None if self._runtime is None else self._runtime.configuration
 
     @property
@@ -504,12 +505,12 @@ class BridgeNode(LifecycleNode):
 
     @property
     def diagnostics(self) -> Diagnostics | None:
-        """What reports on buses and drives, from configure to cleanup."""
+        """The diagnostics of buses and drives, from configure to cleanup."""
         return None if self._runtime is None else self._runtime.diagnostics
 
 
 def _prepare_control() -> None:
-    """Have stops served at once, and whatever others have allocated."""
+    """Raise the thread's priority, and reserve its memory, so that stops are served at once."""
     raise_priority()
     reserve()
 
@@ -519,9 +520,9 @@ def _rcl_services(services: Iterable[Service], context: Context,
     """
     Choose how requests are taken, and answers sent, by what this rclpy has.
 
-    What is not the best way is warned of.
+    Any other way than the best logs a warning.
 
-    :return: the way past rclpy, or None; and why not even a wait set is of use, but only the
+    :return: direct access to rcl, or None; and why not even a wait set is of use, but only the
         executor; '': it is.
     """
     for reason in why_not_by_hand(), outgoing.why_not_straight():
@@ -544,7 +545,7 @@ def _rcl_services(services: Iterable[Service], context: Context,
 
 
 def _gone(drive: DriveNode) -> bool:
-    """Take a drive out of the graph, if nobody waits for an answer of it any more."""
+    """Destroy a drive's node, unless a caller waits for its answer; return whether it was."""
     if drive.answer_all():
         drive.destroy()
         return True
@@ -552,12 +553,12 @@ def _gone(drive: DriveNode) -> bool:
 
 
 def _is_wrong(file: str) -> bool:
-    """Return whether a parameter file has problems of its own, beside those of a command line."""
+    """Return whether a parameter file itself has problems."""
     try:
         configuration_from_file(file, adapters=adapters)
     except ConfigurationError:
         return True
-    except OSError:     # it has gone, and its lines with it
+    except OSError:     # the file was removed, and its lines with it
         pass
     return False
 
@@ -571,7 +572,7 @@ def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: L
     the executor: any client could end the process. Here it becomes a failure and a warning, before
     rcl is asked, which would have a warning of its own.
 
-    :param warn: takes what is wrong with a transition.
+    :param warn: logs what is wrong with a transition.
     :param lock: is held during a transition.
     :param refusal: why none is possible any more; '' otherwise.
     """
@@ -580,7 +581,7 @@ def _guard_transitions(node: LifecycleNode, warn: Callable[[str], None], lock: L
     def guarded(change_state: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
         number, label = request.transition.id, request.transition.label
         with lock:
-            # of a request with both, rclpy takes the label
+            # of a request with both, rclpy uses the label
             possible = transitions.possible
             why = refusal()
             if not why and (label not in possible.values() if label else number not in possible):

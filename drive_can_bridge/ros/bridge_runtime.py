@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a bridge has from configure to cleanup: buses, drives, and what tells of them.
+The parts of a bridge from configure to cleanup: buses, drives, and their reports.
 
 The flight recorder, too: what makes it write, and ``~/save_trace``.
 """
@@ -57,17 +57,17 @@ _LOOK = 0.05
 
 
 class Trigger(Protocol):
-    """Has a trace of a bus written; of several reasons at once the highest rank names it."""
+    """Saves a trace of a bus; of several reasons at once the highest rank names it."""
 
     def __call__(self, bus: str, reason: str, *, rank: int = 0) -> None:
-        """Begin."""
+        """Start to save."""
 
 
 class Occasions:
     """
-    What is worth a trace: whatever ails, each time that it begins.
+    Decides what is worth a trace: each fault, loss and error, when it begins.
 
-    Told of every event when it happens, so that nothing is over too soon to be noticed.
+    Called with every event when it happens, so that none is over too soon to be noticed.
     """
 
     def __init__(self, trigger: Trigger) -> None:
@@ -76,7 +76,7 @@ class Occasions:
         self._bad: set[str] = set()
 
     def drive_told(self, drive: str, bus: str, event: Event, state: DriveState) -> None:
-        """Take an event of a drive, and its state by then."""
+        """Handle an event of a drive, with its state at that time."""
         states = []
         if isinstance(event, StationLost):
             states.append(DriveState.OFFLINE)
@@ -91,15 +91,15 @@ class Occasions:
             self._trigger(bus, f'{drive}_{each.value}', rank=_RANKS[each])
 
     def forget(self, drive: str) -> None:
-        """Record that a drive is inactive: whatever ails it then begins anew."""
+        """Record that a drive is inactive: a later fault counts as new."""
         self._faulted.discard(drive)
 
     def bus_lost(self, bus: str) -> None:
-        """Record that a bus is gone."""
+        """Handle the loss of a bus."""
         self._trigger(bus, 'bus_lost', rank=_BUS_LOST_RANK)
 
     def reported(self, report: StatusEntry, bus: str) -> None:
-        """Take a diagnostic status."""
+        """Handle a diagnostic status."""
         if report.level != DiagnosticStatus.ERROR:
             self._bad.discard(report.name)
         elif report.name not in self._bad:
@@ -109,7 +109,7 @@ class Occasions:
 
 class FlightWatch:
     """
-    Records the buses of a bridge, and notices what is worth a trace.
+    Records the buses of a bridge, and saves traces of what is worth one.
 
     :param buses: those of the configuration; without ``trace_seconds`` nothing is recorded.
     """
@@ -136,19 +136,19 @@ class FlightWatch:
         return self._recorder.memory
 
     def note_of(self, bus: str) -> Callable[..., object] | None:
-        """Return what takes every frame of a bus; None: nobody does."""
+        """Return the function that records every frame of a bus; None: it is not recorded."""
         ring = self._recorder.ring(bus)
         return None if ring is None else ring.note
 
     def attach(self, exchange: BusExchange) -> None:
-        """Take the error frames of a bus, too. Before it is opened."""
+        """Record the error frames of a bus, too. Before it is opened."""
         ring = self._recorder.ring(exchange.bus.name)
         if ring is not None:
             exchange.link.error_witness = lambda classes, data: ring.note_error(
                 classes, data, self._now())
 
     def watch(self, drives: Sequence[DriveNode]) -> None:
-        """Begin to look at the drives."""
+        """Start watching the drives."""
         for drive in drives:
             if drive.drive.bus in self._recorder.buses:
                 drive.witness = partial(_tell, self._occasions, drive)
@@ -159,7 +159,7 @@ class FlightWatch:
         self._leave()
 
     def _leave(self) -> None:
-        """Let go of the service, as soon as its last caller has an answer."""
+        """Destroy the service, as soon as its last caller has an answer."""
         if self._calls:
             self._thread.later(self._leave)
         else:
@@ -192,7 +192,7 @@ class FlightWatch:
 
     def _ask(self, buses: Sequence[str],
              done: Callable[[list[tuple[str, str]]], None]) -> None:
-        """Have the traces of several buses written; told when there is the last one."""
+        """Save the traces of several buses; ``done`` is called after the last one."""
         told: dict[str, tuple[str, str]] = {}
 
         def written(bus: str, path: str, refusal: str) -> None:
@@ -204,7 +204,7 @@ class FlightWatch:
 
 
 def _tell(occasions: Occasions, drive: DriveNode, event: Event) -> None:
-    """Pass on what a drive tells, with the bus lock held."""
+    """Pass on an event of a drive, with the bus lock held."""
     if drive.session.active:
         occasions.drive_told(drive.name, drive.drive.bus, event, drive.session.state)
     else:
@@ -223,11 +223,11 @@ class BridgeRuntime:
     :param announce: changes a read-only parameter of the bridge.
     :param seen: returns the full names of all bridges in the graph, and of the drives around them.
     :param get: answers ``get_parameters`` of the bridge.
-    :param dismiss: takes drives out of the graph; their exchanges are closed.
-    :param fatal: takes the reason when the bridge cannot go on; from any thread.
+    :param dismiss: removes drives from the graph; their exchanges are closed.
+    :param fatal: called with the reason when the bridge cannot go on; from any thread.
     :ivar drives: by name, in the order of the configuration.
     :ivar local_way: answers processes of this host.
-    :raises ConfigurationError: somebody else has a drive.
+    :raises ConfigurationError: another process has a drive.
     """
 
     def __init__(self, node: Node, log: Log, configuration: BridgeConfiguration,
@@ -320,7 +320,7 @@ class BridgeRuntime:
 
     def open(self) -> None:
         """
-        Open the buses, and begin to tell of them; nothing is sent.
+        Open the buses, and start their diagnostics; nothing is sent.
 
         :raises ConfigurationError: what can never be opened, or belongs to another process.
         """
@@ -348,7 +348,7 @@ class BridgeRuntime:
                     deadline = min(deadline, self._clock.now() + OTHERS_TIMEOUT)
 
     def activate(self) -> None:
-        """Begin the exchange with every drive."""
+        """Start the exchange with every drive."""
         for exchange in self.exchanges.values():
             exchange.activate()
         self._attendance.begin()
@@ -357,10 +357,10 @@ class BridgeRuntime:
             drives=len(self.drives), buses=counted(len(self.exchanges), 'bus', 'buses')))
 
     def _limit_memory(self) -> None:
-        """Limit what requests may take; who must go on has what that takes."""
+        """Limit the memory for requests; the threads that must go on reserve theirs first."""
         megabytes = self.configuration.memory_limit_mb
         if megabytes:
-            # for the main thread: whoever takes everything takes its heap, too
+            # for the main thread: a request that takes all memory takes its heap, too
             spare = self._clock.worker(reserve, 'reserve')
             spare.start()
             spare.join()
@@ -378,11 +378,11 @@ class BridgeRuntime:
             self._log.error(sentences.stop_frames_not_sent(bus=bus, reason=reason))
 
     def close(self) -> None:
-        """Close the buses, let the drives go, let others have them."""
+        """Close the buses, remove the drives, release the locks."""
         self._closing.close()
 
     def parameter_changed(self, name: str, value: Any) -> None:
-        """Take a parameter of the bridge that was changed while it runs."""
+        """Handle a parameter of the bridge that was changed while it runs."""
         drive, key = self.drive_of(name), name.rpartition('.')[2]
         if name == 'diagnostics_period':
             self._reporting.set_period(float(value))
@@ -397,7 +397,7 @@ class BridgeRuntime:
 
     def made_parameter(self, name: str, joint_commands: str) -> object:
         """
-        Return the value of a parameter that is made when it is asked for; None: of no other.
+        Return the value of a parameter that is computed on request; None: not one of these.
 
         :param joint_commands: the topic with the commands for all joints.
         """
@@ -411,7 +411,7 @@ class BridgeRuntime:
     # -- from the exchanges (BusListener) ---------------------------------------------------------
 
     def _prepare_thread(self) -> None:
-        """Make a thread of an exchange punctual, and have what it needs."""
+        """Raise the priority of a thread of an exchange, and reserve its memory."""
         self._priority = raise_priority()
         reserve()
 
@@ -420,7 +420,7 @@ class BridgeRuntime:
         self._log.speaker(f'bus {bus}').info('open')
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """Log it; at the start somebody else's bus is none that is waited for."""
+        """Log it; at start-up a bus of another process is not waited for."""
         if self._misconfigured is not None and self.exchanges[bus].link.taken:
             self._misconfigured.append(f'bus {bus}: {reason}')
             return

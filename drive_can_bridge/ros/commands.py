@@ -32,7 +32,7 @@ from drive_can_bridge.ros.values import TOPIC_TYPES
 
 
 class _Target(NamedTuple):
-    """Which setpoint a quantity of the joint is, SI units per unit of it, whether an integer."""
+    """The setpoint of a quantity of the joint, SI units per unit of it, whether an integer."""
 
     setpoint: int
     factor: float
@@ -43,8 +43,8 @@ class CommandIntake:
     """
     The command subscriptions of one drive.
 
-    :param warn: takes (topic of the warning, text); throttling is its business.
-    :param inform: takes what nobody has to do anything about.
+    :param warn: logs (topic of the warning, text); limits repetitions itself.
+    :param inform: logs what needs no action.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
@@ -77,29 +77,29 @@ class CommandIntake:
             raise
 
     def take(self, now: float) -> None:
-        """Hand all waiting commands to the session, oldest first."""
+        """Pass all waiting commands to the session, oldest first."""
         self._topics.take(now)
 
     def discard(self, why: str) -> None:
         """
-        Throw away what is waiting.
+        Discard the waiting commands.
 
-        :param why: in words; '': nobody has to be told.
+        :param why: in words; '': not logged.
         """
         self.discarded(self._topics.discard(), why)
 
     def discarded(self, count: int, why: str) -> None:
-        """Count and tell commands that were thrown away."""
+        """Count and log discarded commands."""
         if count and why:
             self._session.statistics.commands_refused += count
             self._warn('discarded', sentences.commands_discarded(count=count, why=why))
 
     def destroy(self) -> None:
-        """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
+        """Destroy the subscriptions. Before the node is destroyed, which has them otherwise."""
         self._topics.destroy()
 
     def setpoints_text(self) -> str:
-        """Write what may be commanded as JSON, for clients of the bridge."""
+        """Return what may be commanded as JSON, for clients of the bridge."""
         return json.dumps([{
             'name': item.parameter.name, 'limit': item.parameter.limit, 'armed': item.armed,
             **({'neutral_from': item.parameter.neutral_from} if item.parameter.neutral_from else
@@ -108,7 +108,7 @@ class CommandIntake:
 
     def commanders(self, joint_commands: str) -> list[str]:
         """
-        Return who publishes commands to this drive, ``node topic``, as this process sees it.
+        Return the publishers of commands to this drive, ``node topic``, as this process sees them.
 
         :param joint_commands: the topic with the commands for all joints of the bridge.
         """
@@ -162,7 +162,7 @@ class CommandIntake:
             self.take_old(message, message.names.index(self._joint.name))
 
     def take_old(self, message: JointMessage, entry: int) -> None:
-        """Take what a message that is thrown away for its age has for the joint."""
+        """Handle the joint's part of a message that is too old: it may only stop."""
         for quantity, values in message.columns:
             target = self._joint_targets.get(quantity)
             if target is not None and entry < len(values) and values[entry] == values[entry]:
@@ -170,12 +170,12 @@ class CommandIntake:
                     target.setpoint, _in_units(values[entry], target))
 
     def disarm_joint(self) -> None:
-        """Disarm all that is commanded for the joint."""
+        """Disarm all setpoints of the joint."""
         for target in self._joint_targets.values():
             self._session.setpoints.disarm_one(target.setpoint)
 
     def take_quantity(self, quantity: str, value: float, now: float) -> None:
-        """Take a command for one quantity of the joint, in SI units; NaN leaves it alone."""
+        """Handle a command for one quantity of the joint, in SI units; NaN leaves it alone."""
         if value != value:
             return
         target = self._joint_targets.get(quantity)
@@ -190,12 +190,12 @@ class CommandIntake:
             self._inform(sentences.joint_quantity_ignored(quantity))
 
     def refuse(self, topic: str, text: str) -> None:
-        """Count and tell a command that is thrown away."""
+        """Count and log a refused command."""
         self.count_refused()
         self._warn(topic, text)
 
     def count_refused(self) -> None:
-        """Count a command that is thrown away; somebody else tells it."""
+        """Count a refused command that is logged elsewhere."""
         self._session.statistics.commands_refused += 1
 
 

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Callbacks of services as coroutines, which wait for answers without an executor.
+Service callbacks as coroutines, which wait for answers without an executor.
 
-One thread begins a coroutine, the one that answers goes on with it.
+One thread starts a coroutine, the answering one continues it.
 """
 
 from collections.abc import Callable, Coroutine, Generator
@@ -11,16 +11,16 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 _NO_LOCK: AbstractContextManager[Any] = nullcontext()
-#: takes the response, or the error that there is none for; to be called once, from any thread
+#: called with the response, or with the error in its place; once, from any thread
 Answer = Callable[[Any], None]
 AnswerT = TypeVar('AnswerT')
 
 
 class Awaited(Generic[AnswerT]):
     """
-    What such a coroutine awaits: something that is asked when it is awaited.
+    What such a coroutine awaits: a request that is made when it is awaited.
 
-    :param ask: takes what is to be called with the answer, once, from any thread, or at once.
+    :param ask: given the function to call with the answer, once, from any thread, or at once.
     """
 
     __slots__ = ('ask',)
@@ -36,14 +36,14 @@ def go_on(coroutine: Coroutine[Any, Any, Any], later: Callable[[Callable[[], Non
           answer: Answer, found: Any = None, *,
           alone: AbstractContextManager[Any] = _NO_LOCK) -> None:
     """
-    Run a coroutine until it asks something, and once there is an answer go on, to its end.
+    Run a coroutine to its next request, and continue it with the answer, to its end.
 
     No future of rclpy takes part: an executor looks at those in an order that differs with its
     version, and may sleep over one that was completed.
 
-    :param later: has the rest done, in the thread that is meant for it.
-    :param answer: takes what the coroutine returns, or raises.
-    :param found: the answer to what it has asked.
+    :param later: runs the rest in the thread that is meant for it.
+    :param answer: called with what the coroutine returns, or raises.
+    :param found: the answer to its last request.
     :param alone: is held while it runs.
     """
     try:

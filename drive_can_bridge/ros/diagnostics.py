@@ -2,7 +2,7 @@
 """
 ``/diagnostics``: one status per bus and per drive, in words that say what to do.
 
-Also drives that are not there: what is said of one, and who is missing a while after the start.
+Also drives that are offline: the text on one, and which are missing a while after the start.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,7 +43,7 @@ COMMANDS_RECENT = 1.5
 
 
 def absence(drive: DriveNode) -> Sentence:
-    """Say of a drive that is offline since when, and what to do about it."""
+    """Return since when a drive is offline, and what to do about it."""
     session, exchange = drive.session, drive.exchange
     what = session.offline_advice
     if exchange.bus_state != 'up':      # which is told once, there
@@ -63,7 +63,7 @@ def absence(drive: DriveNode) -> Sentence:
 
 class Attendance:
     """
-    Says once, a while after each activation, which drives were never seen.
+    Logs once, a while after each activation, which drives were never seen.
 
     :param drives: of the bridge.
     """
@@ -76,13 +76,13 @@ class Attendance:
         self._thread = clock.worker(self._run, 'attendance')
 
     def begin(self) -> None:
-        """Look in a while."""
+        """Start the timer."""
         self._over = self._clock.wake_event()
         self._thread = self._clock.worker(self._run, 'attendance')
         self._thread.start()
 
     def end(self) -> None:
-        """Do not look any more; wait for a look that is under way."""
+        """Cancel the timer; wait for a check that is under way."""
         self._over.ring()
         self._thread.join()
 
@@ -94,7 +94,7 @@ class Attendance:
             self._log.error(sentences.attendance_failed(type(error).__name__, str(error)))
 
     def look(self) -> None:
-        """Say who is missing."""
+        """Log which drives are missing."""
         missing = [drive for drive in self._drives if _never_seen(drive)]
         if not missing:
             return
@@ -126,7 +126,7 @@ class StatusEntry:
 
 class BusReporter:
     """
-    Reports on one bus; remembers the counts of the last report.
+    Reports on one bus; keeps the counts of the last report.
 
     :param period: s, the shortest of its drives.
     """
@@ -206,7 +206,7 @@ class BusReporter:
 
 class DriveReporter:
     """
-    Reports on one drive; remembers the counts of the last report.
+    Reports on one drive; keeps the counts of the last report.
 
     :param lateness: of the answers of all drives of its bus.
     :ivar ended: the drives have been stopped, and the process ends.
@@ -302,7 +302,7 @@ class DriveReporter:
         return DiagnosticStatus.OK, sentences.online()
 
     def _warnings(self, rejected: int) -> list[Sentence]:
-        """Return everything that is not well although the drive answers."""
+        """Return all warnings of a drive that answers."""
         drive, session = self._drive, self._drive.session
         told: list[Sentence] = []
         if session.warning:
@@ -362,7 +362,7 @@ def _answers(drive: DriveNode) -> AnswerTiming:
 
 class StatusMessage:
     """
-    The message of one report, filled anew each time.
+    The message of one status, filled again each time.
 
     Making twenty messages with twenty entries each, once a second, takes longer than filling them,
     and the exchange wants the interpreter meanwhile.
@@ -373,7 +373,7 @@ class StatusMessage:
         self._entries: dict[str, KeyValue] = {}
 
     def fill(self, report: StatusEntry) -> DiagnosticStatus:
-        """Return the message with what the report says."""
+        """Fill the message from a status, and return it."""
         status, entries = self.status, self._entries
         status.level, status.message = report.level, printable(report.message, None)
         if entries.keys() != report.facts.keys():
@@ -388,7 +388,7 @@ class Diagnostics:
     """
     Publishes the reports of a bridge.
 
-    :param reported: is told each report, and the bus that it is about.
+    :param reported: called with each report, and the bus that it is about.
     """
 
     def __init__(self, node: Node, exchanges: list[BusExchange], drives: list[DriveNode],
@@ -416,7 +416,7 @@ class Diagnostics:
 
     def publish(self) -> None:
         """Publish one status per bus and per drive."""
-        if not self._node.context.ok():  # shut down by somebody else: nobody is left to be told
+        if not self._node.context.ok():  # shut down from outside: there is no receiver
             return
         message = self._message
         with self._lock:
@@ -446,12 +446,12 @@ class Diagnostics:
         return [reporter.report(now) for reporter in reporters]
 
     def destroy(self) -> None:
-        """Take the publisher out of the graph."""
+        """Destroy the publisher."""
         self._node.destroy_publisher(self._publisher)
 
 
 def _fault_text(session: Session) -> str:
-    """Say that there is a fault, and which, as far as that is known."""
+    """Return that there is a fault, and which, as far as that is known."""
     watch = session.fault_watch
     if watch is None or not (watch.text or watch.unread):
         return 'fault'
@@ -459,7 +459,7 @@ def _fault_text(session: Session) -> str:
 
 
 def _bus_error(error: BusError | None, controller: str, count: int) -> Sentence:
-    """Say what error frames of a bus that is up mean, and what to do."""
+    """Return what error frames of a bus that is up mean, and what to do."""
     told = [f'controller {controller}'] if controller else []
     if count:
         told.append(f'{count} error frames' + (f' (the last: {error.text})' if error else ''))

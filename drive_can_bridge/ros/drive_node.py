@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The node of one drive: what its session says becomes topics, what users want goes to the session.
+The node of one drive: events of its session become topics, requests of users go to the session.
 
 Samples are published in the thread that received the frame; parameter services and control
 services are served in threads of theirs.
@@ -46,7 +46,7 @@ from drive_can_bridge.ros.samples import RequestTopic, SamplePublisher
 from drive_can_bridge.ros.stamps import Stamps
 from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 
-#: takes what became of a request: its outcomes, or :class:`.ControlCompleted`
+#: called with the outcomes of a request, or its :class:`.ControlCompleted`
 Completed = Callable[[Any], None]
 #: reads in a row that failed, after which the drive is left alone
 FAILURES_MAX = 2
@@ -57,17 +57,17 @@ class DriveNode(DriveListener):
     One drive in the ROS graph.
 
     :param bridge: the bridge's node; the drive lives in its namespace.
-    :param spinner: serves the node, and what it leaves to be done there.
+    :param spinner: serves the node, and runs its jobs.
     :param log: of the bridge.
     :param control_thread: serves ``~/enable`` and its like.
     :param parameter_thread: serves the parameter services.
     :param stamps: of the bridge.
-    :param identified: takes the drive's identity in words whenever it changes.
-    :ivar joint_commands: the commands for all joints of its bus, which whichever of its drives is
-        served next takes for all of them; None: there are none.
+    :param identified: called with the drive's identity in words whenever it changes.
+    :ivar joint_commands: the commands for all joints of its bus, which the drive that is
+        served next takes for all drives; None: there are none.
     :ivar lost_at: when it went offline last, of :meth:`.Clock.stamp`.
     :ivar lost_for: why it did.
-    :ivar witness: is told of events, too; None: nobody is.
+    :ivar witness: called with events, too; None: nothing is.
     """
 
     def __init__(self, bridge: Node, drive: DriveConfiguration, session: Session, family: Family,
@@ -93,11 +93,11 @@ class DriveNode(DriveListener):
         self._stamp = clock.stamp
         self.lost_for: Sentence = NOTHING
         self.rejected_text: Sentence = NOTHING
-        self._may_run = False   # and nothing has been heard of it since
+        self._may_run = False   # and nothing has arrived from it since
         self._told_online = self._told_from_outside = False
         self.foreign_text: Sentence = NOTHING
         # a local remapping wins over a process-wide ``__node:=``, which would rename every drive;
-        # time and qualities are the bridge's, whose parameters everybody sees
+        # time and qualities are the bridge's, whose parameters are visible to everybody
         self.node = Node(
             drive.name, namespace=bridge.get_namespace(), context=bridge.context,
             cli_args=['--ros-args', '-r', f'__node:={drive.name}'],
@@ -118,14 +118,14 @@ class DriveNode(DriveListener):
             raise
 
     def serve(self) -> None:
-        """Begin to serve: the exchange knows of the drive from now on."""
+        """Start to serve: from now on the exchange knows the drive."""
         self._spinner.of_drives.executor.add_node(self.node)
         for services in self._services:
             services.serve()
 
     def _populate(self, stamps: Stamps, family: Family, control_thread: ServiceThread,
                   parameter_thread: ServiceThread) -> None:
-        """Make the topics and services."""
+        """Create the topics and services."""
         drive, session = self.drive, self.session
         self.samples = SamplePublisher(self.node, drive, session.sample_parameters, stamps.at,
                                        self._log.info)
@@ -150,12 +150,12 @@ class DriveNode(DriveListener):
 
     @property
     def name(self) -> str:
-        """Name of the drive."""
+        """The name of the drive."""
         return self.drive.name
 
     def answer_all(self) -> bool:
         """
-        Answer callers that still wait: no answer will come. The exchange must be closed.
+        Answer callers that still wait, with a failure. The exchange must be closed.
 
         :return: all calls are answered, and the node may go.
         """
@@ -169,7 +169,7 @@ class DriveNode(DriveListener):
         return sum(services.calls for services in self._services)
 
     def destroy(self) -> None:
-        """Take the drive out of the graph. The exchange must be closed."""
+        """Remove the drive from the graph. The exchange must be closed."""
         self._spinner.leaves()
         self._spinner.of_drives.executor.remove_node(self.node)
         self.commands.destroy()
@@ -191,20 +191,20 @@ class DriveNode(DriveListener):
     # -- from the exchange (DriveListener): the bus lock is held ----------------------------------
 
     def take_commands(self, now: float) -> None:
-        """Hand the newest commands to the session."""
+        """Pass the newest commands to the session."""
         self.commands.take(now)
         if self.joint_commands is not None:
             self.joint_commands.take(now)
 
     def take_joint(self, quantity: str, value: float, now: float) -> None:
-        """Take its part of the commands for all joints; another drive may have its turn."""
+        """Handle the drive's part of the commands for all joints, in the turn of any drive."""
         try:
             self.commands.take_quantity(quantity, value, now)
         except Exception as error:  # noqa: BLE001  which costs no other drive
             self.exchange.contain(self.session, error)
 
     def discard_commands(self, why: str) -> None:
-        """Throw waiting commands away."""
+        """Discard waiting commands."""
         self.commands.discard(why)
         if self.joint_commands is not None:
             self.commands.discarded(self.joint_commands.discard(), why)
@@ -264,7 +264,7 @@ class DriveNode(DriveListener):
         elif isinstance(event, SetpointsExpired):
             text = sentences.command_timed_out(
                 self.session.configuration.command_timeout, event.names)
-            if event.orderly:   # nothing changed for the drive: whoever commanded it has ended
+            if event.orderly:   # nothing changed for the drive: the publisher has ended
                 self._log.info(text)
             else:
                 self.warn('command timeout', text)
@@ -298,21 +298,21 @@ class DriveNode(DriveListener):
     @property
     def may_run(self) -> bool:
         """
-        Nobody has confirmed that it stands: asked when the drives have been stopped.
+        Whether the drive may still run after the stop of the drives.
 
-        That was said of it, and it was not online anew since; or its stop is not over.
+        That was reported, and it was not online again since; or its stop is not over.
         """
         session = self.session
         return bool(self._may_run or session.owed or session.defect or not session.stopped)
 
     def looked_at(self, entered: bool) -> None:
         """
-        Take a look at its bus from outside: a drive is not online while that hangs.
+        Update ``~/online`` by whether the bus hangs: then no drive is online.
 
-        The threads of the bus cannot tell so. They may be back by the time that it is told here,
-        and then nobody knows who came last: so the next look has the last word.
+        The threads of the bus cannot report that. They may be back by the time it is published
+        here, and then the order is unknown: so the next look decides.
 
-        :param entered: whoever looks has the lock of the bus; False: has waited for it in vain.
+        :param entered: the caller has the lock of the bus; False: it has waited in vain.
         """
         try:
             if not entered:
@@ -326,7 +326,7 @@ class DriveNode(DriveListener):
             self._cannot_publish(error)
 
     def _tell_stopped(self) -> None:
-        """Say how the drive is left: it was told to stop, and has answered."""
+        """Log the state in which the drive is left: its stop is acknowledged."""
         control = self.session.control
         if control is not None and control.table.enabled is not None and not control.off:
             # it may lag, or the drive runs down
@@ -348,7 +348,7 @@ class DriveNode(DriveListener):
 
     @property
     def told_online(self) -> bool:
-        """What ``~/online`` says."""
+        """The last value of ``~/online``."""
         return self._told_online
 
     def offers(self, action: ControlAction) -> bool:
@@ -357,11 +357,11 @@ class DriveNode(DriveListener):
 
     def command(self, action: ControlAction,
                 completed: Callable[[ControlCompleted], None]) -> None:
-        """Do what a control service does, for who came another way. From any thread."""
+        """Run a control action for a caller by the local way. From any thread."""
         self._control_thread.begin(partial(self._submit, ControlRequest(action), completed))
 
     def tell_condition(self, answer: Callable[[dict[str, str]], None]) -> None:
-        """Say whether it runs, as diagnostics do; {}: its bus hangs. From any thread."""
+        """Answer with its state, as diagnostics show it; {}: its bus hangs. From any thread."""
         def look() -> None:
             session, facts = self.session, dict[str, str]()
             with self.exchange.entered() as entered:
@@ -373,21 +373,21 @@ class DriveNode(DriveListener):
         self._parameter_thread.begin(look)
 
     def call(self, service: str, request: Any, answer: Callable[[Any], None]) -> None:
-        """Do what a parameter service does, for who came another way. From any thread."""
+        """Call a parameter service for a caller by the local way. From any thread."""
         self._parameters.call(service, request, answer)
 
     def _submit(self, request: Request | ControlRequest, completed: Completed) -> None:
-        """Hand a request to the session; what became of it is told from any thread."""
+        """Submit a request to the session; ``completed`` may be called from any thread."""
         self._asked[request] = completed    # its outcome may come before the next line
         try:
             self.exchange.submit(self.session, request)
         except TransportError as error:     # no other drive's stop waits for it
             self._refuse(request, error.sentence)
-        except Exception as error:  # noqa: BLE001  told as the drive's; whoever asks is not left out
+        except Exception as error:  # noqa: BLE001  reported as the drive's
             self._refuse(request, sentences.internal_error(type(error).__name__, str(error)))
 
     def _refuse(self, request: Request | ControlRequest, reason: Sentence) -> None:
-        """Answer the caller that nothing comes of it, unless there was an answer."""
+        """Complete a request with a failure, unless it is completed."""
         completed = self._asked.pop(request, None)
         if completed is not None:
             completed(ControlCompleted(request, False, reason)
@@ -395,7 +395,7 @@ class DriveNode(DriveListener):
                       else (Failure(FailureKind.UNAVAILABLE, reason),) * len(request))
 
     def _submit_quietly(self, request: ReadRequest, completed: Completed) -> None:
-        """Submit a request of our own, whose answer is for the executor."""
+        """Submit a request of the node itself, completed in the executor."""
         self._submit(request, partial(self._spinner.later, completed))
 
     def _parameter_failed(self, what: str, reason: str, uncounted: int) -> None:
@@ -413,17 +413,17 @@ def control_state(session: Session) -> str:
 
 class IdentityReader:
     """
-    Asks, and puts the answers into words. In the executor's thread.
+    Reads the drive's identity and puts it into words. In the executor's thread.
 
     They are read once whenever the drive comes online, one after the other, by requests like
     those of any user: each waits its turn, so that neither cycles nor users are held up by more
     than one read. What could not be read is left out of the text, and tried again when the drive
     comes online the next time; a drive that answers none of them is not asked for all.
 
-    :param submit: hands a request to the drive's session, and calls back with its outcomes.
-    :param online: tells whether the drive is; it is asked nothing otherwise.
-    :param tell: takes the text, ``firmware=10205 serial_number=4711``; '' while it is not known.
-    :param warn: takes what could not be read, in words.
+    :param submit: submits a request to the drive's session, and calls back with its outcomes.
+    :param online: returns whether the drive is; it is asked nothing otherwise.
+    :param tell: called with the text, ``firmware=10205 serial_number=4711``; '' while unknown.
+    :param warn: called with what could not be read, in words.
     """
 
     def __init__(self, profile: Profile, *,
@@ -440,7 +440,7 @@ class IdentityReader:
         self._failures = 0
 
     def read(self) -> None:
-        """Ask the drive. Whatever was known is not: it may be another one now."""
+        """Read the identity again; the former one may be another drive's."""
         self._attempt += 1
         self._known.clear()
         self._failures = 0
@@ -454,7 +454,7 @@ class IdentityReader:
 
     def _take(self, attempt: int, place: int, outcomes: tuple[Outcome, ...]) -> None:
         if attempt != self._attempt or not self._online():
-            return  # the next time that it comes online, all of this begins anew
+            return  # when it comes online the next time, all of this starts again
         parameter, outcome = self._parameters[place], outcomes[0]
         if isinstance(outcome, ReadValue):
             self._failures = 0

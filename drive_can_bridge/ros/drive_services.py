@@ -22,7 +22,7 @@ Serve = Callable[[Any, Any], Coroutine[Any, Any, Any]]
 
 class CoroutineServices:
     """
-    Such services of one node. No two of their coroutines run at the same time.
+    Coroutine services of one node. No two of their coroutines run at the same time.
 
     :param callbacks: by name, with the type of the service.
     :ivar calls: how many callers wait for their answer.
@@ -43,9 +43,9 @@ class CoroutineServices:
 
     def call(self, name: str, request: Any, answer: Answer) -> None:
         """
-        Begin a call that has come another way than by ROS. From any thread.
+        Start a call that came by the local way. From any thread.
 
-        :param answer: takes the response, from any thread.
+        :param answer: called with the response, from any thread.
         """
         kind, callback = self._callbacks[name]
 
@@ -56,12 +56,12 @@ class CoroutineServices:
         self._thread.begin(partial(self._begin, callback, kind.Response, request, answered))
 
     def serve(self) -> None:
-        """Begin to serve."""
+        """Start to serve."""
         for service, callback in self._services.items():
             self._thread.serve(service, callback, self._ended)
 
     def destroy(self) -> None:
-        """Let go of the services. Before the node is destroyed."""
+        """Destroy the services. Before the node is destroyed."""
         self._thread.forget(list(self._services))
 
     def _begin(self, callback: Serve, response: Callable[[], Any], request: Any,
@@ -71,7 +71,7 @@ class CoroutineServices:
         go_on(callback(request, response()), self._thread.later, answer, alone=self._running)
 
     def _ended(self) -> None:
-        """Record that one caller less waits: it was answered, or is out of reach."""
+        """Record that one caller fewer waits: it was answered, or is out of reach."""
         with self._counting:
             self.calls -= 1
 
@@ -80,7 +80,7 @@ def _never(_: Any, response: Any) -> Any:
     raise RuntimeError('such services are taken by a thread of their own')
 
 
-#: hands a request to the session; answered by its outcome
+#: submits a request to the session; answered by its outcome
 Submit = Callable[[ControlRequest], Awaited[ControlCompleted]]
 
 
@@ -91,7 +91,7 @@ def control_services(node: Node, thread: ServiceThread, submit: Submit, *,
 
     :param thread: serves them, and those of other drives, but nothing else.
     :param controlled: it has a control word.
-    :param homing: it can be asked to look for its reference.
+    :param homing: it can home.
     """
     def serving(wanted: Callable[[Any], ControlAction]) -> Serve:
         async def callback(request: Any, response: Any) -> Any:

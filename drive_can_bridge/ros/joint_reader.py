@@ -2,7 +2,7 @@
 """
 JointState messages, read from their bytes.
 
-Who commands joints names the same ones each time, and few do on one topic. To make an object of a
+A publisher names the same joints each time, and a topic has few publishers. To make an object of a
 message, with a string for each name, costs more than all that is done with its numbers. So the
 bytes between the numbers are compared with those of messages before, and only the numbers are
 read. Where they stand is found in the bytes that came: what a publisher sends is up to 12 bytes
@@ -28,13 +28,13 @@ from drive_can_bridge.ros.polled_topics import HEADER
 QUANTITIES = ('position', 'velocity', 'effort')
 #: so many messages have the same names before it is worth while to look where their numbers are
 ALIKE = 8
-#: of so many commanders, who take turns on one topic, each with joints of its own
+#: of so many publishers, who take turns on one topic, each with joints of its own
 COMMANDERS = 4
 #: bytes of its stamp, and of a number
 STAMP, DOUBLE = 8, 8
-#: bytes of a message that says nothing
+#: padding bytes of a message
 SHORTEST = HEADER + STAMP + 5 * 4
-#: bytes behind the last field that say nothing, at most
+#: padding bytes behind the last field, at most
 BEHIND_MAX = 15
 #: names of a message that is looked at
 NAMES_MAX = 1000
@@ -50,7 +50,7 @@ HEAD_FIELDS = 2
 
 
 class JointMessage(NamedTuple):
-    """What a message says: an empty array leaves that quantity alone, and is left out."""
+    """The content of a message: an empty array leaves that quantity alone, and is left out."""
 
     names: list[str]
     columns: list[Column]
@@ -60,11 +60,11 @@ class _Pattern:
     """
     Messages with these names and quantities, and the same bytes around the numbers.
 
-    What is around them is compared in one piece, with what fills it up to an alignment: that is
+    What is around them is compared in one piece, padding included: that is
     nearly always what it was the last time. Only where it is not, each field is looked at.
 
     :param order: of the bytes, as ``struct`` writes it.
-    :param fields: what stands in a message one after the other.
+    :param fields: the fields of a message in order.
     :param data: one of them.
     """
 
@@ -73,7 +73,7 @@ class _Pattern:
 
     def __init__(self, order: str, fields: Sequence[_Field], names: list[str],
                  data: bytes) -> None:
-        # how it is encoded; the stamp is nobody's
+        # how it is encoded; the stamp is not used
         codes, place, places = f'{order}{_code(fields[:HEAD_FIELDS])}', 1, [0]
         self._fields = []
         self._rows: list[tuple[str, slice]] = []
@@ -110,7 +110,7 @@ class _Pattern:
                             [(quantity, found[row]) for quantity, row in self._rows])
 
     def _parted(self, around: tuple[bytes, ...]) -> list[tuple[bytes, ...]]:
-        """Return what is said around the numbers, without what only fills it up."""
+        """Return the bytes around the numbers, without padding."""
         encoding, *rest = around
         return [(encoding,), *(unpack(each) for unpack, each in zip(self._fields, rest))]
 
@@ -130,15 +130,15 @@ class JointReader:
         """
         Read a message.
 
-        :raises RuntimeError: what the middleware says of bytes that are none.
-        :raises ValueError: it has too many names, or ends too soon: such bytes are not handed to
+        :raises RuntimeError: the middleware's words on bytes that are no message.
+        :raises ValueError: it has too many names, or ends too soon: such bytes are not passed to
             the middleware.
         """
         for pattern in self._patterns:
             known = pattern.read(data)
             if known is not None:
                 return known
-        _check(_name_count(data))   # before anybody makes objects of them
+        _check(_name_count(data))   # before objects are made of them
         fields = _fields(data)
         raw = deserialize_message(data, JointState)
         _check(len(raw.name))
@@ -168,7 +168,7 @@ def _check(names: int) -> None:
 
 
 def _name_count(data: bytes) -> int:
-    """Return how many names a message says it has; 0 where it is encoded in another way."""
+    """Return a message's own count of names; 0 where it is encoded in another way."""
     if not _is_plain(data):
         return 0
     number = struct.Struct('<I' if data[1] else '>I')
@@ -187,7 +187,7 @@ def _is_plain(data: bytes) -> bool:
 
 def _fields(data: bytes) -> list[_Field]:
     """
-    Return what stands in a message in plain CDR; nothing: it is encoded in another way.
+    Return the fields of a message in plain CDR; empty: it is encoded in another way.
 
     What only fills up to the alignment of the next field, and what follows the last one, is what
     was in the memory of the publisher (rmw_fastrtps clears neither).

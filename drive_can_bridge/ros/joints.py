@@ -9,11 +9,11 @@ thread of an exchange, which is awake in any case (``exchange.PeriodicTask``).
 
 It always names the same joints: the hardware interface copies a message while it reads the one
 before, and fails when the number of names has changed. A joint whose drive is not online, or whose
-bus hangs, has NaN in every quantity: nobody is told a position that nobody has measured. When the
-last one goes, that is published once.
+bus hangs, has NaN in every quantity: no position is published that was not measured. When the
+last one goes offline, that is published once.
 
 Commands have a subscription for each bus, because each bus has a thread that takes commands just
-before its cycles; what concerns the drives of other buses is left to theirs.
+before its cycles; the part of the drives of other buses is left to theirs.
 """
 
 from collections import Counter
@@ -41,7 +41,7 @@ from drive_can_bridge.ros.stamps import NO_STAMP, Stamps
 
 STATES = '~/joint_states'
 COMMANDS = '~/joint_commands'
-#: so many joints of others are told of
+#: so many joints of others are logged
 STRANGERS_MAX = 100
 
 #: one number of the message: its place in the samples one after the other, and the way to SI units
@@ -50,7 +50,7 @@ _Cell = tuple[int, float, float, float]
 
 class _Joint:
     """
-    A joint that is measured.
+    One measured joint.
 
     :ivar width: how many values its samples have.
     :ivar unknown: a sample of which nothing is known.
@@ -76,18 +76,18 @@ class _Joint:
                 self._places[quantity] = (slot, *linear, joint.factors[name])
 
     def cell(self, quantity: str, first: int) -> _Cell:
-        """Return where a quantity is when the sample begins there; NaN: this joint lacks it."""
+        """Return where a quantity is in a sample that begins there; NaN: this joint lacks it."""
         slot, scale, offset, factor = self._places.get(quantity, (0, math.nan, 0.0, 1.0))
         return first + slot, scale, offset, factor
 
 
 class JointStates:
     """
-    Publishes the message.
+    Publishes the message with all joints.
 
     :param drives: in the order of the configuration; those without a measured joint are left out.
     :param stamps: of the bridge.
-    :param warn: takes (topic of the warning, text); throttling is its business.
+    :param warn: logs (topic of the warning, text); limits repetitions itself.
     """
 
     def __init__(self, node: Node, drives: Sequence[DriveNode], stamps: Stamps,
@@ -116,7 +116,7 @@ class JointStates:
         self._prepared = PreparedMessage.find(self.publisher, message, numbers)
 
     def publish(self, now: float) -> None:
-        """Publish what is known now, if anything is, or was, and somebody listens."""
+        """Publish what is known now, if anything is, or was, and there is a subscriber."""
         try:
             if self._audience.listens(now):
                 self._publish(now)
@@ -125,7 +125,7 @@ class JointStates:
                 self._warn('joint states', sentences.joint_states_unpublished(str(error)))
 
     def destroy(self) -> None:
-        """Take the publisher out of its node."""
+        """Destroy the publisher."""
         self._node.destroy_publisher(self.publisher)
 
     def _publish(self, now: float) -> None:
@@ -185,7 +185,7 @@ class Joints:
                       if drive.drive.joint is not None}
             if not joints:
                 continue
-            if self._taken:     # the others hear the same, and need not tell it again
+            if self._taken:     # the others receive the same, and need not log it again
                 taker = _JointTaker(joints, known, _nothing, _nothing)
             else:
                 taker = _JointTaker(joints, known, warn, log.info)
@@ -203,34 +203,34 @@ class Joints:
                 drive.exchange.periodic_task = self._periodic_task
 
     def start(self) -> None:
-        """Begin to publish."""
+        """Start to publish."""
         if self._periodic_task is not None:
             self._periodic_task.begin(self._period, self._now())
 
     def destroy(self) -> None:
-        """Take the topics out of the node. Nobody may take commands any more."""
+        """Destroy the topics. No thread may take commands any more."""
         if self._periodic_task is not None:
             self._periodic_task.end()
         while self._taken:
             self._taken.pop().unsubscribe()
         if self._states is not None:
-            self._states.publish(self._now())  # the last joints have gone
+            self._states.publish(self._now())  # the last joints are offline
             self._states.destroy()
             self._states = None
 
 
 def _nothing(*_: object, **__: object) -> None:
-    """Leave it to somebody else to tell."""
+    """Do nothing: another subscription logs the same."""
 
 
 class _JointTaker:
     """
-    Takes messages for the joints of one bus.
+    Handles messages for the joints of one bus.
 
     :param joints: the drives of the bus by the names of their joints.
     :param known: the names of all joints of the bridge.
-    :param warn: takes what is wrong with a message.
-    :param inform: takes what nobody has to do anything about.
+    :param warn: logs what is wrong with a message.
+    :param inform: logs what needs no action.
     """
 
     def __init__(self, joints: Mapping[str, DriveNode], known: Collection[str],
@@ -240,12 +240,12 @@ class _JointTaker:
         self._warn = warn
         self._inform = inform
         self._strangers: set[str] = set()
-        #: names of the last message that was in order, and who takes which entry of such a one
+        #: names of the last valid message, and the function for each entry of such a one
         self._names: list[str] | None = None
         self._parts: list[tuple[int, Callable[[str, float, float], None]]] = []
 
     def __call__(self, message: JointMessage, now: float) -> None:
-        """Hand each joint its part."""
+        """Pass each joint its part."""
         names, columns = message
         wrong = self._problem(names, columns)
         if wrong is not None:
@@ -266,7 +266,7 @@ class _JointTaker:
                 take(quantity, values[entry], now)
 
     def take_old(self, message: JointMessage) -> None:
-        """Take what a message that is thrown away for its age may stop, unless it is refused."""
+        """Handle a message that is too old: it may only stop, unless it is refused."""
         names, columns = message
         if self._problem(names, columns) is None:
             for entry, name in enumerate(names):
@@ -279,7 +279,7 @@ class _JointTaker:
             drive.commands.disarm_joint()
 
     def refuse(self, topic: str, text: str) -> None:
-        """Count and tell a message that is thrown away, for all that it might have moved."""
+        """Count and log a refused message, for every joint of it."""
         for drive in self._joints.values():
             drive.commands.count_refused()
         self._warn(topic, text)
@@ -299,7 +299,7 @@ class _JointTaker:
         return None
 
     def _tell_stranger(self, name: str) -> None:
-        """Say once that a joint is none of this bridge; there may be any number of them."""
+        """Log once that a joint is none of this bridge; there may be any number of them."""
         if name not in self._strangers and len(self._strangers) < STRANGERS_MAX:
             self._strangers.add(name)
             self._inform(sentences.foreign_joint(name=printable(name)))

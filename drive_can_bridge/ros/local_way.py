@@ -2,7 +2,7 @@
 """
 What a bridge answers by the local way (:mod:`..process.local_way`).
 
-Nothing is decided here: what is asked ends where the services of the drives end, in the same
+Nothing is decided here: requests end where the services of the drives end, in the same
 threads, with the same checks and answers.
 """
 
@@ -36,27 +36,27 @@ _ACTIONS = {'enable': ControlAction.ENABLE, 'disable': ControlAction.DISABLE,
 _SHARE, _IN_HAND = 0.15, 0.02
 #: s for which the bridges that were seen are taken for those that there are
 _SEEN_FOR = 0.2
-#: patterns in a stop, and characters of each: anybody may send one, and to look at them takes time
+#: patterns in a stop, and characters of each: callers may send any, and matching takes time
 _PATTERNS_MAX, _PATTERN_MAX = 16, 256
 
 
 def security_enforced() -> bool:
-    """Return whether SROS2 says who may stop drives."""
+    """Return whether SROS2 decides who may stop drives."""
     return (os.environ.get('ROS_SECURITY_ENABLE') == 'true'
             and os.environ.get('ROS_SECURITY_STRATEGY') == 'Enforce')
 
 
 class LocalWayServer:
     """
-    Answers on the socket of a presence, from now on until it is closed.
+    Answers on the socket of this bridge's presence until it is closed.
 
     :param name: full name of the bridge.
     :param drives: by name, as they are.
     :param order: their names in the order of the configuration.
     :param seen: returns the full names of all bridges in the graph, ours among them, and those of
         the drives that are seen around them.
-    :param get: does what ``get_parameters`` of the bridge does, in the thread of the spinner.
-    :param warn: takes a line for the log.
+    :param get: handles ``get_parameters`` of the bridge, in the thread of the spinner.
+    :param warn: logs a warning.
     """
 
     def __init__(self, presence: Presence, domain: int, name: str,
@@ -88,12 +88,12 @@ class LocalWayServer:
             keep_share=lambda: CpuThrottle(_SHARE, clock, _IN_HAND).keep, clock=clock)
 
     def close(self) -> None:
-        """Answer nobody any more."""
+        """Stop answering."""
         if self._server is not None:
             self._server.stop()
 
     def serve(self, asked: LocalRequest) -> None:
-        """Begin to answer. In the thread that listens: nothing may wait here."""
+        """Start to answer. In the listening thread, so nothing may wait here."""
         if asked.action == 'stop':
             self._stop(asked)
         elif asked.action in _ACTIONS:
@@ -108,7 +108,7 @@ class LocalWayServer:
         else:
             asked.refuse(sentences.unknown_order())
 
-    # -- what a hand does -------------------------------------------------------------------------
+    # -- commands by hand -------------------------------------------------------------------------
 
     def _stop(self, asked: LocalRequest) -> None:
         place, words = ''.join(asked.words[:1]), asked.words[1:]
@@ -124,7 +124,7 @@ class LocalWayServer:
                        if meant(words, drive.full_name)}, introduce=True)
 
     def _pass(self, asked: LocalRequest) -> None:
-        """Have a stop passed on to those of the bridges that are seen: anybody may name any."""
+        """Pass a stop on to those of its bridges that are seen: a caller may name any."""
         stop = OthersStop.of(asked.words)
         if _is_costly(stop.words):
             asked.refuse(sentences.too_many_patterns())
@@ -132,7 +132,7 @@ class LocalWayServer:
         seen = set(self._around()[0]) - {self._name}
         known = [name for name in stop.bridges if name in seen]
         for name in stop.bridges:
-            if name not in seen:    # it has gone meanwhile
+            if name not in seen:    # it has left meanwhile
                 asked.answer('passed', name, '0', does_not_answer(), '1')
         if known:
             self._pass_on(stop._replace(bridges=tuple(known)), asked)
@@ -145,7 +145,7 @@ class LocalWayServer:
 
     def _command(self, asked: LocalRequest, action: ControlAction,
                  drives: Mapping[str, DriveNode | None], *, introduce: bool = False) -> None:
-        """Have drives do something, all at once; the last one that is done ends it."""
+        """Run an action on drives, all at once; the last one that is done ends the answer."""
         left, counting = len(drives) + 1, threading.Lock()
 
         def done() -> None:
@@ -171,7 +171,7 @@ class LocalWayServer:
         done()
 
     def _introduce(self, asked: LocalRequest) -> None:
-        """Say who this is, which drives there are, and which other bridges."""
+        """Answer with the name of the bridge, its drives, and the other bridges."""
         bridges, drives = self._around()
         asked.answer('drives', *(self._drives[name].full_name for name in self._order
                                  if name in self._drives))
@@ -211,7 +211,7 @@ class LocalWayServer:
 
 
 def _is_costly(words: Sequence[str]) -> bool:
-    """Return whether it takes long to see what words mean."""
+    """Return whether it takes long to match words."""
     patterns = [word for word in words if is_pattern(word)]
     return len(patterns) > _PATTERNS_MAX or any(len(word) > _PATTERN_MAX for word in patterns)
 

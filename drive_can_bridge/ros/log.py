@@ -2,10 +2,10 @@
 """
 The log of the bridge, written by a thread of its own.
 
-A line costs tens of microseconds at best, and whatever the file of the log and its subscribers
-take at worst. Most of what there is to say is found out with a bus lock held. So one that has a
-line puts it into a bounded queue and goes on; what does not fit is counted and said later. How
-much drives and buses may say is limited before (:class:`LogLimit`).
+A line costs tens of microseconds at best, and at worst whatever the file of the log and its
+subscribers take. Most lines are due with a bus lock held. So a thread that has a
+line puts it into a bounded queue and goes on; what does not fit is counted and logged later. How
+much drives and buses may log is limited before (:class:`LogLimit`).
 
 A status bit that flips in every cycle is news a hundred times a second. The first few times a line
 is written at once and as it is; from then on it is held, and summed up once in a while, with how
@@ -14,15 +14,15 @@ what was held is written in the end, in the order in which it came last, and wha
 even be held is counted.
 
 ============== ======================================================================
-of one line    :data:`FEW` times at once (a topic: once, unless it says otherwise),
+of one line    :data:`FEW` times at once (a topic: once, unless called otherwise),
                then a summary every :data:`SUM_UP` s; after :data:`QUIET` s without
                it, it is news again
-of a speaker   :data:`BURST` different lines at once, then :data:`RATE` a second
+of a source   :data:`BURST` different lines at once, then :data:`RATE` a second
 of all         :data:`BURST_OF_ALL` at once, then :data:`RATE_OF_ALL` a second
 ============== ======================================================================
 
-Errors, and warnings that tell of a danger, wait for nobody else: they have an allowance of their
-own, as large as the first one, and none in common with other speakers.
+Errors, and warnings of a danger, do not wait for others: they have an allowance of their
+own, as large as the first one, and none in common with other sources.
 """
 
 from collections.abc import Callable
@@ -57,7 +57,7 @@ LINES_MAX = 1000
 
 
 class LogLevel(Enum):
-    """How much a line matters."""
+    """The levels of lines."""
 
     INFO = 'info'
     WARNING = 'warning'
@@ -70,7 +70,7 @@ _LOOK, _END = (LogLevel.INFO, 'look'), (LogLevel.INFO, 'end')
 
 
 class _Allowance:
-    """So many at once, and then so many per second."""
+    """An allowance of so many lines at once, and then so many per second."""
 
     def __init__(self, size: int, rate: float) -> None:
         self._size, self._rate = float(size), rate
@@ -83,17 +83,17 @@ class _Allowance:
         return max(0.0, (1.0 - self._left) / self._rate)
 
     def take(self) -> None:
-        """Take the one for which :meth:`wait` has just returned 0."""
+        """Use up the one for which :meth:`wait` has just returned 0."""
         self._left -= 1.0
 
 
 @dataclass(slots=True)
 class _Topic:
     """
-    What became of one line, or of all lines of one topic.
+    The counts of one line, or of all lines of one topic.
 
     :ivar written: how often, at once, since it was news.
-    :ivar era: of the speaker, when it was written last; ``in_era``: how often in that.
+    :ivar era: of the source, when it was written last; ``in_era``: how often in that.
     :ivar held: how often it came since it was written; ``since`` when for the first time.
     """
 
@@ -109,7 +109,7 @@ class _Topic:
     since: float = 0.0
 
     def summary(self, now: float) -> str:
-        """Say how often it came, and when last."""
+        """Return the line with how often it came, and when last."""
         held, ago = self.held, now - self.seen_at
         last = f'{ago:.0f} s ago' if ago >= 1.0 else ''
         span = f'in {max(1.0, now - self.since):.0f} s'
@@ -125,9 +125,9 @@ class _Topic:
 
 class Speaker:
     """
-    One drive, one bus: a source of lines of the log.
+    A source of lines of the log: one drive, one bus.
 
-    :param name: stands before each line; '': nothing does.
+    :param name: put before each line; '': nothing is.
     """
 
     def __init__(self, name: str, limit: 'LogLimit') -> None:
@@ -146,9 +146,9 @@ class Speaker:
 
     def warning(self, text: str, *, urgent: bool = False) -> None:
         """
-        Log what somebody should look at.
+        Log what needs attention.
 
-        :param urgent: it tells of a danger.
+        :param urgent: it warns of a danger.
         """
         self._say(LogLevel.WARNING, text, urgent=urgent)
 
@@ -158,7 +158,7 @@ class Speaker:
 
     def warn(self, topic: str, text: str, *, once: bool = False, few: int = 1) -> None:
         """
-        Log a warning whose text may vary; what repeats is counted, and the newest text told.
+        Log a warning whose text may vary; repetitions are counted, and the newest text logged.
 
         :param once: repetitions are not logged at all, until :meth:`reset`.
         :param few: times that it is written at once, at most :data:`FEW`.
@@ -166,7 +166,7 @@ class Speaker:
         self._say(LogLevel.WARNING, text, topic=topic, once=once, few=few)
 
     def reset(self) -> None:
-        """Begin anew: the next warning of each topic is news."""
+        """Start over: the next warning of each topic is new."""
         with self._limit.lock:
             self._era += 1
 
@@ -190,7 +190,7 @@ class Speaker:
             self._emit(LogLevel.WARNING, sentences.lines_left_out(lines=self._left_out))
             self._left_out = 0
         if summed_up is not None and newest is not None and summed_up is not newest:
-            # written before all this, which was over by then: how it is now stands last
+            # written before all this, which was over by then: the present state is logged last
             ago = now - newest.seen_at
             self._emit(newest.level, f'{newest.text} (this came last, {ago:.0f} s ago)')
 
@@ -245,7 +245,7 @@ class Speaker:
             self._limit.wake()
 
     def _wait(self, urgent: bool, now: float) -> float:
-        """Take the allowance for a line, or return the s until there is one."""
+        """Use up the allowance for a line, or return the s until there is one."""
         allowances = (self._urgent,) if urgent else (self._own, self._limit.of_all)
         wait = max(allowance.wait(now) for allowance in allowances)
         if wait <= 0.0:
@@ -264,7 +264,7 @@ class Speaker:
 
 class LogLimit:
     """
-    All speakers of a log. From any thread; nobody waits for anything but another short line.
+    Limits all sources of a log. Thread-safe; callers wait only for each other's short lines.
 
     :param emit: writes a line; must not wait.
     :param wake: is called when :meth:`wait` has become shorter; must not wait either.
@@ -275,20 +275,20 @@ class LogLimit:
                  clock: Callable[[], float]) -> None:
         self.emit, self.wake, self.clock = emit, wake, clock
         self.lock = threading.RLock()
-        #: nobody will sum up anything any more: everything is written
+        #: held lines are not written later: everything is written
         self.over = False
         self.of_all = _Allowance(BURST_OF_ALL, RATE_OF_ALL)
         self._speakers: dict[str, Speaker] = {}
 
     def speaker(self, name: str) -> Speaker:
-        """Return the one of this name, always the same."""
+        """Return the source of this name, always the same."""
         with self.lock:
             if name not in self._speakers:
                 self._speakers[name] = Speaker(name, self)
             return self._speakers[name]
 
     def wait(self) -> float | None:
-        """Return the s until :meth:`sum_up` has something to do; None: it has nothing to do."""
+        """Return the s until :meth:`sum_up` has something to do; None: nothing."""
         with self.lock:
             due = min((speaker.due for speaker in self._speakers.values()), default=math.inf)
             return None if due == math.inf else max(0.0, due - self.clock())
@@ -297,7 +297,7 @@ class LogLimit:
         """
         Write what was held long enough.
 
-        :param all_of_it: everything that is held, because nobody will call any more.
+        :param all_of_it: everything that is held, because this is the last call.
         """
         with self.lock:
             now, self.over = self.clock(), self.over or all_of_it
@@ -333,7 +333,7 @@ class Log:
         self._put(LogLevel.INFO, text)
 
     def warning(self, text: str) -> None:
-        """Log what somebody should look at."""
+        """Log what needs attention."""
         self._put(LogLevel.WARNING, text)
 
     def error(self, text: str) -> None:
@@ -345,7 +345,7 @@ class Log:
         self._put(LogLevel.FATAL, text)
 
     def close(self) -> None:
-        """Write what waits, unless nobody takes it; what comes later is written at once."""
+        """Write what waits, unless its reader hangs; later lines are written at once."""
         if self._closed:
             return
         self._limit.sum_up(all_of_it=True)
@@ -395,5 +395,5 @@ class Log:
                 logger.error(text)
             else:
                 logger.fatal(text)
-        except Exception:  # noqa: BLE001  the context is gone: nobody is left to be told
+        except Exception:  # noqa: BLE001  the context is gone: there is no receiver
             pass

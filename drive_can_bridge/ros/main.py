@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What the executable ``drive_can_bridge`` does.
+The executable ``drive_can_bridge``.
 
 All executors run in threads; the main thread waits for a signal or a fatal error, and then: stops
 the drives, publishes a last diagnostic message, stops the executor, closes the buses, shuts down.
 
-Loading rclpy and its messages takes a second. Signals are looked after before that, which is why
+Loading rclpy and its messages takes a second. Signals are handled before that, which is why
 everything heavy is imported inside functions here.
 """
 
@@ -66,8 +66,8 @@ def _load_rcl() -> None:
     """
     Load rcl while the outputs are as they were.
 
-    Where its middleware is not installed it says so, and ends the process on the spot: what is in
-    a pipe by then is read by nobody. What else may be wrong is told by who needs it.
+    Where its middleware is not installed it prints so, and ends the process on the spot: what is
+    in a pipe by then is never read. Other errors are reported where it is used.
     """
     with suppress(Exception):
         import drive_can_bridge.ros.rcl.extension  # noqa: F401
@@ -89,7 +89,7 @@ def _complain(text: str) -> int:
 
 
 def _tell_rcutils(outputs: StandardOutputs) -> None:
-    """Have it write as if it did not see a pipe."""
+    """Make rcutils write as if its output were no pipe."""
     on_output = os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1'
     if (outputs.output if on_output else outputs.error).is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
@@ -103,10 +103,10 @@ def _refuse_to_suspend() -> None:
 
 def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
     """
-    Run the bridge until its watcher says so.
+    Run the bridge until its watcher ends it.
 
     :param arguments: those of the command line, the program's name first.
-    :return: what the process ends with unless a signal says otherwise.
+    :return: the exit code unless a signal decides it.
     """
     import rclpy
     from rclpy.executors import ExternalShutdownException
@@ -151,18 +151,18 @@ def run(watcher: SignalWatcher, clock: Clock, arguments: list[str]) -> int:
 def set_up_fast_dds(environment: MutableMapping[str, str] = os.environ,
                     maps: Path = MAPS) -> tuple[Sentence, list[Sentence]]:
     """
-    Let Fast DDS use the profile of the bridge, unless somebody has profiles of their own.
+    Make Fast DDS use the bridge's profile, unless the user has profiles of their own.
 
     Fast DDS makes room for a hundred messages at each end of each of them before there is one. A
     drive has about thirty ends, most of which never see as many. So histories begin small and
-    grow where they have to; how many messages they keep is what each topic says, as ever. And it
+    grow where they have to; how many messages they keep is each topic's quality, as ever. And it
     wakes a thread of its own for every sample that a reliable reader gets, which costs as much as
     a tenth of the bridge; in this profile one wake-up in 20 ms serves all of them.
 
-    To be called before ``rclpy.init``. Other middleware takes no notice.
+    To be called before ``rclpy.init``. Other middleware ignores it.
 
     :param maps: what this process has loaded.
-    :return: why the bridge must not run, or nothing; and what is to be said in the log.
+    :return: why the bridge must not run, or empty; and lines for the log.
     """
     from rclpy.utilities import get_rmw_implementation_identifier
 
@@ -211,7 +211,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str],
     code = 0
     try:
         try:
-            if not watcher.signalled:  # else nothing is begun that had to be stopped
+            if not watcher.signalled:  # else nothing is started that would have to be stopped
                 if bridge.autostart and not bridge.start(lambda: watcher.signalled):
                     code = 1
                 elif watcher.wait():
@@ -227,7 +227,7 @@ def _run(watcher: SignalWatcher, clock: Clock, arguments: Sequence[str],
 
 
 def _name_the_unstopped(bridge: 'BridgeNode', _: float) -> None:
-    """Say whose stop is cut short by a second signal."""
+    """Print whose stop is cut short by a second signal."""
     for name, drive in list(bridge.drives.items()):
         session = drive.session
         if not session.stopped and session.may_run:
@@ -255,7 +255,7 @@ def _parameter_files(arguments: Sequence[str]) -> list[str]:
 
 
 def _parse_error(error: Exception, arguments: Sequence[str]) -> str:
-    """Return what is wrong with a file, or what rcl says without positions of its C sources."""
+    """Return what is wrong with a file, or rcl's words without positions of its C sources."""
     from drive_can_bridge.configuration.parameter_file import read_sections
     from drive_can_bridge.configuration.problems import report
     from drive_can_bridge.transport.failures import in_words
@@ -263,7 +263,7 @@ def _parse_error(error: Exception, arguments: Sequence[str]) -> str:
     for path in map(Path, _parameter_files(arguments)):
         try:
             problems = report(read_sections(path)[1])
-        except OSError:     # which rcl says, too
+        except OSError:     # which rcl reports, too
             continue
         if problems:
             more = f' (drive_can validate {path} shows all)' if problems[1:] else ''
@@ -276,12 +276,12 @@ def _parse_error(error: Exception, arguments: Sequence[str]) -> str:
 
 @contextmanager
 def _quiet_rcl() -> Iterator[None]:
-    """Hold back what rcl itself writes to standard error; show it only if all went well."""
+    """Hold back rcl's own lines on standard error; print them only if all went well."""
     sys.stderr.flush()
     saved = os.dup(2)
     # a file would need a disk that can be written, and not every Python has memfd_create
     reading, writing = os.pipe()
-    os.set_blocking(writing, False)     # nobody reads meanwhile: what is too much is lost
+    os.set_blocking(writing, False)     # not read meanwhile: what does not fit is lost
     os.dup2(writing, 2)
     os.close(writing)
     with open(reading, 'rb') as held:

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What is in the messages of parameters: for the bridge, and for its clients."""
+"""The contents of parameter messages: for the bridge, and for its clients."""
 
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterDescriptor, ParameterValue
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -9,7 +9,7 @@ from drive_can_bridge.core.text import facts_in
 
 
 def value_of(message: ParameterValue) -> object:
-    """Return what is in a value; None for NOT_SET, and for a type that does not exist."""
+    """Return the content of a value; None for NOT_SET, and for a type that does not exist."""
     try:
         return parameter_value_to_python(message)
     except RuntimeError:
@@ -29,7 +29,7 @@ def drive_value(message: ParameterValue) -> Value | None:
 
 
 def parameter_message(name: str, value: Value) -> ParameterMessage:
-    """Return what sets a parameter to a value of its type."""
+    """Return the message that sets a parameter to a value of its type."""
     return Parameter(name, value=value).to_parameter_msg()
 
 
@@ -39,7 +39,7 @@ def facts_of(message: ParameterDescriptor) -> dict[str, str]:
 
 
 def limits_of(message: ParameterDescriptor) -> tuple[float | None, float | None]:
-    """Return the smallest and the largest value of a descriptor; None: not told."""
+    """Return the smallest and the largest value of a descriptor; None: unlimited."""
     for limits in (*message.floating_point_range, *message.integer_range):
         return float(limits.from_value), float(limits.to_value)
     return None, None

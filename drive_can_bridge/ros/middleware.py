@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What is asked of the middleware: quality of service of each kind of topic."""
+"""The quality of service of each kind of topic."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from drive_can_bridge.ros.rcl.nodes import overrides
 
-#: s between two looks at who subscribes
+#: s between two counts of subscribers
 COUNT_PERIOD = 0.1
 #: the default policies, and that which makes a topic a latched one
 _OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
@@ -25,7 +25,7 @@ def state_quality() -> QoSProfile:
 
 def command_quality() -> QoSProfile:
     """
-    Setpoints: the newest wins, and what was lost is outdated.
+    Return the quality for setpoints: the newest wins, and what was lost is outdated.
 
     Best effort: after a pause of this process, reliable middleware delivers again what was sent
     meanwhile, seconds late. A few messages of history all the same: a refused value must not push
@@ -35,17 +35,17 @@ def command_quality() -> QoSProfile:
 
 
 def publisher(node: Node, kind: Any, topic: str, quality: QoSProfile) -> Publisher:
-    """Return a publisher whose quality of service may be overridden."""
+    """Create a publisher whose quality of service may be overridden."""
     return node.create_publisher(kind, topic, quality,
                                  qos_overriding_options=overriding(node, topic))
 
 
 def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:
     """
-    Return the overriding options of a topic, or None where nobody overrides anything.
+    Return the overriding options of a topic; None: nothing is overridden.
 
     Declaring three parameters for each of a dozen topics costs every drive some milliseconds at
-    start; almost nobody overrides.
+    start; few users override.
     """
     prefix = f'qos_overrides.{node.resolve_topic_name(topic)}.'
     if any(name.startswith(prefix) for name in overrides(node)):
@@ -54,13 +54,13 @@ def overriding(node: Node, topic: str) -> QoSOverridingOptions | None:
 
 
 def quality_overrides(node: Node) -> list[NodeParameter]:
-    """Return what a node's parameters say about the quality of any topic."""
+    """Return the parameters of a node that override qualities of topics."""
     return [parameter for name, parameter in overrides(node).items()
             if name.startswith('qos_overrides.')]
 
 
 class Audience:
-    """The subscribers of one topic."""
+    """Counts the subscribers of one topic."""
 
     def __init__(self, publisher: Publisher) -> None:
         self._publisher = publisher

@@ -4,7 +4,7 @@ A drive's parameters as the parameters of its node.
 
 The six standard services, so that ``ros2 param`` and rqt_reconfigure work on a drive. Reading and
 writing goes over acyclic frames: the callbacks are coroutines, which wait for the session's answer
-without holding up anybody (:mod:`.threads`).
+without blocking other calls (:mod:`.threads`).
 """
 
 from collections.abc import Callable, Sequence
@@ -52,16 +52,16 @@ class ParameterServices:
     """
     The parameter services of one drive.
 
-    :ivar services: to be begun, and let go of.
-    :param stamps: of what is announced.
+    :ivar services: to be started, and destroyed.
+    :param stamps: of parameter events.
     :param thread: serves them.
-    :param submit: hands a request to the drive's session; answered by one outcome per parameter.
+    :param submit: submits a request to the drive's session; answered by one outcome per parameter.
     :param write_refusal: why users may not write a parameter now, or ''.
     :param role: what the bridge itself uses a parameter for.
-    :param active: tells whether the bridge is active; nothing is sent otherwise.
+    :param active: returns whether the bridge is active; nothing is sent otherwise.
     :param restore: of the drive's profile.
-    :param failed: takes (what was tried, reason) for log and diagnostics, and how many parameters
-        failed without having reached the session, which counts the others.
+    :param failed: called with (what was tried, reason) for log and diagnostics, and how many
+        parameters failed without having reached the session, which counts the others.
     """
 
     def __init__(self, node: Node, thread: ServiceThread, directory: ParameterDirectory,
@@ -93,9 +93,9 @@ class ParameterServices:
 
     def _excess(self, names: Sequence[str], what: str) -> str:
         """
-        Say why a call asks for too much to be looked at; '' if it does not.
+        Return why a call asks for too much to be processed; '' if it does not.
 
-        Those who wait behind it should not notice it: neither its names are looked up, nor is each
+        It must not delay the calls behind it: neither its names are looked up, nor is each
         of them logged.
         """
         if len(names) > NAMES_MAX:
@@ -208,7 +208,7 @@ class ParameterServices:
         if items:
             outcomes = await self._submit(WriteRequest(
                 tuple((parameter, raw) for _, parameter, raw in items),
-                # a drive that nobody hears is not to be left in it
+                # a silent drive is not to be left in it
                 blind=all(self._restore.ends_mode(parameter.name, parameter.word_from_raw(raw))
                           for _, parameter, raw in items)))
             written = []
@@ -270,9 +270,9 @@ class ParameterServices:
 
     def _checked(self, message: ParameterMessage, *, hint: bool = True) -> tuple[Parameter, int]:
         """
-        Find the parameter that is to be set, and the raw integer.
+        Find the parameter that is to be set, and its raw integer.
 
-        :param hint: for a name that nobody knows, look for the nearest that somebody does.
+        :param hint: for an unknown name, look for the nearest known one.
         :raises ValueRefused: in words.
         """
         parameter = self._directory.find(message.name)
@@ -294,7 +294,7 @@ class ParameterServices:
             self._failed(f'{what} parameters', sentences.more_names_failed(more), more)
 
     def _tell_outcomes(self, what: str, failures: Sequence[tuple[Parameter, Failure]]) -> None:
-        """Log what became of a call's names: of what is no fault of theirs what a log takes."""
+        """Log the failures of a call; where the names are not at fault, only the first."""
         alike = 0
         for parameter, failure in failures:
             alike += failure.kind.of_bridge
@@ -318,7 +318,7 @@ class ParameterServices:
 
 def list_parameters(names: list[str], prefixes: list[str], depth: int) -> ListParametersResult:
     """
-    Select names as rcl_interfaces/srv/ListParameters says.
+    Select names by the rules of rcl_interfaces/srv/ListParameters.
 
     :param prefixes: none means all names; otherwise a name that equals one or lies below one.
     :param depth: number of levels below the prefix (or in all); 0 means all.
@@ -349,5 +349,5 @@ def _result(outcome: Outcome) -> SetParametersResult:
 
 
 def _title(parameter: Parameter) -> str:
-    """Name a parameter for the log: ``ramp_time (P30)``."""
+    """Return a parameter's name for the log: ``ramp_time (P30)``."""
     return f'{parameter.name} ({parameter.address})'

@@ -2,8 +2,8 @@
 """
 A stop that came by the local way, passed on to bridges of other hosts.
 
-A command that has just begun has to discover them, a bridge has done so: clients that it makes now
-are matched within some milliseconds. Only what a command of this host asks for is passed on, so
+A command that has just started has to discover them, a bridge has done so: clients that it makes
+now are matched within some milliseconds. Only a request of a command of this host is passed on, so
 nothing goes round in circles.
 """
 
@@ -28,15 +28,15 @@ from drive_can_bridge.ros.rcl.extension import GONE
 PATIENCE = 1.0
 #: stops of strangers that are passed on at a time
 STRANGERS_AT_ONCE = 4
-#: s for which the same stop once more has been heard just now: whoever is late shares the next
+#: s for which an equal stop counts as the same: a later one shares the next
 JUST_NOW = 0.25
 
 
 class NodeEnd:
     """
-    The node of a bridge, as a client of other bridges wants one.
+    The node of a bridge, as an end for calls to other bridges.
 
-    :param warn: takes why its end cannot be the node itself.
+    :param warn: logs why its end cannot be the node itself.
     :ivar end: of the node.
     """
 
@@ -51,7 +51,7 @@ class OthersStop(NamedTuple):
     A stop of drives of other bridges.
 
     :ivar bridges: their full names.
-    :ivar handled: drives that have theirs already.
+    :ivar handled: drives that are stopped already.
     :ivar words: names, patterns or full names of those that are meant; none: all.
     """
 
@@ -61,7 +61,7 @@ class OthersStop(NamedTuple):
 
     @classmethod
     def of(cls, words: Sequence[str]) -> 'OthersStop':
-        """Take apart what was asked: the three, with an empty word between two of them."""
+        """Parse a request: the three lists, with an empty word between two of them."""
         parts: list[list[str]] = [[]]
         for word in words:
             if word or len(parts) == 3:
@@ -74,11 +74,11 @@ class OthersStop(NamedTuple):
 
 class _Way:
     """
-    A stop on its way to other bridges.
+    A stop that is being passed on to other bridges.
 
     :param find_end: returns what asks them.
-    :param asked: who wants to know what becomes of it.
-    :ivar began: when it was.
+    :param asked: the requests that get its answers.
+    :ivar began: when it was started.
     """
 
     def __init__(self, find_end: Callable[[], NodeEnd], wanted: OthersStop,
@@ -95,7 +95,7 @@ class _Way:
             self._stop.leave(wanted.handled)
 
     def look(self, now: float) -> bool:
-        """Go on; return whether all is done."""
+        """Continue; return whether all is done."""
         done = True
         with self._told():
             done = self._stop is None or self._stop.look(now)
@@ -103,7 +103,7 @@ class _Way:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """Have a failure told: a policy, or an end meanwhile; rcl has many types of it."""
+        """Record a failure instead of raising it: rcl has many types, such as for a policy."""
         try:
             yield
         except Exception as error:  # noqa: BLE001
@@ -111,7 +111,7 @@ class _Way:
             self.close()
 
     def answer(self) -> None:
-        """Say what has become of it."""
+        """Answer with the results."""
         drives: list[str] = []
         answers: list[Answer] | None = None
         if self._stop is not None:
@@ -129,7 +129,7 @@ class _Way:
         self.close()
 
     def close(self) -> None:
-        """Wait for nothing any more."""
+        """Drop the calls."""
         stop, self._stop = self._stop, None
         if stop is not None:
             with suppress(*GONE):
@@ -140,10 +140,10 @@ class Passing:
     """
     Passes stops on, each at once; those that are the same as one of just now share the next.
 
-    Not one that is merely under way: a drive that hangs keeps that for long, and others may run
-    again by then. Strangers have a few under way. The thread begins with the first one.
+    Not with one that is merely under way: a drive that hangs keeps that for long, and others may
+    run again by then. Strangers have a few under way. The thread begins with the first one.
 
-    :param warn: takes a line for the log.
+    :param warn: logs a warning.
     """
 
     def __init__(self, node: Node, clock: Clock, warn: Callable[[str], object]) -> None:
@@ -158,7 +158,7 @@ class Passing:
         self._thread: Worker | None = None
 
     def begin(self, wanted: OthersStop, asked: LocalRequest) -> None:
-        """Pass a stop on. From one thread."""
+        """Start to pass a stop on. From one thread."""
         asked.answer('passing')
         if self._thread is None:
             self._thread = self._clock.worker(self._run, 'passing on')
@@ -166,13 +166,13 @@ class Passing:
         self._mail.put((wanted, asked))
 
     def _find_end(self) -> NodeEnd:
-        """Return what asks others; made when it is needed first."""
+        """Return the end for calls to others; created when it is needed first."""
         if self._end_of is None:
             self._end_of = NodeEnd(self._node, self._warn)
         return self._end_of
 
     def end(self) -> None:
-        """Pass nothing on any more."""
+        """End the thread, and all calls."""
         self._ending = True
         self._mail.put(None)
         if self._thread is not None:
@@ -204,7 +204,7 @@ class Passing:
                 way.answer()
 
     def _take_mail(self) -> None:
-        """Take what has come; wait for it, a moment only where something is under way."""
+        """Handle new requests; wait for one, only a moment while something is under way."""
         busy = self._under_way or self._waiting
         with suppress(TimeoutError):
             until = self._clock.now() + LOOK_PERIOD if busy else math.inf
@@ -215,7 +215,7 @@ class Passing:
                 until = -math.inf
 
     def _begin_what_may(self, now: float) -> None:
-        """Begin what waits, and may; whoever wants the same at the same time shares it."""
+        """Start what waits, and may start; equal requests of the same time share one stop."""
         together: dict[OthersStop, list[LocalRequest]] = {}
         for wanted, asked in self._waiting:
             together.setdefault(wanted, []).append(asked)

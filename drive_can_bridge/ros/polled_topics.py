@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Command subscriptions that are taken by hand, when the exchange comes to it, but for old commands.
+Command subscriptions that are polled by the exchange, except for old commands.
 
-Nor does anybody wait for their events, such as a publisher of other quality: with Fast DDS that
+Nor does any thread wait for their events, such as a publisher of other quality: with Fast DDS that
 wait ends with every message, which at 3,000 commands/s costs more than everything else. They are
 looked at once in a while instead.
 
 Even a look into an empty queue costs 2 µs, with four setpoints a tenth of the whole exchange. So
-only the topics that somebody publishes are looked at in each cycle; who does is looked up every
-``COUNT_PERIOD``, and whatever came from anybody is taken then. The very first command of a
+only topics with a publisher are looked at in each cycle; the publishers are counted every
+``COUNT_PERIOD``, and all topics are looked at then. The very first command of a
 publisher that was discovered just now may wait for that long.
 """
 
@@ -32,7 +32,7 @@ from drive_can_bridge.ros.middleware import command_quality, overriding
 from drive_can_bridge.ros.rcl.extension import GONE
 from drive_can_bridge.ros.rcl.incoming import Incoming, subscribe
 
-#: messages that are taken at once where everything is kept, and that are thrown away at once: more
+#: messages that are taken at once where everything is kept, and that are discarded at once: more
 #: than any middleware keeps (Fast DDS: 5000), since what is left would pass for fresh
 DEPTH_UNBOUNDED, WAITING_MAX = 1000, 100_000
 #: bytes of a message that are looked at: a JointState of a thousand joints with long names
@@ -43,9 +43,9 @@ HEADER = 4
 _CODES = {Float64: 'd', Int64: 'q', Bool: '?'}
 #: what is thrown away
 _TOO_OLD = Age.LATE, Age.CLOCKS_DIFFER
-#: what bytes that nobody can read raise
+#: what malformed bytes raise
 _UNREADABLE = RuntimeError, ValueError, struct.error
-#: s between two looks at who publishes
+#: s between two counts of publishers
 COUNT_PERIOD = 0.05
 #: s between two looks at events of subscriptions
 EVENT_PERIOD = 1.0
@@ -58,19 +58,19 @@ Look = tuple[int, int]
 
 class CommandTopic:
     """
-    Takes what waits on one subscription.
+    Takes the waiting messages of one subscription.
 
     A message is taken as the bytes that came and read with ``struct``, which costs half of what
-    rclpy takes to make an object of it; and bytes that nobody can read are one more refused
+    rclpy takes to make an object of it; and malformed bytes are one more refused
     command, not an exception in the thread of the exchange.
 
     A command that is too old (:mod:`drive_can_bridge.core.command_age`) moves nothing, but one
     that equals neutral stops all the same: so a publisher whose clock is behind can.
 
-    :param use: takes each message (of the types with one number: the number) and ``now``.
-    :param old: takes each that is thrown away for its age, for what it may stop.
-    :param aged: takes what its age says of each that is not simply fresh, and the figure in s.
-    :param unreadable: takes why a message cannot be read.
+    :param use: called with each message (of the types with one number: the number) and ``now``.
+    :param old: called with each that is discarded for its age, because it may stop.
+    :param aged: called with the judged age of each that is not simply fresh, and the figure in s.
+    :param unreadable: called with why a message cannot be read.
     :param read: makes of the bytes what ``use`` takes; None: the number, or a message of the type.
     """
 
@@ -98,9 +98,9 @@ class CommandTopic:
 
     def take(self, now: float, look: Look) -> None:
         """
-        Hand over what waits, oldest first.
+        Deliver the waiting messages, oldest first.
 
-        :param look: what the clocks show.
+        :param look: the times of the clocks.
         :raises InvalidHandle: the node is being destroyed.
         """
         take, alone = self.incoming.take, None
@@ -130,7 +130,7 @@ class CommandTopic:
             self._use(message, now)
 
     def discard(self, look: Look) -> int:
-        """Throw away what waits, but for what it may stop; return how many commands that were."""
+        """Discard what waits, except for what it may stop; return how many commands that were."""
         self._ages.look(*look)
         for count in range(self._waiting_max):
             taken = self.incoming.take()
@@ -145,7 +145,7 @@ class CommandTopic:
 
     def _decode(self, data: bytes) -> Any:
         if self._structs and len(data) >= HEADER:
-            code = self._structs[data[1] & 1]       # the lowest bit says: low byte first
+            code = self._structs[data[1] & 1]       # the lowest bit means: low byte first
             if HEADER + code.size <= len(data) < HEADER + code.size + 4:
                 return code.unpack_from(data, HEADER)[0]
         if len(data) < self._shortest:  # no middleware need have words for that
@@ -157,7 +157,7 @@ class CommandTopic:
 
 
 def _gid(info: dict[str, Any]) -> bytes | None:
-    """Return who published a message; None: this rclpy or middleware does not tell."""
+    """Return the publisher of a message; None: this rclpy or middleware does not name it."""
     gid = info.get('publisher_gid')
     if gid is None:
         return None
@@ -166,7 +166,7 @@ def _gid(info: dict[str, Any]) -> bytes | None:
 
 
 class Warn(Protocol):
-    """Takes the topic of a warning, and its text; ``once``: no need to repeat it."""
+    """Logs a warning by topic and text; ``once``: no need to repeat it."""
 
     def __call__(self, topic: str, text: str, *, once: bool = False) -> None:
         """Log it, or not."""
@@ -174,10 +174,10 @@ class Warn(Protocol):
 
 class PolledTopics:
     """
-    The command subscriptions that one thread takes.
+    The command subscriptions that one thread polls.
 
-    :param warn: takes (topic of the warning, text); throttling is its business.
-    :param refuse: the same of a command that is thrown away.
+    :param warn: logs (topic of the warning, text); limits repetitions itself.
+    :param refuse: the same for a command that is refused.
     """
 
     def __init__(self, node: Node, clock: Clock, warn: Warn,
@@ -187,7 +187,7 @@ class PolledTopics:
         self._warn = warn
         self._refuse = refuse
         self._topics: list[CommandTopic] = []
-        self._published: list[CommandTopic] = []  # by somebody, as far as known
+        self._published: list[CommandTopic] = []  # those with a publisher, as far as known
         self._count_at = -math.inf
         self._look_at = -math.inf
         self._ahead = self._compare_clocks()[1]
@@ -200,7 +200,7 @@ class PolledTopics:
         Add a topic.
 
         :param take: gets each message (or its number) and ``now``.
-        :param old: gets each that is thrown away for its age, for what it may stop.
+        :param old: gets each that is discarded for its age, because it may stop.
         :param disarm: disarms what the topic commands.
         :param read: makes of the bytes what ``take`` gets; None: the message.
         """
@@ -232,11 +232,11 @@ class PolledTopics:
 
     @property
     def names(self) -> list[str]:
-        """Full names of the topics."""
+        """The full names of the topics."""
         return [topic.subscription.topic_name for topic in self._topics]
 
     def take(self, now: float) -> None:
-        """Hand over all that waits, oldest first."""
+        """Deliver all waiting messages, oldest first."""
         look = self._look()
         try:
             if now < self._count_at:
@@ -244,7 +244,7 @@ class PolledTopics:
                     topic.take(now, look)
                 return
             self._count_at = now + COUNT_PERIOD
-            for topic in self._topics:  # some may have come from a publisher that is gone by now
+            for topic in self._topics:  # some may have come from a publisher that has left by now
                 topic.take(now, look)
             self._published = [topic for topic in self._topics
                                if topic.incoming.publishers()]
@@ -259,7 +259,7 @@ class PolledTopics:
             pass
 
     def discard(self) -> int:
-        """Throw away what is waiting; return how many commands that were."""
+        """Discard what is waiting; return how many commands that were."""
         look = self._look()
         try:
             return sum(topic.discard(look) for topic in self._topics)
@@ -267,7 +267,7 @@ class PolledTopics:
             return 0
 
     def _look(self) -> Look:
-        """Return what the clocks show; what they differ by is as before, unless one was set."""
+        """Return the times of the clocks; their difference is as before, unless one was set."""
         look = self._compare_clocks()
         if abs(look[1] - self._ahead) > JITTER:
             look = self._compare_clocks()   # this thread may only have had to wait in between
@@ -280,12 +280,12 @@ class PolledTopics:
         return now, self._clock.stamp() - now
 
     def destroy(self) -> None:
-        """Let go of the subscriptions. Before the node is destroyed, which has them otherwise."""
+        """Destroy the subscriptions. Before the node is destroyed, which has them otherwise."""
         for topic in self._topics:
             topic.incoming.let_go()
 
     def unsubscribe(self) -> None:
-        """Take the subscriptions out of a node that stays."""
+        """Destroy the subscriptions of a node that stays."""
         self.destroy()
         self._published.clear()
         while self._topics:

@@ -3,7 +3,7 @@
 Messages that are serialised once; from then on only their numbers are filled in.
 
 rclpy converts a message attribute by attribute and serialises it, every time it is published. For
-a ``ParameterEvent`` of four values that takes twenty times as long as handing its bytes over
+a ``ParameterEvent`` of four values that takes twenty times as long as publishing its bytes
 (docs/performance.md), and nothing but the stamp and four numbers differs from the last one.
 
 A message in whose bytes the numbers cannot be found (a bool is one byte, and no byte is
@@ -39,7 +39,7 @@ NUMBER_CODES = {ValueKind.DOUBLE: 'd', ValueKind.INTEGER: 'q'}
 
 class ConstantBytes(NamedTuple):
     """
-    The bytes of a message: what is constant, in turn with numbers.
+    The constant bytes of a message, in turn with its numbers.
 
     :param order: of the bytes, as ``struct`` writes it.
     :param constants: one more than codes; some may be empty.
@@ -52,12 +52,12 @@ class ConstantBytes(NamedTuple):
 
 def find_layout(message: Any, numbers: Sequence[Number]) -> ConstantBytes | None:
     """
-    Find where the ``numbers`` of a message stand; None: they are not found in its bytes.
+    Find where the ``numbers`` of a message are; None: they are not found in its bytes.
 
     That is not assumed but found: the message is serialised by the middleware in use, with a
     distinctive number in each place.
 
-    They have to be given in the order in which the message has them. The message is left with
+    They have to be in the message's order. The message is left with
     arbitrary numbers in it.
     """
     markers = [_marker(code, index) for index, (code, _) in enumerate(numbers)]
@@ -80,7 +80,7 @@ def _marker(code: str, index: int) -> Any:
 
 def _constants(data: bytes, order: str, codes: Sequence[str],
                markers: Sequence[Any]) -> tuple[bytes, ...]:
-    """Return what stands between these markers; nothing: they are not there."""
+    """Return the bytes between these markers; empty: the markers were not found."""
     constants, end = [], 0
     for code, marker in zip(codes, markers):
         row = marker if isinstance(marker, list) else [marker]
@@ -119,7 +119,7 @@ class PreparedMessage:
         """
         Prepare ``message``, whose ``numbers`` change; None when they are not found in its bytes.
 
-        They have to be given in the order in which the message has them; those in a row are
+        They have to be in the message's order; those in a row are
         published as so many numbers. The message is left with arbitrary numbers in it.
         """
         layout = find_layout(message, numbers)

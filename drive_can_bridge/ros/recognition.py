@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-How bridges and their drives are recognised in the ROS graph, before anybody was asked.
+How bridges and their drives are recognised in the ROS graph, before any of them was asked.
 
-A bridge offers ``~/save_trace`` beside the transitions of a managed node, so nobody else's managed
+A bridge offers ``~/save_trace`` beside the transitions of a managed node, so no other managed
 node is taken for one. A drive offers ``~/quick_stop``, publishes its samples, and lives in the
 namespace of a bridge.
 """
@@ -10,7 +10,7 @@ namespace of a bridge.
 from collections.abc import Callable, Collection, Iterable
 import re
 
-#: name and types of each service, or topic, as the graph tells them
+#: name and types of each service, or topic, as the graph has them
 Entries = Iterable[tuple[str, list[str]]]
 
 #: parameter of a bridge: the full names of all bridges that it sees, its own among them
@@ -33,7 +33,7 @@ def drives_among(services: Entries, topics: Callable[[], Entries], bridges: Iter
     """
     Return the full names of the drives in the namespaces of bridges, but for those known.
 
-    :param topics: asks for the topics of the graph, if need be.
+    :param topics: returns the topics of the graph, if need be.
     """
     places = {namespace_of(bridge) for bridge in bridges}
     stoppable = sorted(node for node in _nodes(services, 'quick_stop', _TRIGGER)

@@ -4,8 +4,8 @@ Requests of services, whatever the middleware makes of their bytes.
 
 Reading a request takes it some microseconds. There are some whose bytes do not fit, of another
 middleware, that take it a minute, or memory until there is no more; or it throws. The interpreter
-is not held meanwhile (:mod:`.rcl.services`), so that is the affair of one thread: whoever looks
-after it is told, to go on with another one.
+is not held meanwhile (:mod:`.rcl.services`), so it blocks one thread only: its service thread
+is called, to continue with another one.
 """
 
 from collections.abc import Callable
@@ -27,10 +27,10 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 #: s after which others are not kept waiting for a request to be read
 HANGS = 0.5
 
-#: is told that a request takes long, or (True) that the thread which reads it will never go on
+#: called when a request takes long, or (True) when the thread that reads it will never continue
 GoOn = Callable[[bool], None]
-#: takes a service, and whoever goes on without the one that takes its request if that takes long;
-#: returns the request, and who asked; None: there is none
+#: called with a service, and with a function that continues without a thread that takes long;
+#: returns the request with its header; None: there is none
 Take = Callable[[Service, GoOn], tuple[Any, Any] | None]
 
 
@@ -45,10 +45,10 @@ def full_name(service: Service) -> str:
 @dataclass(slots=True, eq=False)
 class _Taking:
     """
-    What one thread is taking.
+    The request that one thread is taking.
 
     :ivar thrown: what the middleware threw.
-    :ivar told: others have gone on.
+    :ivar told: other threads have continued.
     """
 
     service: Service
@@ -62,8 +62,8 @@ class ServiceRequests:
     """
     Takes requests. In any thread.
 
-    :param rcl: the way past rclpy; None: there is none.
-    :param warn: takes a line for the log.
+    :param rcl: direct access to rcl; None: through rclpy only.
+    :param warn: logs a warning.
     :param error: the same.
     """
 
@@ -85,9 +85,9 @@ class ServiceRequests:
 
     def take(self, service: Service, go_on: GoOn) -> tuple[Any, Any] | None:
         """
-        Take the oldest request that waits, and who asked; None: there is none that can be read.
+        Return the oldest waiting request, with its header; None: there is none that can be read.
 
-        :param go_on: is told, by another thread, if this takes long.
+        :param go_on: called, by another thread, if this takes long.
         :raises InvalidHandle: the service is gone.
         """
         try:
@@ -121,12 +121,12 @@ class ServiceRequests:
         self._wake.ring()
 
     def stop(self) -> None:
-        """End."""
+        """Stop the thread."""
         self._ending = True
         self._wake.ring()
         self._thread.join(5.0)
 
-    # -- the thread that looks how long it takes --------------------------------------------------
+    # -- the thread that measures how long it takes -----------------------------------------------
 
     def _run(self) -> None:
         while not self._ending:

@@ -75,7 +75,7 @@ class EventTopic:
 
 
 class RequestTopic:
-    """``~/request``: what a drive was told last. Nothing is built without a subscriber."""
+    """``~/request``: the values sent last. Nothing is built without a subscriber."""
 
     def __init__(self, node: Node, sent: LastSent, stamps: Stamps) -> None:
         self._sent = sent
@@ -85,7 +85,7 @@ class RequestTopic:
         self._audience = Audience(self._topic.publisher)
 
     def publish(self, sent_at: float) -> None:
-        """Publish it, if anything was sent since activation."""
+        """Publish them, if anything was sent since activation."""
         raws = self._sent.raws
         if not self._audience.listens(sent_at) or all(raw is None for raw in raws):
             return
@@ -142,7 +142,7 @@ class JointTopic:
               for quantity, _, _ in self._quantities)])
 
     def publish(self, values: Sequence[Value], stamp: Stamp) -> None:
-        """Publish one sample; only what arrived, and nothing if no part of it did."""
+        """Publish one sample: only the values that arrived, and nothing without any."""
         present = len(values)
         if self._prepared is not None and present > max(self._slots):
             self._prepared.publish((*stamp, *(
@@ -189,8 +189,8 @@ class SamplePublisher:
         built in, which have topics of their own but no part in ``~/response``, and then
         ``cyclic_response``.
     :param stamp: (receive time of the steady clock) -> seconds and nanoseconds; asked once for
-        each sample, when it arrives: the clock may be set before somebody else wants to know.
-    :param inform: takes what people should know.
+        each sample, when it arrives: the clock may be set before another reader needs it.
+    :param inform: logs what people should know.
     :ivar last: the raw integers of the last sample (the position of a ``continuous`` joint without
         wraps), its receive time and its stamp, in one,
         because other threads look at them; None: the drive is gone.
@@ -243,14 +243,14 @@ class SamplePublisher:
                 bits.update(raws[bits.slot])
 
     def forget(self) -> None:
-        """Record that the drive is gone: nothing known of it is current."""
+        """Record that the drive is offline: nothing known of it is current."""
         self.last = None
         self.begin_again()
         for bits in self._bits:
             bits.forget()
 
     def begin_again(self) -> None:
-        """Take the position of a joint from the drive anew: it was homed, or away."""
+        """Restart the position of a joint from the drive: it was homed, or offline."""
         if self._continuous is not None:
             self._continuous.begin_again()
 

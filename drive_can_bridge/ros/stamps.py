@@ -29,10 +29,10 @@ class Stamps:
     """
     Turns receive times of the steady clock into ROS time (simulated, when that is active).
 
-    A clock may say anything. A time that no message can hold makes stamps of 0, and is told once.
+    A clock may have any time. One that no message can hold makes stamps of 0, and is logged once.
 
     :param ros: returns the clock of the node.
-    :param warn: takes what is to be told.
+    :param warn: logs a warning.
     """
 
     def __init__(self, ros: Callable[[], RosClock], warn: Callable[[str], None],
@@ -43,7 +43,7 @@ class Stamps:
         self._told = False
         self._simulated = False
         self._look_at = -math.inf
-        self._published: int | None = None  # what /clock says where rclpy cannot hold it
+        self._published: int | None = None  # the time of /clock where rclpy cannot hold it
 
     def at(self, moment: float) -> Stamp:
         """Return the stamp of a moment of the steady clock. Simulated time only knows "now"."""
@@ -62,7 +62,7 @@ class Stamps:
         return Time(sec=seconds, nanosec=nanoseconds)
 
     def guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback for ``/clock`` that hands on only what rclpy can hold."""
+        """Return a callback for ``/clock`` that passes on only what rclpy can hold."""
         def take(message: Any) -> None:
             nanoseconds = message.clock.sec * NANOSECONDS + message.clock.nanosec
             if _representable(nanoseconds):
@@ -73,7 +73,7 @@ class Stamps:
         return take
 
     def _system_time(self, moment: float) -> int:
-        """Return what the system clock said at a moment of the steady clock, in ns."""
+        """Return the system clock's time at a moment of the steady clock, in ns."""
         clock = self._clock
         for _ in range(ATTEMPTS):
             before, nanoseconds, now = clock.now(), clock.stamp(), clock.now()

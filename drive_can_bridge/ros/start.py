@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The executable ``drive_can_bridge``: signals wait until :mod:`.main` is there to take them."""
+"""The executable ``drive_can_bridge``: signals are blocked until :mod:`.main` handles them."""
 
 import sys
 

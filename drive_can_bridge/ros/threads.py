@@ -1,13 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Threads of the bridge: of an executor, of what is periodic, of services that wait for nobody.
+Threads of the bridge: of an executor, of what is periodic, of services that must not wait.
 
-An executor serves one callback after the other, and looks at everything else that it has in
-between: several times for each call that has to wait for its drive, and a client that asks for a
-thousand parameters is served before the one who wants a stop. So services of drives are taken
-by threads that have nothing else to do, straight from a wait set of their own; those that stop
-machines by one of theirs. Answers are sent by another one: where a caller has been discovered only
-halfway, sending takes the middleware a tenth of a second (:mod:`.answers`).
+An executor serves one callback after the other, and checks everything else that it has in between:
+several times for each call that has to wait for its drive, and a client that asks for a thousand
+parameters is served before one that wants a stop. So services of drives are taken by threads that
+do nothing else, straight from a wait set of their own; those that stop machines by a separate one.
+Answers are sent by another one: where a caller has been discovered only halfway, sending takes the
+middleware a tenth of a second (:mod:`.answers`).
 """
 
 from collections import Counter, deque
@@ -40,7 +40,7 @@ from drive_can_bridge.ros.requests import full_name, Take
 ERROR_PAUSE = 0.05
 #: s after which nothing can be missing any more because a drive has left
 LEAVING = 1.0
-#: share of the processor's time for a thread that anybody can keep busy
+#: share of the processor's time for a thread that clients can keep busy
 MODEST = 0.3
 #: calls of one service that are taken in a row
 TAKE_MAX = 8
@@ -49,20 +49,20 @@ STOP_PATIENCE = 1.0
 #: threads that the requests of one service may stop for ever: each keeps its stack
 STOPPED_MAX = 3
 
-#: takes a request, and whatever is to be called with the response
+#: called with a request, and with the function for its response
 Callback = Callable[[Any, Answer], None]
-#: takes service, response and the header of the request
+#: called with service, response and the header of the request
 Send = Callable[[Service, Any, Any], None]
 
 
 class ExecutorThread:
     """
-    Spins a SingleThreadedExecutor until told to stop; no callback can bring it down.
+    Spins a SingleThreadedExecutor until stopped; an exception in a callback does not end it.
 
     A future of rclpy must be completed in its executor's own thread; completing it elsewhere races
     with the executor's wait. Results of other threads are left here.
 
-    :param report: takes one line about an exception that a callback let escape.
+    :param report: logs one line about an exception of a callback.
     """
 
     def __init__(self, name: str, report: Callable[[str], None], context: Context,
@@ -85,23 +85,23 @@ class ExecutorThread:
             self.of_drives.start()
 
     def part(self) -> None:
-        """Have drives in one of their own, before this starts: no transition holds it up."""
+        """Serve drives in an executor of their own, unblocked by transitions. Before the start."""
         self.of_drives = ExecutorThread(f'{self._name} of drives', self._report,
                                         self.executor.context, self._clock)
 
     def later(self, job: Callable[..., object], *arguments: Any) -> None:
-        """Have something done in this thread soon. From any thread; once it stops, nothing is."""
+        """Run a job in this thread soon. From any thread; dropped once it stops."""
         with self._ending:
             if not self._stopping:
                 self.executor.create_task(job, *arguments)
 
     def leaves(self) -> None:
-        """Record that a drive leaves: what was to be served next may be gone. From any thread."""
+        """Record that a drive leaves, whose entities may be due. From any thread."""
         self._left_at = self.of_drives._left_at = self._clock.now()
 
     def stop(self) -> None:
-        """Stop to serve and wait for the callback that is running."""
-        # an executor that is merely woken goes back to waiting for something to do
+        """Stop to serve, and wait for the callback that is running."""
+        # an executor that is merely woken returns to waiting without checking
         self.later(self._end)
         with self._ending:
             self._stopping = True
@@ -133,11 +133,11 @@ class PeriodicThread:
     """
     Calls ``action`` every ``period`` s of the steady clock, for the first time after one.
 
-    A timer of rclpy would do as well. But each time it is due the executor looks at every service
-    of every drive anew: 12 ms of computing for 15 drives, beside an exchange that wants the
+    A timer of rclpy would do as well. But each time it is due the executor checks every service
+    of every drive: 12 ms of computing for 15 drives, beside an exchange that wants the
     interpreter every 0.3 ms.
 
-    :param failed: takes one line about an exception that ``action`` let escape.
+    :param failed: logs one line about an exception of ``action``.
     """
 
     def __init__(self, name: str, period: float, action: Callable[[], None],
@@ -151,16 +151,16 @@ class PeriodicThread:
         self._thread = clock.worker(self._run, name)
 
     def start(self) -> None:
-        """Begin."""
+        """Start."""
         self._thread.start()
 
     def set_period(self, period: float) -> None:
-        """Begin anew with another period, in s."""
+        """Start over with another period, in s."""
         self._period = period
         self._changed.ring()
 
     def stop(self) -> None:
-        """End, and wait for a call that is under way."""
+        """Stop, and wait for a call that is under way."""
         self._ending = True
         self._changed.ring()
         self._thread.join(5.0)
@@ -180,7 +180,7 @@ class PeriodicThread:
 
 class CpuThrottle:
     """
-    Have one thread pause when it has used more than its share. Made and used by that thread.
+    Pauses a thread that has used more than its share. Created and used by that thread.
 
     One thread at a time has the interpreter. One that never waits, because callers ask as fast as
     they are answered, makes the exchange late and stops wait, however high their priority is.
@@ -198,7 +198,7 @@ class CpuThrottle:
         self._used = clock.used()
 
     def keep(self) -> None:
-        """Pause, if it is time to. After each piece of work."""
+        """Pause, if it is time to. Called after each piece of work."""
         now, used = self._clock.now(), self._clock.used()
         self._left = min(self._in_hand, self._left + self._share * (now - self._seen)) - (
             used - self._used)
@@ -209,11 +209,11 @@ class CpuThrottle:
 
 class _RequestTaker:
     """
-    One of the threads that take requests: but for the last, all are still taking one.
+    One of the threads that take requests; all but the last are still taking one.
 
-    :ivar changed: what is served is not what it waits for.
-    :ivar superseded: another one has gone on.
-    :ivar without: the service that it is taking a request of since, and others do without.
+    :ivar changed: the services have changed since it began to wait.
+    :ivar superseded: another one has continued.
+    :ivar without: the service whose request it is taking since, which others leave out.
     """
 
     def __init__(self, waiting: Waiting | Sleeping) -> None:
@@ -223,7 +223,7 @@ class _RequestTaker:
         self.without: Service | None = None
 
     def change(self) -> None:
-        """Have it look what is served."""
+        """Make it check which services there are."""
         self.changed = True
         self.wake()
 
@@ -232,14 +232,14 @@ class ServiceThread:
     """
     Serves services whose callback group keeps them from executors.
 
-    Starts with the first service. Answers are awaited by nobody: a callback has to be short.
+    Starts with the first service. No thread waits for answers: a callback has to be short.
 
-    :param report: takes one line about an exception that a callback let escape.
+    :param report: logs one line about an exception of a callback.
     :param prepare_thread: called first in each thread that takes requests.
     :param share: of the processor's time that each of its two threads may use; 1: all of it.
     :param send: sends an answer.
     :param take: takes a request; where that takes long another thread serves all other services.
-    :param relay: has an executor take the requests, and send the answers; None: this does.
+    :param relay: makes an executor take the requests, and send the answers; None: this does.
     """
 
     def __init__(self, name: str, context: Context, report: Callable[[str], None], clock: Clock,
@@ -268,7 +268,7 @@ class ServiceThread:
     def serve(self, service: Service, callback: Callback,
               answered: Callable[[], None] = lambda: None) -> None:
         """
-        Begin to serve a service.
+        Start to serve a service.
 
         :param answered: called after each response was sent.
         """
@@ -284,11 +284,11 @@ class ServiceThread:
         self._taker.change()
 
     def later(self, job: Callable[[], None]) -> None:
-        """Have the thread that answers do something. From any thread."""
+        """Run a job in the answering thread. From any thread."""
         self._jobs.put(job)
 
     def begin(self, job: Callable[[], None]) -> None:
-        """Have the thread that takes requests begin what has come another way. From any thread."""
+        """Run a job of the local way in the thread that takes requests. From any thread."""
         self._begun.append(job)
         self._taker.wake()
 
@@ -301,7 +301,7 @@ class ServiceThread:
         self._taker.change()
 
     def stop(self) -> None:
-        """End, when the answers that there are have been sent."""
+        """Stop, when all answers have been sent."""
         self._ending = True
         self._taker.change()
         self._jobs.put(None)
@@ -316,7 +316,7 @@ class ServiceThread:
 
     def _relayed(self, service: Service, callback: Callback, request: Any,
                  answer: Callable[[Any], None]) -> None:
-        """Begin what the executor has taken."""
+        """Start a callback for a request that the executor has taken."""
         kind = service.srv_type
         self.begin(partial(callback, request, lambda message: answer(
             response_to(kind, request, message) if isinstance(message, Exception) else message)))
@@ -344,7 +344,7 @@ class ServiceThread:
         return not self._ending and not taker.superseded and bool(self._context.ok())
 
     def _take_while_unchanged(self, taker: _RequestTaker, throttle: CpuThrottle) -> None:
-        """Take what comes until something else is to be served."""
+        """Handle requests until the services change."""
         taker.changed = False
         without = {other.without for other in self._superseded.copy()}
         with taker.waiting.held([] if self._relay is not None else [
@@ -371,9 +371,9 @@ class ServiceThread:
 
     def _supersede(self, taker: _RequestTaker, service: Service, for_ever: bool) -> None:
         """
-        Have another thread take the requests of all other services.
+        Start another thread for the requests of all other services.
 
-        :param for_ever: this one will never go on; then that one takes those of this, too.
+        :param for_ever: this one will never continue; then that one takes those of this, too.
         :raises RuntimeError: no thread can be started.
         """
         if not taker.superseded:
@@ -401,7 +401,7 @@ class ServiceThread:
 
     def _answer(self, service: Service, request: Any, header: Any,
                 answered: Callable[[], None], message: Any) -> None:
-        """Have an answer sent. From any thread."""
+        """Queue an answer. From any thread."""
         self._jobs.put(partial(self._send, service, request, header, answered, message))
 
     def _send(self, service: Service, request: Any, header: Any, answered: Callable[[], None],
@@ -425,7 +425,7 @@ class ServiceThread:
             throttle.keep()
 
     def _do_one_job(self) -> bool:
-        """Do what comes next; the job is forgotten then, and with it the drive that it was for."""
+        """Run the next job, then release it and its drive; return False at the end."""
         job = self._jobs.get()
         if job is None:
             return False
@@ -437,7 +437,7 @@ class ServiceThread:
 
 
 def response_to(kind: Any, request: Any, error: Exception) -> Any:
-    """Return what tells a caller that there is no answer, where the response has words for it."""
+    """Return the response that reports an error, where its type has a field for it."""
     response, text = kind.Response(), f'internal error: {type(error).__name__}: {error}'
     if hasattr(response, 'message'):
         response.message = text
@@ -450,9 +450,9 @@ def response_to(kind: Any, request: Any, error: Exception) -> Any:
 
 class ExecutorServices:
     """
-    Services of a node that an executor serves, and whose requests it does not take itself.
+    Services of a node whose callbacks run in an executor, and whose requests are taken elsewhere.
 
-    :param thread: takes them.
+    :param thread: takes their requests.
     """
 
     def __init__(self, thread: ServiceThread, spinner: ExecutorThread) -> None:
@@ -460,7 +460,7 @@ class ExecutorServices:
         self._spinner = spinner
 
     def adopt(self, services: Iterable[Service]) -> None:
-        """Begin to serve services."""
+        """Start to serve services."""
         for service in services:
             service.callback_group = PolledGroup()
             kind: Any = service.srv_type
@@ -468,7 +468,7 @@ class ExecutorServices:
                 self._spinner.later, self._serve, service.callback, kind.Response))
 
     def leave(self, service: Service, then: Callable[[], object]) -> None:
-        """Stop to serve one; what follows happens when its answers have been sent."""
+        """Stop serving a service; ``then`` runs when its answers have been sent."""
         self._thread.forget([service])
         self._thread.later(partial(self._spinner.later, then))
 

@@ -38,7 +38,7 @@ def parameter_value(parameter: Parameter, value: Value) -> ParameterValue:
 
 def constraints(parameter: Parameter, role: Role | None, error: str = '') -> str:
     """
-    Return what tools want to know of a parameter: ``unit="N m" number=209 type=int16 …``.
+    Return a parameter's properties for tools: ``unit="N m" number=209 type=int16 …``.
 
     What does not apply is absent. ``shlex.split`` takes it apart.
 
@@ -124,7 +124,7 @@ def descriptor(name: str, parameter: Parameter, *, role: Role | None = None,
 
 
 def _tidy(value: float) -> float:
-    """Take the binary noise from a product: 3276.7, not 3276.7000000000003."""
+    """Return a product without binary noise: 3276.7, not 3276.7000000000003."""
     return float(f'{value:.12g}')
 
 

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Services of other nodes, asked without an executor: answers are looked for.
+Services of other nodes, called without an executor: answers are polled.
 
-How a client makes sure that a node can answer it: that a server was found does not say that the
-server has found this client. One that has not gives its answer up, though it has done what it was
+How a client makes sure that a node can answer it: a discovered server may not have discovered the
+client yet. Then it drops its answer, though it has done what it was
 asked. So before the first call another one is made that changes nothing, through a client that was
 made later, until it is answered: endpoints are announced in order, so that a server which knows
 the later one knows the earlier ones of this node, too. Nor has this side found all services of a
@@ -39,36 +39,36 @@ from drive_can_bridge.ros.client.foreign import foreign
 from drive_can_bridge.ros.rcl.end import Names, TopicEnd
 
 # What makes messages from their definitions comes with every type support, is used by none, and
-# takes 0.15 s to be imported; its package goes without where it cannot be.
+# its import takes 0.15 s; the package works without it where it is missing.
 sys.modules.setdefault('rosidl_generator_py.generate_py_impl', None)    # type: ignore[arg-type]
 #: what is asked of a node to know that it knows us: of no parameter
 GREETING = 'get_parameter_types', GetParameterTypes
-#: s after which a greeting is said again for the first time; then twice as many, and so on
+#: s after which a greeting is repeated for the first time; then twice as many, and so on
 FIRST_PATIENCE = 0.1
 #: what changes nothing
 ASKING: dict[str, Any] = {
     'get_parameters': GetParameters, 'list_parameters': ListParameters,
     'describe_parameters': DescribeParameters}
-#: what is done once only; and not for everybody who reads (SROS2)
+#: with effect each time; and some not for everybody who reads (SROS2)
 CHANGING: dict[str, Any] = {
     'set_parameters': SetParameters, 'enable': SetBool, 'reset_fault': Trigger}
 SERVICES = {**ASKING, **CHANGING}
 #: s after which a question that changes nothing is asked again: DDS may lose an answer
 AGAIN = 30.0
-#: s that a service which nobody offers yet may still be found in: each is found by itself
+#: s that a service which is not discovered yet may still be: each is discovered by itself
 OFFER_TIMEOUT = 2.0
 #: s until a node knows us, or offers what it was asked for
 FIND_TIMEOUT = 10.0
-#: s without the server until it has gone
+#: s without the server until it counts as left
 GONE = 2.0
 #: s without a question after which a node's clients are closed
 _IDLE = 60.0
-#: s for which one that has answered is taken for the same, and not for one that was started anew
+#: s for which one that has answered counts as the same, and not as restarted
 _FRESH = 2.0
 
-#: takes the response, or None: nobody answered in time
+#: called with the response, or None: there was none in time
 Done = Callable[[Any], None]
-#: is told instead where it was not even asked: nothing has come of it
+#: called instead where the request was not even sent: nothing was done
 Unasked = Callable[[], None]
 
 
@@ -77,11 +77,11 @@ class ClientNode:
     This process in the ROS graph.
 
     It is no :class:`rclpy.node.Node`: that one has topics and services of its own, and what they
-    need takes longer to be imported (0.25 s) than all that a command wants to know takes to be
-    asked.
+    need takes longer to be imported (0.25 s) than all requests of a command take to be
+    answered.
 
     :param purpose: part of the node's name.
-    :ivar end: what it does there.
+    :ivar end: its clients, subscriptions and publishers.
     :ivar full_name: of the node in the graph.
     :raises DriveCanError: ROS does not start.
     """
@@ -95,7 +95,7 @@ class ClientNode:
         name = f'_drive_can_{purpose}_{os.getpid()}'
         self.full_name = f'/{name}'
         try:
-            # takes no signals, and no log file: a stop has to work where nothing can be written
+            # no signals, and no log file: a stop has to work where nothing can be written
             self.context.init([], initialize_logging=False)
             self.end = TopicEnd(self.context, name, _tell_slow)
         except Exception as error:  # rcl fails in several types
@@ -104,7 +104,7 @@ class ClientNode:
 
     @property
     def open(self) -> bool:
-        """It has not gone."""
+        """Whether it is still in the graph."""
         return bool(self.context.ok())
 
     def services(self) -> Names:
@@ -116,18 +116,18 @@ class ClientNode:
         return self.end.topics()
 
     def servers(self, service: str) -> int:
-        """Return how many offer a service of this name."""
+        """Return how many servers of this name are discovered."""
         return self.end.servers(service)
 
     def leave(self) -> None:
-        """Go. Idempotent."""
+        """Leave the graph. Idempotent."""
         if self.context.ok():
             self.end.close()
             self.context.try_shutdown()
 
 
 class HasEnd(Protocol):
-    """A client node, or another one that has its part in the graph."""
+    """A client node, or another node with an end of its own."""
 
     end: TopicEnd
 
@@ -139,9 +139,9 @@ def _tell_slow(reason: str) -> None:
 @dataclass(slots=True)
 class _Call:
     """
-    A question, and until when it may be sent, or answered.
+    A request, with the time until which it may be sent, or answered.
 
-    :ivar seen_at: when somebody offered it last.
+    :ivar seen_at: when a server was seen last.
     """
 
     request: Any
@@ -154,11 +154,11 @@ class _Call:
 
 class Service:
     """
-    A service that may be asked again and again, by several at once.
+    A service for any number of requests, several at once.
 
     :param node: of ours.
     :param timeout: s after which an answer is not waited for any more.
-    :param again: s after which it is asked once more while there is no answer.
+    :param again: s after which a request is repeated while there is no answer.
     """
 
     def __init__(self, node: HasEnd, service_type: Any, name: str, timeout: float,
@@ -172,32 +172,32 @@ class Service:
 
     @property
     def ready(self) -> bool:
-        """Somebody offers it."""
+        """Whether a server is discovered."""
         return self._client.ready
 
     @property
     def foreign(self) -> bool:
-        """Only another middleware offers it, which is sent nothing."""
+        """Whether only servers of another middleware are discovered, which are sent nothing."""
         return bool(foreign(self._node, self._name))
 
     @property
     def busy(self) -> bool:
-        """Somebody waits for an answer."""
+        """Whether a request waits for its answer."""
         return bool(self._waiting or self._unsent)
 
     @property
     def unsent(self) -> bool:
-        """Something waits until somebody offers it."""
+        """Whether a request waits to be sent."""
         return bool(self._unsent)
 
     def send(self, request: Any, done: Done, now: float, patience: float = OFFER_TIMEOUT,
              unasked: Unasked | None = None) -> None:
         """
-        Ask, as soon as somebody offers it.
+        Send a request, as soon as a server is discovered.
 
-        :param done: takes the response, or None: nobody answered in time.
+        :param done: called with the response, or None: there was none in time.
         :param patience: s that it may take until it is offered.
-        :param unasked: is told where nobody was asked in time; None: ``done`` is.
+        :param unasked: called instead where it was not sent in time; None: ``done`` is.
         """
         call = _Call(request, done, unasked or partial(done, None), now + patience, math.inf, now)
         if self.ready:
@@ -215,7 +215,7 @@ class Service:
         self._waiting[self._client.send(call.request)] = call
 
     def look(self, now: float) -> None:
-        """Ask what could not be asked before, and hand over the answers that have arrived."""
+        """Send what could not be sent before, and deliver the answers that have arrived."""
         if not self.busy:
             return
         ready = self.ready
@@ -260,7 +260,7 @@ class Service:
 
 class NodeCalls:
     """
-    What nodes are asked by clients that stay, once these are known there.
+    Calls services of nodes, after making sure that they know the clients.
 
     :param node: of ours.
     :param timeout: s after which an answer is not waited for any more.
@@ -273,17 +273,17 @@ class NodeCalls:
 
     @property
     def busy(self) -> bool:
-        """Somebody waits for an answer."""
+        """Whether a request waits for its answer."""
         return any(host.busy for host in self._hosts.values())
 
     def ask(self, host: str, service: str, request: Any, done: Done, now: float,
             patience: float = FIND_TIMEOUT, unasked: Unasked | None = None) -> None:
         """
-        Ask a node, as soon as it offers the service and knows us.
+        Call a service of a node, as soon as it offers it and knows us.
 
         :param service: one of :data:`SERVICES`.
         :param patience: s that it may take, once it knows us, until it is offered.
-        :param unasked: is told where it was not asked in time; None: ``done`` is.
+        :param unasked: called instead where it was not sent in time; None: ``done`` is.
         """
         if host not in self._hosts:
             self._hosts[host] = _Host(self._node, host, self._timeout)
@@ -291,7 +291,7 @@ class NodeCalls:
                               unasked or partial(done, None))
 
     def close(self) -> None:
-        """Ask nobody any more."""
+        """Drop all requests and clients."""
         while self._hosts:
             self._hosts.popitem()[1].close()
 
@@ -305,7 +305,7 @@ class NodeCalls:
             self._hosts[host].drop(service)
 
     def look(self, now: float) -> None:
-        """Ask what could not be asked before, and hand over the answers that have arrived."""
+        """Send what could not be sent before, and deliver the answers that have arrived."""
         for name, host in list(self._hosts.items()):
             host.look(now)
             if host.asked_at + _IDLE < now and not host.busy:
@@ -326,7 +326,7 @@ class _Host:
     """
     A node that is asked.
 
-    :ivar asked_at: when it was asked last.
+    :ivar asked_at: when a service of it was called last.
     """
 
     def __init__(self, node: HasEnd, name: str, timeout: float) -> None:
@@ -439,13 +439,13 @@ def newest_quality() -> QoSProfile:
 
 
 def log_quality() -> QoSProfile:
-    """Return what suits ``/rosout``: what was said shortly before we came, too."""
+    """Return what suits ``/rosout``: recent lines are delivered to late joiners, too."""
     return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.RELIABLE,
                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def undemanding_quality() -> QoSProfile:
-    """Quality of a subscription that any publisher offers."""
+    """Return the quality of a subscription that matches every publisher."""
     return QoSProfile(depth=_BATCH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -460,15 +460,15 @@ class NewestPublisher:
         self._writing.publish(message)
 
     def close(self) -> None:
-        """Publish nothing any more."""
+        """Destroy the publisher."""
         self._writing.close()
 
 
 class Inbox:
     """
-    A subscription that is looked into.
+    A subscription whose messages are polled.
 
-    :param take: takes each message.
+    :param take: called with each message.
     """
 
     def __init__(self, node: HasEnd, message_type: Any, topic: str, quality: QoSProfile,
@@ -477,11 +477,11 @@ class Inbox:
         self._reading = node.end.reading(message_type, topic, quality)
 
     def look(self) -> None:
-        """Take what has arrived."""
+        """Deliver the messages that have arrived."""
         for _ in range(_BATCH):
             try:
                 message = self._reading.take()
-            except RuntimeError:  # anybody can publish rubbish
+            except RuntimeError:  # any publisher may send malformed bytes
                 continue
             if message is None:
                 return

@@ -2,8 +2,8 @@
 """
 Drives stopped, enabled, disabled and reset by hand, through the services of their bridges.
 
-A stop waits for nobody: a drive is told as soon as it is seen in the graph, before its bridge was
-asked for anything. What the bridges say afterwards shows whether that were all.
+A stop does not wait: a drive is commanded as soon as it is seen in the graph, before its bridge
+was asked for anything. The bridges' answers show afterwards whether those were all.
 """
 
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
@@ -28,14 +28,14 @@ from drive_can_bridge.ros.client.search import find_bridges, find_drives, Graph,
 from drive_can_bridge.ros.rcl.quality import latched_quality
 from drive_can_bridge.ros.recognition import drives_among, namespace_of
 
-#: s after which a drive is told to stop once more: DDS may lose an answer
+#: s after which a stop is repeated: DDS may lose an answer
 STOP_AGAIN = 1.0
-#: s that it may take to hear whether a drive is online
+#: s that it may take to learn whether a drive is online
 _ONLINE_TIMEOUT = 5.0
 
 
 class _Stopping:
-    """One drive that is told to stop."""
+    """The stop of one drive."""
 
     def __init__(self, client_node: HasEnd, node: str, now: float) -> None:
         self.node = node
@@ -66,7 +66,7 @@ class _Stopping:
             self.answer = stop_answer(self.node, False, response.message, False)
 
     def look(self, now: float) -> None:
-        """Take what has arrived."""
+        """Handle what has arrived."""
         self._service.look(now)
         if self._inbox is None:
             if not self._service.unsent:    # first things first
@@ -88,7 +88,7 @@ class _Stopping:
         self._online = message.data
 
     def close(self) -> None:
-        """Wait for nothing any more."""
+        """Drop its service and subscription."""
         self._service.close()
         if self._inbox is not None:
             self._inbox.close()
@@ -96,7 +96,7 @@ class _Stopping:
 
 class StopRequests:
     """
-    A stop of drives, begun for each one as soon as it is seen.
+    A stop of drives, sent to each one as soon as it is discovered.
 
     :param client_node: of ours.
     :param namespace: of the bridges that are meant; None: all.
@@ -119,15 +119,15 @@ class StopRequests:
         self._elsewhere: set[str] = set()
 
     def leave(self, nodes: Iterable[str]) -> None:
-        """Leave drives to who stops them another way."""
+        """Leave out drives that are stopped another way."""
         self._elsewhere.update(nodes)
 
     def know(self, name: str, drives: Sequence[str], others: Sequence[str]) -> None:
-        """Have it known of a bridge what it has said another way."""
+        """Record a bridge's drives that were found another way."""
         self._search.know(name, drives, others)
 
     def look(self, now: float) -> bool:
-        """Go on; return whether all is done."""
+        """Continue; return whether all is done."""
         self._search.look(now)
         for node in (*self._seen(), *self.drives):
             if (node not in self._drives and node not in self._elsewhere
@@ -152,22 +152,22 @@ class StopRequests:
 
     @property
     def seen(self) -> set[str]:
-        """The bridges of which :meth:`answers` tells."""
+        """The bridges whose answers :meth:`answers` returns."""
         return set(self._search.found)
 
     @property
     def heard(self) -> set[str]:
-        """Those that have answered."""
+        """The bridges that have answered."""
         return {name for name, each in self._search.found.items() if each.answered}
 
     @property
     def drives(self) -> list[str]:
-        """Full names of the drives of all bridges that have said so."""
+        """Full names of the drives of all bridges that have answered."""
         return [node for each in self._search.found.values() for node in each.nodes]
 
     def answers(self, present: Iterable[Present] = ()) -> list[Answer]:
         """
-        Return what became of it so far: bridges that do not answer, then drives.
+        Return the results so far: bridges that do not answer, then drives.
 
         :param present: what this host shows of bridges.
         """
@@ -186,7 +186,7 @@ class StopRequests:
                        or drive.answer is not None]
 
     def close(self) -> None:
-        """Ask nobody any more."""
+        """Drop all requests."""
         self._search.close()
         for drive in self._drives.values():
             drive.close()
@@ -194,7 +194,7 @@ class StopRequests:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What a drive is told beside a stop: the service, and what it is asked."""
+    """A command besides a stop: the service, and its request."""
 
     service: str
     request: Callable[[], Any]

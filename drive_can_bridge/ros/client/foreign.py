@@ -3,8 +3,8 @@
 Services of another middleware, recognised before anything is sent to them.
 
 Fast DDS and Cyclone DDS discover each other, and topics work between them; services never do, and
-their requests may do harm on the other side. The first two bytes of an endpoint's gid say who made
-its middleware (RTPS 2.5, 9.3.1.5 and 8.3.3.1.3: vendor identifiers).
+their requests may do harm on the other side. The first two bytes of an endpoint's gid identify
+the maker of its middleware (RTPS 2.5, 9.3.1.5 and 8.3.3.1.3: vendor identifiers).
 """
 
 from typing import Protocol
@@ -28,13 +28,13 @@ class _Node(Protocol):
 
 
 def ours() -> str:
-    """Return the middleware of this process; '': one that nobody of ours knows."""
+    """Return the middleware of this process; '': an unknown one."""
     return _OURS.get(get_rmw_implementation_identifier(), '')
 
 
 def foreign(node: _Node, service: str) -> str:
     """
-    Return the middleware of all who offer a service, if that is known and another one than ours.
+    Return the middleware of all servers of a service, if it is known and differs from ours.
 
     :param service: full name.
     """
@@ -45,7 +45,7 @@ def foreign(node: _Node, service: str) -> str:
 
 def why_not(node: _Node, name: str, bridge: str = '') -> Sentence | None:
     """
-    Say why services of a node do not work with this process; None: they may.
+    Return why services of a node do not work with this process; None: they may.
 
     :param name: full name of a bridge, or of one of its drives.
     :param bridge: whose that is; '': of the one in its namespace.

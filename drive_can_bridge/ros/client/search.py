@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The search for bridges, the same for all commands.
+Bridges in the ROS graph, found in the same way for all commands.
 
-A process that has just begun does not know the graph, a bridge does. So the first one that answers
-says which others there are (its parameter ``bridges``), and nobody waits for what may still turn
+A process that has just started does not know the graph, a bridge does. So the first one that
+answers names the others (its parameter ``bridges``), and there is no wait for what may still turn
 up. What is in the graph with the services of a bridge counts, whether it answers or not.
 
 A client node that waits for what it asks.
@@ -37,7 +37,7 @@ from drive_can_bridge.ros.recognition import BRIDGES, bridges_among, Entries, na
 
 #: s between two looks at what has arrived
 LOOK_PERIOD = 0.002
-#: s that an answer may take: many reads that nobody answers are slow
+#: s that an answer may take: many reads without an answer are slow
 _CALL_TIMEOUT = 120.0
 
 
@@ -45,7 +45,7 @@ class Graph:
     """
     This process in the ROS graph.
 
-    :param client_node: what it is there; None: a new one.
+    :param client_node: its client node; None: a new one.
     :raises DriveCanError: ROS does not start.
     """
 
@@ -58,7 +58,7 @@ class Graph:
         self._statuses: dict[str, tuple[float, dict[str, str]]] = {}
 
     def now(self) -> float:
-        """Return the time."""
+        """Return the time of the steady clock, in s."""
         return self._clock.now()
 
     def close(self) -> None:
@@ -67,9 +67,9 @@ class Graph:
 
     def wait(self, done: Callable[[float], Any], timeout: float) -> bool:
         """
-        Wait until something is done; False if it is not in time.
+        Wait until something is done; return False if it is not in time.
 
-        :param done: is asked again and again with the time, and may look at what has arrived.
+        :param done: called again and again with the time; may poll what has arrived.
         """
         deadline = self._clock.now() + timeout
         while True:
@@ -85,8 +85,8 @@ class Graph:
         """
         Call a parameter service of a node.
 
-        :raises NoAnswer: nobody answers.
-        :raises DriveCanError: it was closed.
+        :raises NoAnswer: there is no answer.
+        :raises DriveCanError: the graph was closed.
         """
         self._check()
         if timeout not in self._calls:
@@ -119,7 +119,7 @@ class Graph:
 
         :param age: s that it may have; else the next one is waited for, so much longer:
         :param patience: s.
-        :raises DriveCanError: it was closed.
+        :raises DriveCanError: the graph was closed.
         """
         self._check()
         if self._diagnostics is None:
@@ -143,7 +143,7 @@ class Graph:
             raise DriveCanError(sentences.way_closed())
 
 
-#: s without anything new in the graph until nobody is there, and how long that may go on
+#: s without a change in the graph until it counts as empty, and how long that may go on
 _QUIET, _LONGEST = 4.0, 12.0
 #: s that a bridge has to answer
 _ANSWER_TIMEOUT = 5.0
@@ -164,8 +164,8 @@ class FoundBridge:
     :ivar drives: names of its drives, in the order of the configuration; None: not known yet.
     :ivar others: the bridges that it sees, itself among them; None: not known yet.
     :ivar silent: it has not answered in time.
-    :ivar foreign: it has another middleware, and is not asked.
-    :ivar asked_at: when it was, for the first time.
+    :ivar foreign: it has another middleware, and is sent nothing.
+    :ivar asked_at: when it was asked first.
     """
 
     name: str
@@ -177,7 +177,7 @@ class FoundBridge:
 
     @property
     def answered(self) -> bool:
-        """All that it was asked is known."""
+        """Whether it has answered everything."""
         return self.drives is not None and self.others is not None
 
     @property
@@ -187,7 +187,7 @@ class FoundBridge:
 
 
 class Seeing(Protocol):
-    """A node that can say what it sees in the graph."""
+    """A node whose view of the graph can be read."""
 
     end: TopicEnd
 
@@ -200,13 +200,13 @@ class Seeing(Protocol):
 
 class Search:
     """
-    Looks for bridges, and asks each one that it sees.
+    Searches for bridges, and asks each one that is discovered.
 
     :param namespace: of those that are meant, ``/cell``, '' for the root; None: all.
     :param expected: full names of bridges that are known to be there.
     :param only: those that are looked for; None: all.
     :param patience: s that a bridge has to answer; None: a few.
-    :param signs: makes what looks for signs of life: a bridge that gives any has longer to
+    :param signs: makes what watches for signs of life: a bridge that gives any has longer to
         answer; None: none has.
     :ivar found: by full name, whether they have answered or not.
     :ivar services: all that have been discovered.
@@ -230,25 +230,25 @@ class Search:
 
     @property
     def names(self) -> list[str]:
-        """The full names of all bridges, one as often as there are some of that name."""
+        """The full names of all bridges; equal names are repeated."""
         named = [each.others for each in self.found.values() if each.others]
         return sorted(name for name in self.found for _ in range(
             max([1, *(others.count(name) for others in named)])))
 
     @property
     def settled(self) -> bool:
-        """All bridges are known, and each one has answered, or is silent."""
+        """Whether all bridges are known, and each one has answered, or is silent."""
         return ((any(each.answered or each.foreign for each in self.found.values())
                  or self._only is not None)
                 and all(each.answered or each.silent for each in self.found.values()))
 
     def over(self, now: float) -> bool:
-        """Return whether nobody is there, or nobody who answers."""
+        """Return whether there is no bridge, or none that answers."""
         return (all(each.silent for each in self.found.values()) and self._only is None
                 and now > min(self._changed_at + _QUIET, self._began + _LONGEST))
 
     def look(self, now: float) -> bool:
-        """Look at the graph, and take answers; return whether there is anything new in it."""
+        """Update from the graph and handle answers; return whether the graph has changed."""
         if self._began < 0.0:
             self._began = self._changed_at = now
             self._see(self._expected, now)
@@ -266,13 +266,13 @@ class Search:
         return True
 
     def know(self, name: str, drives: Sequence[str], others: Sequence[str]) -> None:
-        """Have it known of a bridge what it has said another way: it is not asked."""
+        """Record what a bridge has answered another way: it is not asked again."""
         found = self.found.setdefault(name, FoundBridge(name))
         found.drives = tuple(drive.rpartition('/')[2] for drive in drives)
         found.others = tuple(others)
 
     def close(self) -> None:
-        """Ask nobody any more."""
+        """Drop all requests."""
         self._calls.close()
         if self._signs is not None:
             self._signs.close()
@@ -286,7 +286,7 @@ class Search:
             self._signs = self._make_signs()
 
     def _give_up(self, bridge: FoundBridge, ask_again: Callable[[float], None]) -> None:
-        """Have a bridge silent that has not answered in time, unless it is seen to live."""
+        """Mark a bridge as silent that has not answered in time, unless it gives signs of life."""
         if (self._signs is not None and self._now < bridge.asked_at + _BUSY_TIMEOUT
                 and self._signs.lives(bridge.name)):
             ask_again(self._now)
@@ -294,7 +294,7 @@ class Search:
             bridge.silent = True
 
     def _see(self, names: Iterable[str], now: float) -> None:
-        for name in filter(is_ros_name, names):     # anybody may tell anything
+        for name in filter(is_ros_name, names):     # any node may answer anything
             if (name not in self.found and self._namespace in (None, namespace_of(name))
                     and (self._only is None or name in self._only)):
                 other = bool(foreign(self._client_node, f'{name}/save_trace'))
@@ -339,7 +339,7 @@ class Search:
 
 
 def _search(graph: Graph, namespace: str | None, enough: Callable[[list[str]], bool]) -> Search:
-    """Search until all is known, or the names of the bridges are enough."""
+    """Search until all is known, or ``enough`` of the bridges' names."""
     search = Search(graph.client_node, namespace, signs=lambda: Signs(graph.client_node))
 
     def done(now: float) -> bool:
@@ -391,7 +391,7 @@ def find_bridges(graph: Graph, pattern: str) -> list[FoundBridge]:
 
 def _must_talk(graph: Graph, found: Iterable[FoundBridge]) -> None:
     """
-    See that bridges have the middleware of this process.
+    Check that bridges have the middleware of this process.
 
     :raises SilentBridge: they do not.
     """
@@ -403,7 +403,7 @@ def _must_talk(graph: Graph, found: Iterable[FoundBridge]) -> None:
 
 def _none(graph: Graph, pattern: str | None, search: Search,
           silent: Sequence[str]) -> DriveCanError:
-    """Say that there is no bridge, or none that answers: one that has left the graph, perhaps."""
+    """Return the error for no bridge, or none that answers, such as one that has left."""
     if silent:
         return SilentBridge(nobody(pattern, silent, search.waited(silent)))
     domain = graph.client_node.context.get_domain_id()

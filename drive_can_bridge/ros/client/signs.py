@@ -2,9 +2,9 @@
 """
 What shows that a bridge lives although it does not answer.
 
-On a busy computer that takes its time: the question waits for a thread of the bridge, or the
-answer for one of ours. A bridge that publishes diagnostics, or whose process on this host takes
-time of the processors, is waited for; one that is suspended or gone does neither.
+On a busy computer that takes a while: the request waits for a thread of the bridge, or the
+answer for one of ours. A bridge that publishes diagnostics, or whose process on this host uses
+processor time, is waited for; one that is suspended or gone does neither.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,13 +17,13 @@ from drive_can_bridge.ros.client.calls import HasEnd, Inbox
 
 #: s for which a sign counts
 RECENT = 3.0
-#: s between two looks at a process: it takes tens of ms of the processors in that time
+#: s between two looks at a process: it uses tens of ms of processor time meanwhile
 LOOK_PERIOD = 0.5
 _DIAGNOSTICS_DEPTH = 50
 
 
 def processor_time(process: int) -> int | None:
-    """Return what a process has taken of the processors, in ticks; None: it is not there."""
+    """Return the processor time of a process, in ticks; None: there is no such process."""
     try:
         with open(f'/proc/{process}/stat', encoding='utf-8', errors='replace') as file:
             words = file.read().rpartition(')')[2].split()
@@ -38,7 +38,7 @@ class Signs:
 
     :param client_node: of ours.
     :param present: returns the bridges of this host.
-    :param taken: returns what a process has taken of the processors; None: it is not there.
+    :param taken: returns the processor time of a process; None: there is no such process.
     """
 
     def __init__(self, client_node: HasEnd,
@@ -55,7 +55,7 @@ class Signs:
                             QoSProfile(depth=_DIAGNOSTICS_DEPTH), self._take)
 
     def look(self, now: float) -> None:
-        """Take what has arrived, and look at the processes of this host."""
+        """Handle what has arrived, and check the processes of this host."""
         self._now = now
         if self._began is None:
             self._began = now
@@ -73,9 +73,9 @@ class Signs:
 
     def lives(self, bridge: str) -> bool:
         """
-        Return whether there was a sign of a bridge just now, or was no time yet to see any.
+        Return whether a bridge gave a sign just now, or there was no time yet for one.
 
-        On a busy computer this process stands still as well: between its first look and the one
+        On a busy computer this process is stalled as well: between its first look and the one
         before there may be all the time that a bridge has to answer.
         """
         since = self._now - RECENT
@@ -85,7 +85,7 @@ class Signs:
                 or self._used.get(short(bridge), (None, since))[1] > since)
 
     def close(self) -> None:
-        """Look no more."""
+        """Unsubscribe."""
         self._inbox.close()
 
     def _take(self, message: Any) -> None:

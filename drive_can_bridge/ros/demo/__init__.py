@@ -1,2 +1,2 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What of ``drive_can demo`` talks to ROS itself: somebody who commands the drives."""
+"""The ROS side of ``drive_can demo``: a node that commands the drives."""

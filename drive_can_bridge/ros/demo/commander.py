@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Somebody who commands the drives, as any other ROS node would: ``drive_can demo --drive``.
+A node that commands the drives, as any other could: ``drive_can demo --drive``.
 
 ``~/enable`` where there is control, then neutral until every setpoint is armed, then a slow sine.
 Setpoints without a negative side get a steady value; what the profile calls a limit gets none.
@@ -44,7 +44,7 @@ _ENABLED = ('enabled', 'operation enabled')
 
 
 class _DriveCommander:
-    """Commands one drive by what diagnostics say of it."""
+    """Commands one drive by its diagnostics."""
 
     def __init__(self, node: Node, drive: DriveConfiguration, delay: float) -> None:
         self._logger = node.get_logger()
@@ -64,12 +64,12 @@ class _DriveCommander:
         self._begun_at: float | None = None
 
     def reported(self, report: StatusReport, now: float) -> None:
-        """Take what the bridge says of the drive."""
+        """Handle a status of the drive."""
         control = report.facts.get('control_state')
         there = report.state not in ('offline', 'mapping differs', 'fault')
         ready = self._ready = there and (control is None or control in _ENABLED)
         if not (ready and report.state == 'online'):
-            # gone, back again, or the process stood still: whatever it was, begin anew
+            # gone, back again, or the process was stalled: restart in any case
             self._begun_at = None
         elif self._begun_at is None:
             self._begun_at = now + self._delay
@@ -104,7 +104,7 @@ def main() -> int:
     except (ExternalShutdownException, NotInitializedException, *GONE):
         if rclpy.ok():
             raise
-        # SIGTERM: rclpy takes the context away, from whatever is being done or still made
+        # SIGTERM: rclpy ends the context, whatever is being done
     return 0
 
 

@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A hidden node that attaches to whatever bridges there are, and fills the model.
+A hidden node that attaches to all bridges there are, and fills the model.
 
-It subscribes and asks, and that is all: no topic, no service, no parameter of its own. Everything
+It only subscribes and calls: no topic, no service, no parameter of its own. Everything
 happens in :meth:`MonitorClient.poll`, in the thread that calls it.
 
-:class:`ServiceOperations` is what a person may ask of a drive through it: reads, writes, stops.
+:class:`ServiceOperations` is what a user may request of a drive through it: reads, writes, stops.
 Nothing here can move one.
 """
 
@@ -80,7 +80,7 @@ def log_level(message: Log) -> str:
 
 
 def parameter_info(message: ParameterDescriptor) -> ParameterInfo:
-    """Return what a descriptor says."""
+    """Return what a descriptor contains."""
     facts = facts_of(message)
     return ParameterInfo(
         printable(message.name), _KINDS.get(message.type) or _kind_told_by(facts),
@@ -102,7 +102,7 @@ _CALL_TIMEOUT = 5.0
 _BATCH = 200
 _BITS_MAX = 256
 #: drives that are asked for the first time, and topics and services that are made, in one look: on
-#: a busy machine with hundreds of drives each takes DDS 0.1 s, and somebody wants to see and stop
+#: a busy machine with hundreds of drives each takes DDS 0.1 s, and the user wants to see and stop
 _ASKED_AT_ONCE, _MADE_AT_ONCE = 4, 16
 _PLACE = ('bus', 'station', 'protocol', 'period')
 
@@ -138,16 +138,16 @@ class MonitorClient:
 
     @property
     def node(self) -> ClientNode:
-        """The node, for those who ask more of drives than this."""
+        """The node, for further calls to drives."""
         return self._node
 
     @property
     def busy(self) -> bool:
-        """Wait for an answer to something: polling soon is worth it."""
+        """Whether an answer is awaited: polling soon is worth it."""
         return self._calls.busy
 
     def focus(self, *drives: str) -> None:
-        """Look at drives closely: all of their samples, and their bits."""
+        """Subscribe to all samples of drives, and to their bits."""
         if self._focus != set(drives):
             self._focus = frozenset(drives)
             self._graph_at = 0.0
@@ -156,11 +156,11 @@ class MonitorClient:
                 self._bits.pop(topic).close()
 
     def watch(self, wanted: bool) -> None:
-        """Ask for samples, or for none: nobody looks at them."""
+        """Subscribe to samples, or to none while no view shows them."""
         self._watched = wanted
 
     def poll(self, now: float) -> None:
-        """Take what has arrived, and ask for what is missing."""
+        """Handle what has arrived, and request what is missing."""
         self._now = now
         for inbox in (*self._inboxes, *self._online.values(), *self._bits.values()):
             inbox.look()
@@ -171,7 +171,7 @@ class MonitorClient:
         self._follow()
 
     def glance(self, now: float) -> None:
-        """Take the samples of what is looked at closely, and nothing else."""
+        """Handle the samples of the drives in focus, and nothing else."""
         self._now = now
         for drive in self._focus & self._samples.keys():
             for inbox in self._samples[drive]:
@@ -192,7 +192,7 @@ class MonitorClient:
     # -- what is asked for ------------------------------------------------------------------------
 
     def _follow(self) -> None:
-        """Subscribe to what there is to be seen now, and to nothing else."""
+        """Subscribe to what there is now, and to nothing else."""
         model, now = self._model, self._now
         _keep(self._online, model.drives, self._subscribe_online, Inbox.close)
         wanted = (self._plan.choose(model.rates(), self._focus, now) if self._watched
@@ -214,7 +214,7 @@ class MonitorClient:
                 self._find_bits()
 
     def _by_interest(self, drives: Iterable[str]) -> list[str]:
-        """Return drives, those that somebody looks at first."""
+        """Return drives, those in focus first."""
         return sorted(drives, key=lambda drive: drive not in self._focus)
 
     def _subscribe_online(self, drive: str) -> Inbox:
@@ -234,7 +234,7 @@ class MonitorClient:
                       take_request))
 
     def _notice(self) -> None:
-        """Look for drives whose bridge has not told of them: it hangs, or takes its time."""
+        """Look for drives that their bridge has not reported: it hangs, or is slow."""
         services = self._node.services()
         self._model.noticed(drives_among(
             services, self._node.topics, bridges_among(services), set(self._model.drives)),
@@ -256,7 +256,7 @@ class MonitorClient:
         return Inbox(self._node, Bool, f'{drive}/{parameter}/{bit}', latched_quality(), take)
 
     def _ask_places(self, bridge: str) -> None:
-        """Ask a bridge where its drives are, and how often it tells of them."""
+        """Read where a bridge's drives are, and how often it publishes diagnostics."""
         self._asked.add(bridge)
         self._bridges_asked.add(bridge)
         drives = self._model.drives_of(bridge)
@@ -300,7 +300,7 @@ class MonitorClient:
                   DescribeParameters.Request(names=names[:_BATCH]), take)
 
     def _ask(self, node: str, service: str, request: Any, done: Callable[[Any], None]) -> None:
-        """Ask; what was asked of the same service before is not waited for any more."""
+        """Send a request; an earlier one to the same service is dropped."""
         self._calls.drop(node, service)
         if is_ros_name(node):
             self._calls.ask(node, service, request, done, self._now)
@@ -308,7 +308,7 @@ class MonitorClient:
 
 def _keep(have: dict[str, Any], wanted: Iterable[str], make: Callable[[str], Any],
           close: Callable[[Any], None]) -> None:
-    """Make what is wanted and missing, the first of it now; close what is not wanted."""
+    """Make what is wanted and missing, only the first of it now; close what is not wanted."""
     names = dict.fromkeys(wanted)
     for name in have.keys() - names.keys():
         close(have.pop(name))
@@ -333,7 +333,7 @@ def _number(value: Any) -> float:
 
 class ServiceOperations:
     """
-    Services of drives, for those who see them through a monitor's node.
+    Calls services of drives, through a monitor's node.
 
     :param node: of the monitor.
     """
@@ -344,7 +344,7 @@ class ServiceOperations:
         self._calls = NodeCalls(node, PARAMETER_TIMEOUT)
 
     def poll(self, stops: Mapping[str, Collection[StopAction]], now: float) -> bool:
-        """Take the answers that have arrived; return whether somebody still waits for one."""
+        """Handle the answers that have arrived; return whether any is still awaited."""
         wanted = [(drive, stop) for drive, each in stops.items() for stop in each]
         for gone in self._stops.keys() - set(wanted):
             if not self._stops[gone].busy:
@@ -365,7 +365,7 @@ class ServiceOperations:
 
     def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],
              now: float) -> None:
-        """Stop a drive, one that no poll has told of yet too."""
+        """Stop a drive, also one that no poll has reported yet."""
         name, _, request, patience, _ = _STOPS[stop]
         service = self._stops.get((drive, stop)) or self._keep_at_hand(drive, stop)
 

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-One end in the ROS graph: who asks services and looks into topics without an executor.
+One end in the ROS graph: clients, subscriptions and publishers without an executor.
 
 Straight from rclpy's extension, where it has what that takes; else as :mod:`.public_end` does it,
-each client, publisher and subscription by itself. So is whatever this finds made in another way.
+each client, publisher and subscription by itself. So is whatever differs in this rclpy.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,16 +37,16 @@ class Asking(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Somebody offers it."""
+        """Whether a server is discovered."""
 
     def send(self, request: Any) -> int:
-        """Ask; return the number of the question."""
+        """Send a request; return its number."""
 
     def take(self) -> tuple[int, Any] | None:
-        """Return the oldest answer, and to which question; None: there is none."""
+        """Return the oldest answer, with the number of its request; None: there is none."""
 
     def close(self) -> None:
-        """Wait for no answer any more."""
+        """Drop the open requests."""
 
 
 class ReadingEnd(Protocol):
@@ -70,7 +70,7 @@ class Writing(Protocol):
         """Publish a message."""
 
     def close(self) -> None:
-        """Publish nothing any more."""
+        """Destroy the publisher."""
 
 
 class _Asking:
@@ -181,10 +181,10 @@ def _node(context: Context, name: str) -> Any:
 
 class TopicEnd:
     """
-    One end.
+    The clients, subscriptions and publishers of one node.
 
     :param name: of a node of its own.
-    :param told: takes why this is slower than it might be, once.
+    :param told: called once with why this is slower than it might be.
     :param of: a node of rclpy, which this is instead; then the name is that of another one, which
         is only made if need be.
     """
@@ -202,9 +202,9 @@ class TopicEnd:
             self._give_up(error)
 
     def _give_up(self, error: Exception) -> None:
-        """Do without the extension from now on."""
+        """Use the public interface from now on."""
         if self._public is None:
-            # takes 0.25 s to be imported, which hardly anybody needs
+            # its import takes 0.25 s, and it is seldom needed
             from drive_can_bridge.ros.rcl.public_end import PublicEnd
             self._public = PublicEnd(
                 self._context, self._name if self._private is None else f'{self._name}_too')
@@ -229,12 +229,12 @@ class TopicEnd:
         return found
 
     def servers(self, service: str) -> int:
-        """Return how many offer a service of this name."""
+        """Return how many servers of this name are discovered."""
         return int(self._do('servers', service))
 
     def who_reads(self, topic: str) -> list[bytes]:
         """
-        Return the gids of who subscribes to a topic.
+        Return the gids of a topic's subscribers.
 
         :param topic: as the middleware has it.
         """
@@ -257,7 +257,7 @@ class TopicEnd:
         return made
 
     def close(self) -> None:
-        """Take the node of its own out of the graph."""
+        """Remove the node of its own from the graph."""
         if self._private is not None and self._own:
             self._private.close()
         if self._public is not None:

@@ -6,8 +6,8 @@ pybind11 makes Python's of them. ctypes has nothing that catches one: the C++ ru
 handler, unwinds nothing, calls what ``std::set_terminate`` was given, and ends the process
 (``terminate called after throwing an instance of 'std::bad_alloc'``, SIGABRT; tried with gcc 12).
 The handler here keeps a thread that announced itself from that: the thread stays where it is for
-ever, and whoever waits for it hears why. For all other threads the former handler is called: what
-a thread of the middleware has locked by then, nobody would ever unlock.
+ever, and its caller learns why. For all other threads the former handler is called: what
+a thread of the middleware has locked by then would never be unlocked.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ from typing import Any
 from drive_can_bridge.ros.rcl.unfit import Unfit
 
 _HANDLER = ctypes.CFUNCTYPE(None)
-#: by thread, who is told
+#: by thread, the function to call
 _guarded: dict[int, Callable[[str], object]] = {}
 _installing = threading.Lock()
 #: the handler of this process, kept as long as that lives, and those functions that it needs
@@ -71,9 +71,9 @@ def install(library: ctypes.CDLL) -> None:
 @contextmanager
 def guarded(tell: Callable[[str], object]) -> Iterator[None]:
     """
-    Have an exception within end neither the process nor this: the thread stays there for ever.
+    Keep an exception within from ending the process: the thread stays there for ever.
 
-    :param tell: takes what was thrown, in that thread.
+    :param tell: called with what was thrown, in that thread.
     """
     own = threading.get_ident()
     _guarded[own] = tell

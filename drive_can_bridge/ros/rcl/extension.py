@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The extension of rclpy, which all that is here goes through: nobody promises what is in it.
+The extension of rclpy, which everything here goes through: none of it is public.
 
 Looked up each time, because another one may stand in its place (tests), and by name only here.
 """
@@ -14,12 +14,12 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 
 try:
     from rclpy.impl.implementation_singleton import rclpy_implementation
-except ImportError:     # it is somewhere else: so nothing is in it, and all goes round it
+except ImportError:     # it is somewhere else: so it counts as empty, and other ways are used
     rclpy_implementation = None
 
 
 class Extension:
-    """What rclpy has of rcl, by the names that it has there."""
+    """The parts of rcl in rclpy, by their names there."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(rclpy_implementation, name)
@@ -34,10 +34,10 @@ GONE = InvalidHandle, RCLError
 
 def look_for(names: Iterable[str]) -> None:
     """
-    See that members are there.
+    Check that members exist.
 
     :param names: ``Client.take_response``, and the like.
-    :raises Unfit: they are not; it says which.
+    :raises Unfit: they do not; with the first missing one.
     """
     for name in names:
         found: Any = extension

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Messages that whoever wants them takes by hand, as the bytes that came, and events of their topics.
+Messages that are polled as the bytes that came, and events of their topics.
 
-Where rclpy has other ways for that, its executor takes them (``raw=True``), and they wait here.
+Where rclpy has no such members, its executor takes them (``raw=True``), and they wait here.
 The stamp of the middleware does not show how long one has waited for the executor: so what counts
 is when that has taken it.
 """
@@ -25,14 +25,14 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 MEMBERS = ('Subscription.take_message', 'Subscription.get_publisher_count', 'EventHandle',
            'EventHandle.take_event', 'EventHandle.destroy_when_not_in_use')
 
-#: messages that wait here where everything is kept: what Fast DDS keeps then, whoever takes them
+#: messages that wait here where everything is kept: as many as Fast DDS keeps
 KEPT_MAX = 5000
 #: the bytes of a message, and what is known of it
 Taken = tuple[bytes, dict[str, Any]]
 
 
 class PolledGroup(CallbackGroup):
-    """Entities of this group are taken by hand; an executor never waits for them."""
+    """A group whose entities are polled; an executor never waits for them."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
@@ -50,7 +50,7 @@ class Incoming(NamedTuple):
 
     :ivar take: returns the oldest message that waits; None: there is none.
     :ivar publishers: returns how many publish to it.
-    :ivar look: looks what has happened to it.
+    :ivar look: handles its events.
     :ivar let_go: must have been called before the subscription is destroyed.
     """
 
@@ -63,14 +63,14 @@ class Incoming(NamedTuple):
 
 def by_hand(subscription: Any, look: Callable[[], None] = lambda: None,
             let_go: Callable[[], None] = lambda: None) -> Incoming:
-    """Return what takes from a subscription that nobody else takes from."""
+    """Return the functions to poll a subscription that no executor takes from."""
     handle = subscription.handle
     return Incoming(subscription, partial(handle.take_message, subscription.msg_type, True),
                     handle.get_publisher_count, look, let_go)
 
 
 def why_not_by_hand() -> str:
-    """Say why messages cannot be taken by hand; '': they can."""
+    """Return why messages cannot be polled; '': they can."""
     try:
         look_for(MEMBERS)
     except Unfit as error:
@@ -84,7 +84,7 @@ def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile,
     """
     Subscribe to a topic.
 
-    :param incompatible: takes the status of a publisher whose quality does not do.
+    :param incompatible: called with the status of a publisher of incompatible quality.
     :param stamp: returns the time of the day, in ns.
     """
     if why_not_by_hand():

@@ -3,7 +3,7 @@
 How messages lie in memory: what is too long in one is found, and cut, before Python reads it.
 
 Making a Python message of one in C keeps the interpreter: 0.2 s for a million names, and
-somebody's cycles wait. Nobody means anything by texts or lists of such length. The layout follows
+cycles wait. No honest request has texts or lists of such length. The layout follows
 from the definition of a message as the C compiler has it (rosidl_generator_c, ``struct.h``):
 strings and sequences are an address, a length and a capacity.
 """
@@ -48,7 +48,7 @@ def layout_of(kind: Any) -> MessageLayout:
     """
     Return the layout of a type of messages.
 
-    :raises Unfit: it has something that nobody of ours has.
+    :raises Unfit: it has a type that no message of ours has.
     """
     parts: list[tuple[int, MessageLayout | None]] = []
     end, alignment = 0, 1

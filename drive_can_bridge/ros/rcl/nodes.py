@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What is private in the Python part of rclpy, of nodes: there is no other way to any of it.
+Private members of rclpy's Python nodes, for what has no public way.
 
-So a bridge says at its start what is missing (:func:`look`, and :func:`look_at` its node), and
+So a bridge reports at its start what is missing (:func:`look`, and :func:`look_at` its node), and
 does not begin.
 """
 
@@ -33,9 +33,9 @@ _OF_NODES = (
 
 def look() -> None:
     """
-    See that there is what this takes, before there is a node.
+    Check that the members used here exist, before there is a node.
 
-    :raises Unfit: it is not; it says what.
+    :raises Unfit: they do not; with the missing ones.
     """
     _complain([f'{kind.__name__}.{name}' for kind, names in _OF_CLASSES for name in names
                if not hasattr(kind, name)])
@@ -43,9 +43,9 @@ def look() -> None:
 
 def look_at(node: LifecycleNode) -> None:
     """
-    See that a node has what this takes.
+    Check that a node has the members used here.
 
-    :raises Unfit: it does not; it says what.
+    :raises Unfit: it does not; with the missing ones.
     """
     lacking = [_lacking(node, name) for name in _OF_NODES]
     _complain([f'LifecycleNode.{name}' for name in dict.fromkeys(lacking) if name])
@@ -68,23 +68,23 @@ def _complain(missing: Sequence[str]) -> None:
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return what parameter files and command line say of a node, declared or not."""
+    """Return the overrides of a node from parameter files and command line, declared or not."""
     found: Mapping[str, Parameter] = node._parameter_overrides
     return found
 
 
 def set_read_only(node: Node, name: str, value: Any) -> None:
     """
-    Change a parameter that is read-only for everybody else.
+    Change a parameter that is read-only from outside.
 
-    The descriptor is handed in again because that is how rclpy leaves it read-only.
+    The descriptor is passed again because that is how rclpy leaves it read-only.
     """
     node._set_parameters_atomically_common(
         [Parameter(name, value=value)], {name: node.describe_parameter(name)})
 
 
 class Transitions:
-    """The transitions of a managed node, before rcl is asked for one."""
+    """The transitions of a managed node, read before rcl is asked for one."""
 
     def __init__(self, node: LifecycleNode) -> None:
         self._machine = node._state_machine
@@ -92,19 +92,19 @@ class Transitions:
 
     @property
     def possible(self) -> dict[int, str]:
-        """Number and label of each that is possible now."""
+        """Number and label of each transition that is possible now."""
         return {number: label for number, label, *_ in self._machine.available_transitions}
 
     @property
     def state(self) -> str:
-        """Label of the state."""
+        """The label of the state."""
         return str(self._machine.current_state[1])
 
     def guard(self, guarded: Callable[[Callable[[Any, Any], Any], Any, Any], Any]) -> None:
         """
-        Have something else answer requests.
+        Replace the handler of transition requests.
 
-        :param guarded: takes what rclpy does, request and response.
+        :param guarded: called with rclpy's handler, request and response.
         """
         change_state = self._service.callback
         self._service.callback = lambda request, response: guarded(
@@ -113,11 +113,11 @@ class Transitions:
 
 class AnsweringParameterServices(ParameterService):
     """
-    The parameter services of rclpy, which answer whatever the type of a value is said to be.
+    The parameter services of rclpy, which answer for any type number of a value.
 
     There, a type that does not exist ends the callback, and the client waits for ever.
 
-    :param prepare: is told the names of parameters that are asked for.
+    :param prepare: called with the names of requested parameters.
     """
 
     def __init__(self, node: Node, prepare: Callable[[Sequence[str]], None]) -> None:
@@ -125,7 +125,7 @@ class AnsweringParameterServices(ParameterService):
         self._prepare = prepare
 
     def get(self, request: Any, response: Any) -> Any:
-        """Do what ``get_parameters`` does, for who came another way."""
+        """Handle ``get_parameters`` for a caller by the local way."""
         return self._get_parameters_callback(request, response)
 
     def _get_parameters_callback(self, request: Any, response: Any) -> Any:

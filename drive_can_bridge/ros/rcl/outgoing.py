@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Messages that are bytes already."""
+"""Messages that are published as bytes."""
 
 from collections.abc import Callable
 
@@ -11,9 +11,9 @@ from drive_can_bridge.ros.rcl.unfit import Unfit
 
 def publish_bytes(publisher: Publisher) -> Callable[[bytes], None]:
     """
-    Return what publishes the bytes of a message. A destroyed publisher raises RCLError.
+    Return the function that publishes bytes. A destroyed publisher raises RCLError.
 
-    The promised way, ``Publisher.publish``, costs more than the handing over.
+    The public way, ``Publisher.publish``, costs more than the publishing itself.
     """
     straight: Callable[[bytes], None] = (
         publisher.publish if why_not_straight() else publisher.handle.publish_raw)
@@ -21,7 +21,7 @@ def publish_bytes(publisher: Publisher) -> Callable[[bytes], None]:
 
 
 def why_not_straight() -> str:
-    """Say why that is not to be had; '': it is."""
+    """Return why bytes cannot be published; '': they can."""
     try:
         look_for(['Publisher.publish_raw'])
     except Unfit as error:

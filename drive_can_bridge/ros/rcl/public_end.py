@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-An end in the ROS graph by what rclpy promises: a node, and an executor that spins when looked at.
+An end in the ROS graph by rclpy's public interface: a node, and an executor that is polled.
 
 Slower: importing it takes 0.25 s, and each look some tenths of a millisecond.
 """
@@ -37,19 +37,19 @@ class PublicEnd:
         self._came = 0
 
     def spin(self) -> None:
-        """Take what has come."""
+        """Handle what has arrived."""
         idle = 0
         for _ in range(_TURNS_MAX):
             before = self._came
-            # bytes that nobody can read are somebody else's affair
+            # malformed bytes are another node's fault
             with suppress(RuntimeError):
                 self._executor.spin_once(timeout_sec=0.0)
             idle = 0 if self._came != before else idle + 1
-            if idle == 2:   # the first one may have looked after something else
+            if idle == 2:   # the first turn may have handled something else
                 return
 
     def came(self) -> None:
-        """Count what has come."""
+        """Count an arrival."""
         self._came += 1
 
     def services(self) -> Sequence[tuple[str, list[str]]]:
@@ -65,7 +65,7 @@ class PublicEnd:
         return int(self._node.count_services(service))
 
     def who_reads(self, topic: str) -> list[bytes]:
-        """Return the gids of who subscribes to a topic, as the middleware names it."""
+        """Return the gids of a topic's subscribers; the topic as the middleware names it."""
         return [bytes(found.endpoint_gid)
                 for found in self._node.get_subscriptions_info_by_topic(topic, no_mangle=True)]
 
@@ -83,13 +83,13 @@ class PublicEnd:
         return _PublicWriting(self._node, self._node.create_publisher(kind, topic, quality))
 
     def close(self) -> None:
-        """Take the node out of the graph."""
+        """Remove the node from the graph."""
         self._executor.shutdown(timeout_sec=0.0)
         self._node.destroy_node()
 
 
 class _Arrivals:
-    """What has come and waits to be taken, the oldest first; with ``kept`` so many at most."""
+    """What has arrived and waits to be taken, the oldest first; at most the last ``kept``."""
 
     def __init__(self, end: PublicEnd, kept: int | None = None) -> None:
         self._end = end

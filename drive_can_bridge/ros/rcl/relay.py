@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Requests that an executor of rclpy takes, and answers that it sends, by what rclpy promises."""
+"""Requests that an executor of rclpy takes, and answers that it sends, by its public interface."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,15 +8,15 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.service import Service
 from rclpy.task import Future
 
-#: takes a request, and what is to be called with the response, once, from any thread
+#: called with a request, and with the function for its response: once, from any thread
 Begin = Callable[[Any, Callable[[Any], None]], None]
 
 
 class Relay:
     """
-    Has services served by the executor that has their node.
+    Serves services in the executor that has their node.
 
-    :param later: has something done by that executor.
+    :param later: runs a function in that executor.
     """
 
     def __init__(self, later: Callable[..., object]) -> None:
@@ -24,7 +24,7 @@ class Relay:
 
     def serve(self, service: Service, begin: Begin, answered: Callable[[], None]) -> None:
         """
-        Have a service served.
+        Serve a service.
 
         :param answered: called when a response was sent.
         """
@@ -41,9 +41,9 @@ class Relay:
         relaying: Any = callback
         service.callback = relaying
         service.callback_group = ReentrantCallbackGroup()
-        # one that waits since before, and for nothing of this service, waits for it from now on
+        # a wait that began before, without this service, includes it from now on
         self._later(_look_again)
 
 
 def _look_again() -> None:
-    """Have the executor look what it has to wait for."""
+    """Make the executor collect again what it waits for."""

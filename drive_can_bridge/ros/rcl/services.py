@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Requests and answers of services, straight from and to rcl: nobody has the interpreter meanwhile.
+Requests and answers of services, straight from and to rcl, without holding the interpreter.
 
 rclpy calls the middleware with the interpreter held (``service.cpp``), so every thread of the
 process waits for it: cycles, commands, stops. ``rcl_take_request_with_info`` lasts for as long as
@@ -13,7 +13,7 @@ functions are called that way, with the same arguments:
 * the service: ``Service.pointer`` is the address of its ``rcl_service_t``;
 * request and response: as rclpy does it (``utils.cpp``), by the functions that generated message
   classes carry as capsules (rosidl_generator_py, ``_msg.py.em``);
-* who asked: a ``rmw_service_info_t`` (``rmw/types.h``).
+* the caller: a ``rmw_service_info_t`` (``rmw/types.h``).
 
 What is too long in a request is cut before Python reads it (:mod:`.layout`); an exception of the
 middleware leaves the thread where it is (:mod:`.escaped`).
@@ -60,12 +60,12 @@ _RESIZE = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_size_t)
 _COPY = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p)
 
 _WORD = ctypes.c_size_t
-#: tells (what was thrown) that a call will never return
+#: called with what was thrown, when a call will never return
 Escaped = Callable[[str], object]
 
 
 class Unreachable(Exception):
-    """The middleware has waited for the caller, and given up: it will not receive its answer."""
+    """The middleware has waited for the caller, and given up: the answer will not arrive."""
 
 
 class _ErrorString(ctypes.Structure):
@@ -78,7 +78,7 @@ _GET_ERROR = ctypes.PYFUNCTYPE(_ErrorString)
 
 
 class _Functions(NamedTuple):
-    """What makes messages of a type in C, and of them in Python."""
+    """The functions that convert messages of a type between C and Python."""
 
     create: Callable[[], int | None]
     to_c: Callable[[Any, int], bool]
@@ -88,7 +88,7 @@ class _Functions(NamedTuple):
 
 class Header:
     """
-    Who asked.
+    The header of a request, which identifies its caller.
 
     :ivar caller: the same for all calls of one client.
     """
@@ -101,7 +101,7 @@ class Header:
 
     @property
     def caller(self) -> bytes:
-        """Return what all calls of one client have in common."""
+        """Return the bytes that all calls of one client have in common."""
         return ctypes.string_at(self.request, _CALLER_SIZE)
 
     @property
@@ -111,7 +111,7 @@ class Header:
 
     def check(self) -> None:
         """
-        Compare it with what is known of all.
+        Check the header's layout against known values.
 
         :raises Unfit: it is laid out differently.
         """
@@ -121,7 +121,7 @@ class Header:
 
 
 class ReadyResponse(NamedTuple):
-    """An answer that is ready to be sent."""
+    """An answer with everything that sending it takes."""
 
     service: Service
     message: Any
@@ -132,7 +132,7 @@ class ReadyResponse(NamedTuple):
 
 class RclServices:
     """
-    Takes requests, and sends answers.
+    Takes requests, and sends answers, by functions of rcl.
 
     :raises Unfit: something that this needs is not to be found.
     """
@@ -156,7 +156,7 @@ class RclServices:
 
     def check(self, service: Service) -> None:
         """
-        Find out whether a service can be served this way.
+        Check that a service can be served this way.
 
         :raises Unfit: it cannot.
         """
@@ -169,18 +169,18 @@ class RclServices:
 
     def take(self, service: Service, lost: Escaped) -> tuple[Any, Header] | None:
         """
-        Take the oldest request that waits, and who asked; None: there is none.
+        Return the oldest waiting request, with its header; None: there is none.
 
-        Of a list that is longer than anybody reads, each entry is its first one.
+        A list that is too long has its first entry in every place.
 
-        :param lost: is told what was thrown, if this will never return.
+        :param lost: called with what was thrown, if this will never return.
         :raises InvalidHandle: the service is gone.
         :raises RCLError: as rclpy does.
         """
         kind: Any = service.srv_type.Request    # type: ignore[attr-defined]
         functions = self._functions_of(kind)
         header, handle = Header(), service.handle
-        with handle:    # who destroys it meanwhile only has it destroyed at the end of this
+        with handle:    # a destruction meanwhile is put off to the end of this
             raw = functions.create()
             if raw is None:
                 raise MemoryError
@@ -201,9 +201,9 @@ class RclServices:
 
     def prepare(self, service: Service, message: Any, header: Any) -> ReadyResponse:
         """
-        Make an answer ready.
+        Prepare an answer.
 
-        :raises Unfit: it was asked for another way.
+        :raises Unfit: its request was taken another way.
         """
         if not isinstance(header, Header):
             raise Unfit(f'a header of type {type(header).__name__}')
@@ -214,7 +214,7 @@ class RclServices:
         """
         Send an answer. Other threads run meanwhile; the service may be destroyed by them.
 
-        :raises Unreachable: nobody will receive it.
+        :raises Unreachable: it will not be received.
         :raises InvalidHandle: the service is gone.
         :raises RCLError: as rclpy does.
         """
@@ -222,7 +222,7 @@ class RclServices:
         with handle:
             raw = self._written(response.message, functions)
             try:
-                # what somebody left in this thread would be told together with what fails here
+                # an older error of this thread would be reported with this one
                 self._reset_error()
                 result = self._send(handle.pointer, response.header.request, raw)
             finally:
@@ -230,7 +230,7 @@ class RclServices:
             self._succeeded(result, 'send response')
 
     def _written(self, message: Any, functions: _Functions) -> int:
-        """Return an answer in C; what says the same of very many is not made of so many."""
+        """Return an answer in C; many equal entries are copied from one."""
         field, entries = _crowd(message)
         if not field:
             return _in_c(message, functions)
@@ -247,7 +247,7 @@ class RclServices:
         return raw
 
     def _repeat(self, one: int, many: int, entries: Sequence[Any]) -> bool:
-        """Copy the entry of one sequence to as many of another as there are here."""
+        """Fill a sequence with copies of the one entry of another."""
         kind: Any = type(entries[0])
         name = f'{kind.__module__.partition(".")[0]}__msg__{kind.__name__}'
         if not _RESIZE((f'{name}__Sequence__init', self._library))(many, len(entries)):
@@ -279,7 +279,7 @@ class RclServices:
 
 
 def _address(kind: Any, name: str) -> int:
-    """Return where a function is that a message class carries."""
+    """Return the address of a function that a message class carries."""
     try:
         capsule = getattr(type(kind), name)
         return int(_capsule_pointer(capsule, _capsule_name(capsule)))
@@ -310,7 +310,7 @@ def _read(raw: int, layout: MessageLayout, functions: _Functions) -> Any:
 
 
 def _crowd(message: Any) -> tuple[str, Sequence[Any]]:
-    """Return the one field of a message, if it says the same of very many; else ''."""
+    """Return the one field of a message, if it has very many equal entries; else ''."""
     fields = list(message.get_fields_and_field_types())
     entries = getattr(message, fields[0]) if len(fields) == 1 else ()
     if (isinstance(entries, list) and len(entries) > ENTRIES_MAX
@@ -320,7 +320,7 @@ def _crowd(message: Any) -> tuple[str, Sequence[Any]]:
 
 
 def take_by_rclpy(service: Service) -> tuple[Any, Any] | None:
-    """Take a request as the executors of rclpy do: with the interpreter held."""
+    """Return a request as the executors of rclpy take it, with the interpreter held."""
     kind: Any = service.srv_type
     handle: Any = service.handle
     request, header = handle.service_take_request(kind.Request)

@@ -25,9 +25,9 @@ MEMBERS = (
 
 def look(context: Context) -> None:
     """
-    See that there is what this takes, and that it is made as it is here.
+    Check that the members used here exist, and can be made as they are here.
 
-    :raises Unfit: it is not.
+    :raises Unfit: they do not, or cannot.
     """
     look_for(MEMBERS)
     try:
@@ -44,14 +44,14 @@ def _wait_set(context_handle: Any, services: int) -> Any:
 
 
 class Waiting:
-    """What one thread waits for."""
+    """The wait set of one thread."""
 
     def __init__(self, context: Context) -> None:
         self._context: Any = context.handle
         self._guard = extension.GuardCondition(context.handle)
 
     def wake(self) -> None:
-        """Have the thread look what else there is to do. From any thread."""
+        """Wake the thread. From any thread."""
         try:
             with self._guard:
                 self._guard.trigger_guard_condition()
@@ -59,15 +59,16 @@ class Waiting:
             pass
 
     def close(self) -> None:
-        """Let go of what wakes it."""
+        """Destroy the guard condition."""
         self._guard.destroy_when_not_in_use()
 
     @contextmanager
     def held(self, services: Iterable[Service]) -> Iterator[Callable[[], list[Service]]]:
         """
-        Keep services from being destroyed meanwhile; those that are gone are left out.
+        Hold services so that they are not destroyed meanwhile; leave out those that are.
 
-        :return: waits until there is a request or :meth:`wake`, and returns who has one.
+        :return: waits until there is a request or :meth:`wake`, and returns the services that have
+            one.
         """
         with ExitStack() as held:
             present: dict[int, Service] = {}
@@ -93,7 +94,7 @@ class Waiting:
 
 
 class Wakeable(Protocol):
-    """What a thread waits for that nobody else wakes."""
+    """An event that a thread waits for."""
 
     def wait(self) -> object:
         """Wait."""
@@ -103,18 +104,18 @@ class Wakeable(Protocol):
 
 
 class Sleeping:
-    """In place of :class:`Waiting`, where somebody else takes the requests."""
+    """In place of :class:`Waiting`, where the executor takes the requests."""
 
     def __init__(self, wake_event: Wakeable) -> None:
         self._wake_event = wake_event
         self.wake = wake_event.ring
 
     def close(self) -> None:
-        """Have nothing to let go of."""
+        """Do nothing: there is nothing to close."""
 
     @contextmanager
     def held(self, _: Iterable[Service]) -> Iterator[Callable[[], list[Service]]]:
-        """Return what waits until :meth:`wake`."""
+        """Return the function that waits until :meth:`wake`."""
         def wait() -> list[Service]:
             self._wake_event.wait()
             return []
