@@ -14,9 +14,9 @@ outs, EEPROM gaps) instead of one period. Drives of equal periods take turns (:f
 
 Where the adapter wakes the reader in time (``EndPoint.punctual``), the reader makes the passes,
 too: it sleeps once for whatever comes first, a frame or a deadline, and no thread has to wait for
-the other one's lock and interpreter. It says when it will be back. The timer thread makes the
-passes that are due before that, those for which somebody rings, and all of them while no reader is
-back in time: no bus, one that opens, a reader that has died, an adapter that sleeps too long.
+the other one's lock and interpreter. It sets when it will be back. The timer thread makes the
+passes that are due before that, those for which it is woken, and all of them while no reader is
+back in time: no bus, one that opens, a reader that has ended, an adapter that sleeps too long.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -46,7 +46,7 @@ SLOT = 0.0015
 EARLY = 0.1
 #: the timer thread passes at least this often (s), so that a longer gap means lost time
 PASS_PERIOD = 0.25
-#: s without a pass after which nothing is believed any more: the process stood still
+#: s without a pass after which known states are invalid: the process was stalled
 LOST_TIME = 1.0
 #: s by which a pass may be late until commands that wait are not believed any more
 LATENESS_MAX = 0.25
@@ -56,9 +56,9 @@ PATIENCE, LITTLE_PATIENCE = LOST_TIME, 0.05
 LOOK_PERIOD = 0.05
 #: s by which the reader may be back too late before the timer thread does its work
 GRACE = 0.02
-#: frames that may have come in one packet and are looked at before something is sent
+#: frames that may have come in one packet and are read before something is sent
 LOOK_AHEAD = 8
-#: s until what was last sent is told again
+#: s until the values sent last are published again
 REQUEST_PERIOD = 1.0
 
 
@@ -76,9 +76,9 @@ class Router(Generic[Owner]):
 
     def add(self, routes: Iterable[Route], owner: Owner, overheard: Iterable[Route] = ()) -> None:
         """
-        Send the frames of these routes to ``owner``.
+        Route the frames of these routes to ``owner``.
 
-        :param overheard: what it is to hear of, too, as others may; of one identifier each.
+        :param overheard: routes that several owners may share; of one identifier each.
         """
         for route in routes:
             self._table(route.extended, route.mask)[route.identifier & route.mask] = owner
@@ -86,7 +86,7 @@ class Router(Generic[Owner]):
             self._hearers.setdefault((route.identifier, route.extended), []).append(owner)
 
     def hearers(self, frame: Frame) -> Sequence[Owner]:
-        """Return who is to hear of a frame that has no owner; it may be nobody."""
+        """Return the owners that overhear a frame without an owner; there may be none."""
         return self._hearers.get((frame[0], frame[2]), ())
 
     def find(self, frame: Frame) -> Owner | None:
@@ -110,7 +110,7 @@ class Router(Generic[Owner]):
 
 def stagger(periods: Sequence[float]) -> list[float]:
     """
-    Return for each drive when in its period its turn is, in s.
+    Return when in its period each drive has its turn, in s.
 
     Drives that are all served at the same instant wait for each other: on the wire, where the
     last of fifteen at 1 Mbit/s gets its request after two and its answer after four of five
@@ -119,7 +119,7 @@ def stagger(periods: Sequence[float]) -> list[float]:
     because every turn costs a wake-up, and five exchanges at 1 Mbit/s fill a slot
     (bench/README.md has what other slots cost).
 
-    Drives of a period are taken in the order given; as many of them as need be share a slot.
+    Drives of a period are placed in the order given; as many of them as need be share a slot.
     """
     groups: dict[float, list[int]] = {}
     for index, period in enumerate(periods):
@@ -134,13 +134,13 @@ def stagger(periods: Sequence[float]) -> list[float]:
 
 class PeriodicTask:
     """
-    Calls ``action`` with the time, once a period. No thread waits for another one's call.
+    Calls ``action`` with the time, once a period. No thread waits for a call in another one.
 
     A thread of its own costs a wake-up each time, asks for the interpreter beside threads that
     need it, and finds its caches cold: together more than what it does. The timer threads of busy
     buses are awake all the time, and those of idle ones have the time to wake up for it.
 
-    :param action: must not raise; whichever thread calls it has no lock of an exchange.
+    :param action: must not raise; it is called without the lock of any exchange.
     """
 
     def __init__(self, action: Callable[[float], None]) -> None:
@@ -151,18 +151,18 @@ class PeriodicTask:
         self._taken = threading.Lock()
 
     def begin(self, period: float, now: float) -> None:
-        """Have it done every ``period`` s from now on, for the first time after one."""
+        """Start to call every ``period`` s, for the first time after one."""
         with self._taken:
             self._period = period
             self._plan(now + period)
 
     def end(self) -> None:
-        """Have it done no more, and wait for a call that is under way."""
+        """Stop calling, and wait for a call that is under way."""
         with self._taken:
             self._due = self._from = math.inf
 
     def run(self, now: float) -> float:
-        """Do it if it is due; return when to call next."""
+        """Call if it is due; return when to run next."""
         if now < self._from:
             return self._due
         if not self._taken.acquire(blocking=False):     # another exchange is at it
@@ -186,12 +186,13 @@ class BusExchange:
     All drives of one bus.
 
     :param routes: for each session, in the same order, the identifiers it wants to see.
-    :param counted: further identifiers, on which nobody else should send.
-    :param overheard: for each session those on which another master tells several drives at once.
+    :param counted: further identifiers, on which no other node should send.
+    :param overheard: for each session those on which another master commands several drives at
+        once.
     :param open_bus: opens the bus; None: python-can, by the configuration.
     :param prepare_thread: called first in each of the two threads.
-    :param note: sees every frame that was sent or received: (frame, time, sent).
-    :ivar periodic_task: what its threads see to beside its drives; to be set before ``open``.
+    :param note: called with every frame that was sent or received: (frame, time, sent).
+    :ivar periodic_task: what its threads run beside its drives; to be set before ``open``.
     :ivar hung: a thread has kept the lock for too long: the adapter does not return from a send.
     """
 
@@ -240,7 +241,7 @@ class BusExchange:
     # -- life cycle -------------------------------------------------------------------------------
 
     def attach(self, session: Session, listener: DriveListener) -> None:
-        """Say who listens to a session. Once for each, before ``open``."""
+        """Attach the listener of a session. Once for each, before ``open``."""
         member = Member(session, listener, self._transmit, self._clock)
         for other in self._members:
             if other.session in session.partners:
@@ -257,7 +258,7 @@ class BusExchange:
         self._thread.start()
 
     def activate(self) -> None:
-        """Begin the exchange with every drive."""
+        """Start the exchange with every drive."""
         with self.lock:
             now = self._clock()
             self._last_pass = self._meant_at = now
@@ -268,14 +269,14 @@ class BusExchange:
         self._wake.ring()
 
     def serve(self) -> None:
-        """Serve parameter requests only: nothing is sent that nobody asked for."""
+        """Serve parameter requests only: nothing is sent unasked."""
         with self.lock:
             for member in self._members:
                 member.session.serve()
 
     def deactivate(self) -> bool:
         """
-        Stop every drive safely and wait until it is done; somebody else may have begun with it.
+        Stop every drive safely and wait for it; another thread may have started it.
 
         :return: False when it could not be completed in time (a bus that blocks).
         """
@@ -283,14 +284,14 @@ class BusExchange:
         return self._wait_for_stop()
 
     def begin_stop(self) -> None:
-        """Begin to stop every drive safely; its threads go on with it."""
+        """Start to stop every drive safely; the exchange's threads continue it."""
         with self.lock:
             if self.active:
                 self._begin_stop(self._clock())
         self._wake.ring()
 
     def _begin_stop(self, now: float) -> None:
-        lost = now - self._last_pass >= LOST_TIME   # nobody has noticed yet
+        lost = now - self._last_pass >= LOST_TIME   # not noticed yet
         self.active = False
         for member in self._members:
             member.anew_at = math.inf
@@ -311,12 +312,12 @@ class BusExchange:
                 now = self._clock()
             self._sleep(now + 0.002)
             asleep = self._clock() - now
-            if asleep > LATENESS_MAX:   # a process that stood still: not the bus blocks
+            if asleep > LATENESS_MAX:   # a stalled process: not the bus blocks
                 end += asleep
         return True
 
     def _give_up(self) -> None:
-        """End stops that do not come to an end: nobody knows what the drives do."""
+        """End stops that take too long: the state of the drives is unknown."""
         with self.lock:
             for member in self._members:
                 session = member.session
@@ -333,7 +334,7 @@ class BusExchange:
                     member.take(member.session.handle_timer, self._clock())
 
     def close(self) -> None:
-        """End both threads and close the bus."""
+        """End both threads, and close the bus."""
         self._closing = True
         self._wake.ring()
         self._thread.join(2.0)
@@ -341,21 +342,21 @@ class BusExchange:
 
     @property
     def stopped(self) -> bool:
-        """No drive is exchanged with, or being stopped."""
+        """Whether no drive is exchanged with, or being stopped."""
         with self.lock:
             return all(session.stopped for session in self._sessions)
 
     # -- users, any thread ------------------------------------------------------------------------
 
     def stands_still(self, now: float) -> bool:
-        """Return whether nobody has looked after its drives for so long that nothing is known."""
+        """Return whether there was no pass for so long that the drives' states are unknown."""
         return now - self._last_pass >= LOST_TIME
 
     @contextmanager
     def entered(self) -> Iterator[bool]:
-        """Have the lock, for who serves other buses, too; False: this one hangs."""
+        """Acquire the lock for a thread that serves other buses, too; yield False: it hangs."""
         patience = 0.5 * (LITTLE_PATIENCE if self.hung else PATIENCE)
-        # twice: the process may have stood still meanwhile
+        # twice: the process may have been stalled meanwhile
         entered = any(self.lock.acquire(timeout=patience) for _ in range(2))
         self.hung = not entered
         try:
@@ -366,7 +367,7 @@ class BusExchange:
 
     def submit(self, session: Session, request: Request | ControlRequest) -> None:
         """
-        Hand a request to a drive's session; the answer comes as an event.
+        Submit a request to a drive's session; the answer comes as an event.
 
         :raises TransportError: the bus hangs.
         """
@@ -393,7 +394,7 @@ class BusExchange:
 
     def contain(self, session: Session, error: Exception) -> None:
         """
-        Stop a drive because of a defect in what belongs to it, whoever met it.
+        Stop a drive after an internal error in one of its parts.
 
         To be called in the course of a call of a listener: with the bus lock held.
         """
@@ -403,7 +404,7 @@ class BusExchange:
         return next(member for member in self._members if member.session is session)
 
     def _ring_if_sooner(self, member: Member) -> None:
-        """Wake the timer thread if a drive, or a partner of it, wants to be served before that."""
+        """Wake the timer thread if a drive, or a partner, is due before it wakes by itself."""
         if member.soonest < self._wake_at:
             self._wake.ring()
 
@@ -423,12 +424,12 @@ class BusExchange:
             self._fail(f'{type(error).__name__}: {error}')
 
     def _turn(self) -> float:
-        """Return when the next pass is the timer thread's, as things are."""
+        """Return when the timer thread makes the next pass."""
         due, back_at = self._wake_at, self._back_at
         return due if due < back_at else max(due, back_at + GRACE)
 
     def _keep_time(self, longest: float) -> float:
-        """Serve, in the reader thread, what is due; return how many s it may wait for a frame."""
+        """Serve what is due, in the reader thread; return how many s it may wait for a frame."""
         if self._clock() >= self._wake_at:
             self._serve()
         with self.lock:
@@ -440,7 +441,7 @@ class BusExchange:
         return max(0.0, self._back_at - now)
 
     def _serve(self) -> None:
-        """Make a pass, and see to the periodic task."""
+        """Make a pass, and run the periodic task."""
         with self.lock:
             self._wake_at = self._pass()
         if self.periodic_task is not None:
@@ -474,7 +475,7 @@ class BusExchange:
 
     def _look_at_clock(self) -> float:
         """
-        Return the time, and see to what a stall has made stale.
+        Return the time, after handling a stall, or discarding commands after a delay.
 
         Not only when a pass begins: a process may be stopped in the midst of one.
         """
@@ -494,7 +495,7 @@ class BusExchange:
                 member.tell(member.listener.request_sent, now)
 
     def _notice_lost_time(self, now: float) -> bool:
-        """Re-arm everything after a second that was lost; False: none was."""
+        """Handle a stall of a second or more: arm again; return False: there was none."""
         gap = now - self._last_pass
         if gap < LOST_TIME or not self.active:
             return False
@@ -508,7 +509,7 @@ class BusExchange:
     # -- the reader thread (LinkListener) ---------------------------------------------------------
 
     def frame_received(self, frame: Frame, age: float) -> None:
-        """Take a frame from the link. The fast path of the reader."""
+        """Handle a frame from the link. The fast path of the reader."""
         arrived = self._clock() - age
         with self.lock:
             now = self._clock()
@@ -530,7 +531,7 @@ class BusExchange:
         self._wake.ring()
 
     def _find(self, frame: Frame, arrived: float, now: float) -> Member | None:
-        """Count a frame, and return whose it is; what has no owner is handed out here."""
+        """Count a frame, and return its owner; without one it is overheard."""
         self.received_bits += bits_on_bus(len(frame[1]), frame[2])
         if self._note is not None:
             self._note(frame, arrived, False)
@@ -542,7 +543,7 @@ class BusExchange:
         return member
 
     def _take_with_others(self, member: Member, frame: Frame, now: float, age: float) -> None:
-        """Take a frame, and before anything is sent because of it what came in one packet."""
+        """Handle a frame, and those of its packet before anything is sent in answer."""
         session = member.session
         session.receive_frame(frame, now, age)
         for _ in range(LOOK_AHEAD):
@@ -560,7 +561,7 @@ class BusExchange:
                 owner.take(owner.session.receive_frame, following, now, age)
 
     def bus_opened(self) -> None:
-        """Begin (again) with every drive."""
+        """Start (again) with every drive."""
         with self.lock:
             now = self._clock()
             self.bus_state, self.bus_reason = 'up', ''
@@ -588,7 +589,7 @@ class BusExchange:
         self._listener.fatal(self.bus.name, reason, misconfigured=True)
 
     def link_failed(self, reason: str) -> None:
-        """Give up: the reader thread met a defect."""
+        """Give up: the reader thread ended by an internal error."""
         self._back_at = -math.inf
         self._wake.ring()
         self._fail(reason)
@@ -600,7 +601,7 @@ class BusExchange:
     # -- from session to the outside --------------------------------------------------------------
 
     def _transmit(self, frame: Frame, now: float) -> bool:
-        """Send a frame of a session; False: the bus did not take it."""
+        """Send a frame of a session; return False: the bus refused it."""
         if not self.link.send(frame):
             return False
         self.sent_bits += bits_on_bus(len(frame[1]), frame[2])
@@ -611,7 +612,7 @@ class BusExchange:
 
 def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
     """
-    Stop the drives of every exchange that is active, or being stopped, and wait until it is done.
+    Stop the drives of every active exchange, also of one that is stopping, and wait for it.
 
     :return: why the stop frames could not all be sent, by name of the bus.
     """
@@ -637,7 +638,7 @@ def stop_all(exchanges: Iterable[BusExchange], clock: Clock) -> dict[str, str]:
             except RuntimeError:    # the system has no more threads for us
                 left.append(exchange)
     for exchange in left:   # no drive runs on while another one's stop is waited for
-        with suppress(Exception):   # told when it is waited for
+        with suppress(Exception):   # reported when it is waited for
             exchange.begin_stop()
     for exchange in left:
         stop(exchange)

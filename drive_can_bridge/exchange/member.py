@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A drive on its bus: its session, its listener, and what a defect in either of them costs.
+A drive on its bus: its session, its listener, and the effect of an internal error in either.
 
 Whatever one of the two raises, the bus and its other drives go on. The drive itself is not
-commanded on blindly: it is stopped as at the end of the bridge, is offline for a moment, and is
-looked for again as after a loss. Drives that share frames with it share that.
+commanded further: it is stopped as at the end of the bridge, is offline for a moment, and is
+looked for again as after a loss. Drives that share frames with it are stopped with it.
 """
 
 from collections.abc import Callable
@@ -22,49 +22,49 @@ from drive_can_bridge.core.session import Session
 STOP_MARGIN = 0.5
 #: s that a drive is left alone after a defect: long enough to be seen
 PAUSE = 1.0
-#: s until a step is taken again that has failed during a stop
+#: s until a step is repeated that has failed during a stop
 RETRY_AFTER = 0.01
 
 
 class DriveListener:
     """
-    What an exchange tells the owner of a drive, who does nothing about what it leaves out.
+    The callbacks of an exchange for the owner of a drive; all do nothing by default.
 
     Every call comes with the bus lock held, from the reader or timer thread or from the thread
     that called the exchange: it has to be short and must not call back into the exchange.
     """
 
     def take_commands(self, now: float) -> None:
-        """Hand the newest setpoint commands to the session: a cycle may be due."""
+        """Pass the newest setpoint commands to the session: a cycle may be due."""
 
     def discard_commands(self, why: str) -> None:
         """
-        Throw away commands that are waiting: they are stale.
+        Discard commands that are waiting: they are too old.
 
-        :param why: in words; '' where nobody has to be told.
+        :param why: in words; '' where it need not be logged.
         """
 
     def process_data(self, event: ProcessDataReceived) -> None:
         """Publish a sample. The fast path."""
 
     def request_sent(self, now: float) -> None:
-        """Publish what the drive was told last: it changed, or a second has passed."""
+        """Publish the values sent to the drive last: they changed, or a second has passed."""
 
     def handle_event(self, event: Event) -> None:
         """Publish or log anything else."""
 
 
 class BusListener(Protocol):
-    """What an exchange tells about its bus; from the reader or timer thread, lock not held."""
+    """The callbacks of an exchange for its bus; from the reader or timer thread, lock not held."""
 
     def bus_opened(self, bus: str) -> None:
-        """Record that the bus is there (again)."""
+        """Handle a bus that is there (again)."""
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """Record that the bus is gone, or could not be opened."""
+        """Handle a bus that is gone, or could not be opened."""
 
     def bus_told(self, bus: str, text: str) -> None:
-        """Record what people should know of its adapter."""
+        """Log what people should know of the adapter."""
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
         """End the bridge: the exchange cannot go on."""
@@ -74,13 +74,13 @@ class Member:
     """
     A drive on the bus.
 
-    :param transmit: (frame, time): sends it; False: the bus did not take it.
+    :param transmit: (frame, time): sends it; False: the bus refused it.
     :ivar partners: drives that share frames with this one: what happens to it may concern them.
     :ivar due: when the session wants to be called; kept here, so that a pass over all drives costs
         a comparison each.
     :ivar look_at: when its commands are to be looked at.
-    :ivar anew_at: when to look for it again after a defect; infinity: there was none.
-    :ivar told: what the listener knows to have been sent.
+    :ivar anew_at: when to look for it again after an internal error; infinity: there was none.
+    :ivar told: the sent values that the listener knows.
     """
 
     __slots__ = ('_clock', '_defect_told', '_give_up_at', '_transmit', 'anew_at', 'due',
@@ -110,18 +110,18 @@ class Member:
     # -- steps ------------------------------------------------------------------------------------
 
     def take(self, step: Callable[..., object], *arguments: object) -> None:
-        """Take a step of the session, and see to what comes of it."""
+        """Call a session method, then send its frames and report its events."""
         before = self.session.defect
         try:
             step(*arguments)
             self.pump()
-        except Exception as error:  # noqa: BLE001  one drive costs no other: it is told
+        except Exception as error:  # noqa: BLE001  one drive costs no other: it is reported
             self.contain(error)
             if before:      # not for ever in one go
                 self.due = self._clock() + RETRY_AFTER
 
     def tell(self, call: Callable[..., object], *arguments: object) -> None:
-        """Report to the listener something that no event says."""
+        """Call the listener with what is no event of the session."""
         try:
             call(*arguments)
         except Exception as error:  # noqa: BLE001  likewise
@@ -129,15 +129,15 @@ class Member:
 
     def take_commands(self, now: float) -> None:
         """
-        Let the listener hand in the commands that wait.
+        Make the listener pass on the commands that wait.
 
-        Behind a defect, too: a limit is taken all the same, and what waits for all joints of the
-        bus is of other drives as well.
+        After an internal error, too: a limit is set all the same, and what waits for all joints of
+        the bus is of other drives as well.
         """
         self.tell(self.listener.take_commands, now)
 
     def pump(self) -> None:
-        """Send what the session wants sent, and tell its listener what happened."""
+        """Send the session's frames, and report its events to the listener."""
         self._pump()
         for partner in self.partners:
             partner._pump()
@@ -149,7 +149,7 @@ class Member:
                 self._send()
         finally:
             self._report()
-        if outbox.frames:   # a fault that was told is asked for its number
+        if outbox.frames:   # the number of a reported fault is requested
             self._send()
         self.due = self.session.next_timer()
 
@@ -158,7 +158,7 @@ class Member:
         frames = session.take_frames()
         while frames:
             refused = []
-            leaving = self._clock()     # nothing answers before that
+            leaving = self._clock()     # no answer comes before that
             for place, frame in enumerate(frames):
                 if not self._transmit(frame, leaving):
                     refused.append(place)
@@ -166,7 +166,7 @@ class Member:
             frames = session.take_frames()
 
     def _report(self) -> None:
-        """Report to the listener what was sent, and what happened."""
+        """Report what was sent, and what happened, to the listener."""
         session, failure = self.session, None
         if session.sent.raws is not self.told:
             self.told = session.sent.raws
@@ -177,7 +177,7 @@ class Member:
                     self.listener.handle_event(event)
                 elif not session.defect:
                     self.listener.process_data(event)
-            except Exception as error:  # noqa: BLE001  the other events are told all the same
+            except Exception as error:  # noqa: BLE001  the other events are reported all the same
                 failure = failure or error
         if failure is not None:
             self.unheard(failure)
@@ -186,9 +186,9 @@ class Member:
 
     def contain(self, error: Exception) -> None:
         """
-        Stop the drive, and those that share frames with it, because of a defect.
+        Stop the drive, and those that share frames with it, after an internal error.
 
-        :raises Exception: the error, where nobody but its user needs the drive.
+        :raises Exception: the error, where only parameter requests are served.
         """
         if self.session.serving:
             raise error
@@ -198,7 +198,7 @@ class Member:
             partner._fail(partner_failed(self.session.configuration.name, text))
 
     def unheard(self, error: Exception) -> None:
-        """Record that the listener has raised: a stop that takes its course goes on."""
+        """Handle an exception of the listener: a stop that is under way goes on."""
         if self.session.active:
             self.contain(error)
         else:
@@ -212,7 +212,7 @@ class Member:
         for step in (partial(session.fail, text, now), self._pump):
             try:
                 step()
-            except Exception:   # noqa: BLE001  more of what was told
+            except Exception:   # noqa: BLE001  more of what was reported
                 self.due = now + RETRY_AFTER
         self._give_up_at = now + session.longest_stop + STOP_MARGIN
 
@@ -226,12 +226,12 @@ class Member:
             pass
 
     def begin(self, step: Callable[[float], None], now: float) -> None:
-        """Have the session begin: what was wrong before is over."""
+        """Start the session; earlier internal errors are over."""
         self.anew_at, self._defect_told = math.inf, ''
         self.take(step, now)
 
     def begin_anew(self, now: float) -> None:
-        """Look for the drive again, as soon as its stop has run its course."""
+        """Look for the drive again, as soon as its stop is complete."""
         session = self.session
         if session.stopped:
             self.take_commands(now)     # of a drive that is lost: they move nothing

@@ -2,10 +2,10 @@
 """
 One master for each drive: a process locks drives on this host before it talks to them.
 
-A drive is known by its bus (interface, channel), its protocol and its station, whatever a
+A drive is identified by its bus (interface, channel), its protocol and its station, whatever a
 parameter file calls it. Serial ports are locked as a whole: what two processes read from one
 arrives at neither. Buses that other processes may use besides (SocketCAN) are not locked; drives
-on them that the other process does not know are nobody's business.
+on them that the other process does not know are not affected.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,15 +26,15 @@ class InUse(DriveCanError):
 
 
 class AnotherMaster(DriveCanError):
-    """Somebody else talks to one of the drives."""
+    """Another master talks to one of the drives."""
 
 
 class Ownership:
     """
-    The locks that a process has; a context manager.
+    The locks of a process; a context manager.
 
     :param buses: with all drives on each of them that it will talk to.
-    :param who: what it calls itself: ``drive_can_bridge``, ``drive_can read``.
+    :param who: its name: ``drive_can_bridge``, ``drive_can read``.
     :param advice: what to do where a bridge has a drive.
     :raises InUse: another process has one; nothing is locked then.
     """
@@ -48,13 +48,13 @@ class Ownership:
                 for name in identity.names:
                     claims[f'drive {name} {drive.protocol} {drive.station}'] = (
                         f'bus {bus.name}: drive {drive.name}')
-            if identity.port:      # behind the drives: they say more
+            if identity.port:      # after the drives: their locks are more specific
                 claims.update(dict.fromkeys(
                     identity.names, f'bus {bus.name}: the serial port {identity.port}'))
         try:
             self._locks: list[HostLock] = take(list(claims), who)
         except Held as held:
-            # which one it was is chance: the first in the caller's order says more
+            # which one failed is chance: the first in the caller's order is clearest
             for key, what in claims.items():
                 other = holder(key)
                 if other is not None:
@@ -68,7 +68,7 @@ class Ownership:
         self.release()
 
     def release(self) -> None:
-        """Let others talk to the drives. Idempotent."""
+        """Release the drives. Idempotent."""
         while self._locks:
             self._locks.pop().release()
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What an executable does first; it imports nothing that takes time.
+The first steps of an executable; imports nothing that takes time.
 
-Signals that come while a program is still being loaded wait until they are handled: as long as
-nobody does, Python answers SIGINT with a traceback. Standard streams that the starting process has
-closed (``>&-``) go to nobody: else the next file or socket that is opened would be taken for one.
+Signals that come while a program is still being loaded wait until they are handled: without a
+handler, Python answers SIGINT with a traceback. Standard streams that the starting process has
+closed (``>&-``) go to /dev/null: else the next file or socket would become one of them.
 """
 
 import io
@@ -16,13 +16,13 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 def begin() -> None:
-    """Hold signals, and see that there are all three standard streams."""
+    """Block signals, and open missing standard streams."""
     hold_signals()
     open_streams()
 
 
 def open_streams() -> None:
-    """Open to nobody what is closed of the descriptors 0, 1 and 2, and of Python's streams."""
+    """Redirect closed ones of the descriptors 0, 1 and 2, and Python's streams, to /dev/null."""
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
@@ -35,7 +35,7 @@ def open_streams() -> None:
 
 def keep_output() -> None:
     """
-    Keep standard output to what Python prints; what libraries write goes to standard error.
+    Keep standard output for Python; redirect what libraries write to standard error.
 
     Fast DDS writes its complaints to descriptor 1, amid what other programs read.
     """
@@ -45,28 +45,28 @@ def keep_output() -> None:
         open(os.dup(1), 'wb', 0 if unbuffered else -1, closefd=False), former.encoding,
         former.errors, line_buffering=bool(former.line_buffering), write_through=unbuffered)
     os.dup2(2, 1)
-    # who asks for the size of a terminal asks the other one
+    # a program that asks for the size of a terminal asks the other one
     for name in ('stdout', '__stdout__'):
         setattr(sys, name, kept)
 
 
 def look_after_outputs() -> None:
-    """Let nothing that is said raise an error: an output may be one that has no … or °."""
+    """Make unprintable characters harmless: an output may have no … or °."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
 
 
 def hold_signals() -> None:
-    """Let signals wait until :func:`let_signals_in`, in this thread and in what it starts."""
+    """Block signals until :func:`let_signals_in`, in this thread and in what it starts."""
     signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 
 
 def let_signals_in() -> None:
     """
-    Let signals have their effect, those that have waited at once.
+    Unblock signals; those that have waited take effect at once.
 
-    :raises KeyboardInterrupt: SIGINT has come, and nobody handles it otherwise.
+    :raises KeyboardInterrupt: SIGINT has come, and has no other handler.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
@@ -81,6 +81,6 @@ def leave(code: int) -> None:
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except (OSError, ValueError):  # its reader has gone
+        except (OSError, ValueError):  # its reader is gone
             pass
     os._exit(code)

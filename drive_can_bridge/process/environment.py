@@ -34,7 +34,7 @@ def prepare(domain_id: int | None) -> None:
 
 def domain_problem() -> str:
     """
-    Say why there is no such ROS domain; '' where there is one, or rcl says it.
+    Return why there is no such ROS domain; '' where there is one, or where rcl reports it.
 
     Fast DDS ends the process itself where it finds no ports, in two lines of its own.
     """
@@ -42,14 +42,14 @@ def domain_problem() -> str:
         domain = int(os.environ.get(DOMAIN_ID, ''), 0)
     except ValueError:
         return ''
-    if -1 <= domain <= DOMAIN_ID_MAX:   # rcl takes -1 for none
+    if -1 <= domain <= DOMAIN_ID_MAX:   # rcl reads -1 as none
         return ''
     return host_texts.domain_impossible.format(
         variable=DOMAIN_ID, domain=domain, most=DOMAIN_ID_MAX)
 
 
 def in_words() -> str:
-    """Say where the demo can be seen, ``ROS domain 0, on this machine only``."""
+    """Return where the demo is visible, ``ROS domain 0, on this machine only``."""
     domain = os.environ.get(DOMAIN_ID) or '0'
     reach = os.environ.get(DISCOVERY_RANGE, '').upper()
     if os.environ.get(_LOCALHOST_ONLY) == '1' or reach == 'LOCALHOST':
@@ -69,7 +69,7 @@ def export_command() -> str:
 
 
 def activate_command() -> str:
-    """Return the shell command that makes another terminal know ``drive_can``; '' if none is."""
+    """Return the shell command to find ``drive_can`` in another terminal; '' if none is needed."""
     script = Path(sys.prefix) / 'bin' / 'activate'
     return (f'source {shlex.quote(str(script))}'
             if sys.prefix != sys.base_prefix and script.is_file() else '')
@@ -77,7 +77,7 @@ def activate_command() -> str:
 
 def nobody(namespace: str | None, silent: Sequence[str] = (), waited: float = 0.0) -> str:
     """
-    Say that there is no bridge, or none that answers.
+    Return that there is no bridge, or none that answers.
 
     :param silent: those that do not answer.
     :param waited: for so many s.

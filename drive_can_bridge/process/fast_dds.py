@@ -2,12 +2,12 @@
 """
 Which profiles the Fast DDS of this process reads, and ours for it.
 
-Fast DDS 2 and 3 read another variable and another file of the working directory, and take other
-words: a file with one word of the other version is refused whole. What nobody reads is passed over
-in silence, which with TLS means that everybody gets in. Which version runs is seen in what this
+Fast DDS 2 and 3 read another variable and another file of the working directory, and use other
+words: a file with one word of the other version is refused whole. What is not read is ignored
+in silence, which with TLS means that every node gets in. Which version runs is seen in what this
 process has loaded.
 
-To be used before ``rclpy.init``, by whom rclpy has loaded its middleware for.
+To be used before ``rclpy.init``, in a process where rclpy has loaded its middleware.
 """
 
 from collections.abc import Iterator, Mapping, MutableMapping
@@ -17,7 +17,7 @@ import re
 
 #: what a process has loaded
 MAPS = Path('/proc/self/maps')
-#: who wrote a profile that protects: how ``drive_can security`` calls transport and participant
+#: the names in a profile that protects: how ``drive_can security`` calls transport and participant
 MARK = b'drive_can_tls'
 #: a profile has some thousand bytes; looked at is no more than this
 _SIZE_MAX = 1 << 20
@@ -31,9 +31,9 @@ _OTHERS = {'rmw_cyclonedds_cpp': 'Cyclone DDS', 'rmw_connextdds': 'Connext DDS',
 @dataclass(frozen=True, slots=True)
 class Release:
     """
-    What one major version reads.
+    The profile settings that one major version reads.
 
-    :ivar variable: that names a file.
+    :ivar variable: with the name of a file.
     :ivar file: that it takes from the working directory.
     :ivar shipped: our profile for it, below ``config``.
     """
@@ -53,7 +53,7 @@ RELEASES = {
 @dataclass(frozen=True, slots=True)
 class IgnoredProfiles:
     """
-    Profiles that somebody has named, and nobody reads.
+    Profiles that the user has set, and that are not read.
 
     :ivar name: the variable, or the file in the working directory.
     :ivar file: which one that is.
@@ -70,7 +70,7 @@ class IgnoredProfiles:
 @dataclass(frozen=True, slots=True)
 class Middleware:
     """
-    What this process talks through.
+    The middleware of this process.
 
     :ivar name: ``Fast DDS 2.14``.
     :ivar release: what it reads; None: nothing of this.
@@ -83,11 +83,11 @@ class Middleware:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Those that are in effect."""
+        """The variables that are in effect."""
         return self.also if self.release is None else (self.release.variable, *self.also)
 
     def ignored(self, environment: Mapping[str, str], folder: Path) -> Iterator[IgnoredProfiles]:
-        """Go through what is set, or lies in the working directory, and is not in effect."""
+        """Yield what is set, or lies in the working directory, and is not in effect."""
         read = {Path(folder, environment[name]) for name in self.variables
                 if environment.get(name)}
         for release in RELEASES.values():
@@ -103,29 +103,29 @@ class Middleware:
                                       _protects(Path(folder, release.file)))
 
     def has_profiles(self, environment: Mapping[str, str], folder: Path) -> bool:
-        """Return whether somebody has profiles of their own, which count."""
+        """Return whether the user has profiles of their own, which are in effect."""
         return self.release is not None and (
             any(environment.get(name) for name in self.variables)
             or Path(folder, self.release.file).exists())
 
     def missing(self, environment: Mapping[str, str], folder: Path) -> Iterator[tuple[str, str]]:
-        """Go through variables in effect whose file is none, and the file."""
+        """Yield variables in effect whose file is missing, and the file."""
         for name in self.variables:
             named = environment.get(name, '')
             if named and not Path(folder, named).is_file():
                 yield name, named
 
     def use(self, profiles: Path, environment: MutableMapping[str, str]) -> None:
-        """Have it read a file."""
+        """Set the profiles file for it."""
         if self.release is not None:
             environment[self.release.variable] = str(profiles)
 
 
 def running(identifier: str, maps: Path = MAPS) -> Middleware:
     """
-    Look what this process has loaded.
+    Return the middleware that this process has loaded.
 
-    :param identifier: of the middleware, as rclpy tells it.
+    :param identifier: of the middleware, from rclpy.
     """
     if 'fastrtps' not in identifier:
         return Middleware(_OTHERS.get(identifier, identifier))
@@ -135,7 +135,7 @@ def running(identifier: str, maps: Path = MAPS) -> Middleware:
         loaded = ''
     found = _LIBRARY.search(loaded)
     if found is None:
-        # nobody can say: nothing is claimed, and ours are of no use
+        # the version is unknown: nothing is claimed, and our profiles cannot be used
         return Middleware('Fast DDS', None, tuple(
             release.variable for release in RELEASES.values()))
     release = RELEASES.get(int(found[1]), RELEASES[max(RELEASES)])
@@ -151,7 +151,7 @@ def _protects(path: Path) -> bool:
 
 
 def _content(path: Path) -> bytes:
-    """Return how a file begins; nothing where there is none."""
+    """Return the beginning of a file; empty where there is none."""
     try:
         if not path.is_file():  # a pipe would be waited for
             return b''

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The end of a bridge of the local way (:mod:`.local_way`): a thread that takes what is asked.
+The bridge's end of the local way (:mod:`.local_way`): a thread that reads requests.
 
-It never waits for a caller, and hands on what was asked to whoever answers it. What a caller can
+It never waits for a caller, and passes requests on to be answered. What a caller can
 cost is limited: its time to ask, what waits to be read by it, how many there are, and the share of
 the processor's time that all of them together get.
 """
@@ -28,17 +28,17 @@ CALLERS_MAX, OF_A_STRANGER, BUSY_MAX = 300, 30, 60
 UNREAD_MAX, UNREAD_PATIENCE = 4000, 5.0
 #: s that a connection may stay without a question, and how often it is looked for those
 IDLE, _LOOK_PERIOD = 60.0, 0.25
-#: connections taken in a row; strangers that are heard between two looks at everybody
+#: connections accepted in a row; strangers that are read between two looks at everybody
 _TAKE_MAX, _STRANGERS_HEARD = 16, 4
-#: what is heard from everybody
+#: actions that every user may request
 STOPPING = ('stop', 'pass')
 
 
 class LocalRequest:
     """
-    What a caller has asked.
+    The request of a caller.
 
-    :ivar action: what it wants.
+    :ivar action: its action.
     :ivar words: the rest.
     :ivar trusted: the caller is root, or our user.
     """
@@ -51,15 +51,15 @@ class LocalRequest:
         self.trusted = trusted
 
     def answer(self, *message: str) -> None:
-        """Say something. From any thread; nobody is waited for."""
+        """Send a message. From any thread; without waiting."""
         self._caller.say(message)
 
     def end(self) -> None:
-        """Say that this was all."""
+        """End the answer."""
         self._caller.say([END], last=True)
 
     def refuse(self, text: str) -> None:
-        """Say that this is not answered here."""
+        """Answer that this is not served here."""
         self._caller.say([NO, text], last=True)
 
 
@@ -68,7 +68,7 @@ class _Caller:
     One connection.
 
     :ivar since: when it last asked, or was answered.
-    :ivar busy: what it has asked, and is being answered; '': nothing.
+    :ivar busy: the action that is being answered; '': none.
     """
 
     def __init__(self, connection: socket.socket, user: int, now: Callable[[], float],
@@ -86,12 +86,12 @@ class _Caller:
 
     @property
     def unread(self) -> bool:
-        """Something waits to be read."""
+        """Whether something waits to be read."""
         return bool(self._unread)
 
     @property
     def left(self) -> bool:
-        """It has hung up: nobody waits for an answer."""
+        """Whether the caller has hung up."""
         poll = select.poll()
         poll.register(self.socket, 0)
         return bool(poll.poll(0))
@@ -109,8 +109,8 @@ class _Caller:
             self._wake()
 
     def close(self) -> None:
-        """Hang up; nothing more is said."""
-        with self._lock:    # nobody sends to whatever has its number next
+        """Hang up; nothing more is sent."""
+        with self._lock:    # nothing is sent to the next owner of its number
             self.gone = True
             self.socket.close()
 
@@ -135,12 +135,12 @@ class _Caller:
 
 class LocalServer:
     """
-    Takes what is asked, from now on until it is stopped.
+    Serves requests until it is stopped.
 
     :param listener: bound to the name of the bridge.
-    :param serve: takes what was asked, in the thread of this; must not wait.
-    :param open_to_all: a stop is heard from every user.
-    :param report: takes a line about an exception that ``serve`` let escape.
+    :param serve: handles a request, in this thread; must not wait.
+    :param open_to_all: a stop is accepted from every user.
+    :param report: logs a line about an exception of ``serve``.
     :param prepare_thread: called first in the thread.
     :param keep_share: returns what pauses when it is time to; called after each piece of work.
     """
@@ -167,7 +167,7 @@ class LocalServer:
         self._thread.start()
 
     def stop(self) -> None:
-        """End; whoever still waits for an answer sees that there is none."""
+        """Stop; callers that still wait see that there is no answer."""
         self._ending = True
         self._ring()
         self._thread.join(5.0)
@@ -195,7 +195,7 @@ class LocalServer:
             keep()
 
     def _turn(self) -> None:
-        """Wait until somebody wants something, and see to it."""
+        """Wait for events, and handle them."""
         poll = select.poll()
         poll.register(self._bell, select.POLLIN)
         poll.register(self._listener, select.POLLIN)
@@ -244,27 +244,27 @@ class LocalServer:
             if self._may_stay(caller):
                 self._callers[connection.fileno()] = caller
                 if not self._is_strange(caller):
-                    self._hear(caller)  # who asks mostly has asked by now
+                    self._hear(caller)  # a caller mostly has asked by now
                     if caller.gone:
                         self._hang_up(caller)
             else:
                 connection.close()
 
     def _may_stay(self, caller: _Caller) -> bool:
-        """Return whether there is room for one more; those that ask nothing make it."""
+        """Return whether there is room for one more; idle callers make room."""
         if self._is_strange(caller) and (
                 not self._open_to_all or self._is_full_for(caller.user)):
             return False
         return len(self._callers) < CALLERS_MAX or self._make_room(None)
 
     def _is_full_for(self, user: int) -> bool:
-        """Return whether a stranger has all the room that there is for one."""
+        """Return whether the callers of another user have all the room they may have."""
         if sum(each.user == user for each in self._callers.values()) < OF_A_STRANGER:
             return False
         return not self._make_room(user)
 
     def _make_room(self, user: int | None) -> bool:
-        """Hang up on who has been quiet for longest, of a user; False: nobody is quiet."""
+        """Hang up on a user's caller that was idle for longest; return False: none is idle."""
         quiet = [each for each in self._callers.values()
                  if not each.busy and user in (None, each.user)]
         if not quiet:
@@ -273,7 +273,7 @@ class LocalServer:
         return True
 
     def _hear(self, caller: _Caller) -> None:
-        """Take what a caller says."""
+        """Read a caller's message."""
         try:
             for _ in range(_TAKE_MAX):
                 packet = caller.socket.recv(PACKET + 1)
@@ -298,7 +298,7 @@ class LocalServer:
             asked.refuse(host_texts.version_differs.format(version=VERSION))
         elif action not in STOPPING and not asked.trusted:
             asked.refuse(host_texts.another_user)
-        elif action not in STOPPING and caller.left:    # nothing but a stop is done too late
+        elif action not in STOPPING and caller.left:    # only a stop is still done when late
             caller.gone = True
         elif action not in STOPPING and sum(
                 bool(each.busy) and each.busy not in STOPPING
@@ -313,7 +313,7 @@ class LocalServer:
 
 
 def _patience(caller: _Caller) -> float:
-    """Return the s that a connection may stay as it is."""
+    """Return the s that a connection may stay idle."""
     if caller.unread:
         return UNREAD_PATIENCE
     if caller.busy:

@@ -16,21 +16,21 @@ from drive_can_bridge.process.local_way import (
 from drive_can_bridge.process.presence import (
     bridges, in_namespace, own_domain, Present, short, switched_on)
 
-#: s after which the way through ROS is taken, too, where a bridge has said nothing yet
+#: s after which the way through ROS is used, too, where a bridge is silent
 SOON = 0.15
 #: s that a drive may take to stop
 STOP_TIMEOUT = 10.0
-#: messages of one bridge that are taken in a row: one that never ends holds up nobody
+#: messages of one bridge that are read in a row: one that never ends delays no other
 _AT_ONCE = 1000
 
 
 class Answer(namedtuple('Answer', 'name ok text bridge domain', defaults=(False, None))):
     """
-    What became of a drive, or of a bridge.
+    The result of a drive, or of a bridge.
 
-    :ivar name: full name; or what was asked for and is nobody's.
-    :ivar ok: it did what was wanted.
-    :ivar bridge: it is one.
+    :ivar name: full name; or the word that no drive has.
+    :ivar ok: it succeeded.
+    :ivar bridge: it is a bridge.
     :ivar domain: its ROS domain, where that is not the one of this shell.
     """
 
@@ -38,7 +38,7 @@ class Answer(namedtuple('Answer', 'name ok text bridge domain', defaults=(False,
 
 
 def stop_answer(node: str, success: bool, message: str, online: bool) -> Answer:
-    """Return what became of a drive that was told to stop."""
+    """Return the result of a drive that was commanded to stop."""
     if not success:
         return Answer(node, False, message)
     said = message or 'stopped'
@@ -48,19 +48,19 @@ def stop_answer(node: str, success: bool, message: str, online: bool) -> Answer:
 
 class _Told:
     """
-    A bridge of this host.
+    A bridge of this host, with its answers to a stop.
 
-    :param question: what it is asked.
+    :param question: its request.
     :ivar line: to it; None: there is none.
     :ivar busy: it takes no calls just now.
-    :ivar name: as it says itself; '' until then.
+    :ivar name: as it answers; '' until then.
     :ivar drives: all of its drives.
     :ivar seen: the bridges that it sees.
     :ivar around: the drives that it sees in the graph.
     :ivar answers: of its drives.
     :ivar ended: these were all.
-    :ivar passed: what became of others that it has passed a stop on to; None: was not asked to.
-    :ivar said: something, since the last look.
+    :ivar passed: the results of others that it has passed a stop on to; None: was not asked to.
+    :ivar said: anything arrived since the last look.
     """
 
     def __init__(self, present: Present, question: Sequence[str]) -> None:
@@ -91,28 +91,28 @@ class _Told:
 
     @property
     def here(self) -> bool:
-        """It has said who it is, and is believed."""
+        """Whether it has answered with its name, and is trusted."""
         return bool(self.name)
 
     @property
     def failed(self) -> bool:
-        """It was to pass a stop on, and has not said what became of all of that."""
+        """Whether it was to pass a stop on, and has not answered all of that."""
         return self.passed is not None and self.line is None and not self.ended
 
     @property
     def unreached(self) -> bool:
-        """It is not known to have been asked: an older one, of another user, or it has ended."""
+        """Whether a stop may not have reached it: it is older, another user's, or has ended."""
         return not self.here and (self.line is None or not self.line.believed)
 
     @property
     def quiet(self) -> bool:
-        """It may still answer, and has not said who it is."""
+        """Whether it may still answer, and has not sent its name."""
         return not self.here and (self.busy or self.line is not None and self.line.believed)
 
     def look(self) -> None:
-        """Take what it has said."""
+        """Handle its messages."""
         line = self.line
-        # one that is not believed was asked all the same: it may be what it says
+        # one that is not trusted was asked all the same: it may be what it claims
         if line is None or not line.believed:
             return
         try:
@@ -149,14 +149,14 @@ class _Told:
             self.hang_up()
 
     def give_up(self, now: float) -> None:
-        """Hang up on one that was to pass a stop on, and has said nothing for too long."""
+        """Hang up on one that was to pass a stop on, and has been silent for too long."""
         if self.said or not self._heard_at:
             self.said, self._heard_at = False, now
         elif now - self._heard_at > PATIENCE:
             self.hang_up()
 
     def hang_up(self) -> None:
-        """Ask it nothing more."""
+        """Close the connection."""
         line, self.line = self.line, None
         if line is not None:
             line.close()
@@ -164,7 +164,7 @@ class _Told:
 
 class LocalStop:
     """
-    A stop of drives of this host; made, it has been sent.
+    A stop of drives of this host; sent when it is created.
 
     Without words and namespace it goes to all bridges of this host, else to those of one domain.
 
@@ -191,7 +191,7 @@ class LocalStop:
                     each.ask()
 
     def look(self, now: float) -> bool:
-        """Take what was said; return whether all that anybody knows of have answered."""
+        """Handle what has arrived; return whether all known bridges have answered."""
         if self._began is None:
             self._began = now - self._waited_before
         waited = now - self._began
@@ -208,7 +208,7 @@ class LocalStop:
         return self._knows_own_domain and self.over(now) and not self._left_to_ros
 
     def wait(self, timeout: float) -> bool:
-        """Wait until something is said, for so many s at most; return whether it was."""
+        """Wait until something arrives, for so many s at most; return whether it did."""
         poll = select.poll()
         for each in (*self._told, *self._passing):
             if each.line is not None and each.line.believed:
@@ -216,7 +216,7 @@ class LocalStop:
         return bool(poll.poll(1e3 * timeout))
 
     def go_on(self, waited: float) -> None:
-        """Go on by another clock: with the next look so many s will have passed."""
+        """Continue by another clock: with the next look so many s will have passed."""
         self._began, self._waited_before = None, waited
 
     def over(self, now: float) -> bool:
@@ -233,7 +233,7 @@ class LocalStop:
         return 0.0 if self._began is None else now - self._began
 
     def wants_ros(self, now: float) -> bool:
-        """Return whether there may be bridges that only ROS reaches, or that have said nothing."""
+        """Return whether there may be bridges that only ROS reaches, or that are silent."""
         own = [each for each in self._told if each.present.domain in (None, self.domain)]
         if any(each.quiet for each in own) and self._waited(now) < SOON:
             return False
@@ -242,7 +242,7 @@ class LocalStop:
 
     @property
     def _left_to_ros(self) -> bool:
-        """There is a bridge that is not reached by the local way, or a stop was not passed on."""
+        """Whether the local way does not reach a bridge, or a stop was not passed on."""
         return (any(each.unreached for each in self._told
                     if each.present.domain in (None, self.domain))
                 or any(each.failed for each in self._passing
@@ -250,11 +250,11 @@ class LocalStop:
 
     @property
     def _knows_own_domain(self) -> bool:
-        """Somebody has said which bridges there are in the domain of this shell."""
+        """Whether a bridge has listed the bridges in the domain of this shell."""
         return any(each.here and each.present.domain == self.domain for each in self._told)
 
     def _pass_on(self) -> None:
-        """Have bridges of other hosts told by one of this host that knows them."""
+        """Pass the stop on to bridges of other hosts, by bridges that know them."""
         for each in self._told:
             domain = each.present.domain
             same = [other for other in self._told if other.present.domain == domain]
@@ -272,7 +272,7 @@ class LocalStop:
                 passing.ask()
                 self._passing.append(passing)
 
-    # -- what has become of it --------------------------------------------------------------------
+    # -- results ----------------------------------------------------------------------------------
 
     @property
     def present(self) -> list[Present]:
@@ -281,31 +281,31 @@ class LocalStop:
 
     @property
     def known(self) -> dict[str, _Told]:
-        """The bridges in the domain of this shell that have said who they are, by full name."""
+        """The bridges in the domain of this shell that have sent their name, by full name."""
         return {each.name: each for each in self._told
                 if each.here and each.present.domain == self.domain}
 
     @property
     def handled(self) -> set[str]:
-        """Drives that have their stop from here, and those of which nothing is wanted."""
+        """Drives that have their stop from here, and those that are not meant."""
         return {node for each in self.known.values() for node in each.drives} | {
             answer.name for each in self._passing for answer in each.passed or ()
             if each.present.domain == self.domain and not answer.bridge}
 
     @property
     def drives(self) -> list[str]:
-        """Full names of all drives that are known in the domain of this shell."""
+        """Full names of all known drives in the domain of this shell."""
         return [node for each in (*self._told, *self._passing)
                 if each.present.domain == self.domain for node in each.drives]
 
     @property
     def unheard(self) -> list[Present]:
-        """The bridges of this host that have not said who they are, and may be meant."""
+        """The bridges of this host that have not sent their name, and may be meant."""
         return [present for present in self._silent() if self._may_be_meant(present)]
 
     @property
     def spared(self) -> set[str]:
-        """Names of those of which others know that they have no drive that is meant."""
+        """Names of silent bridges that are known to have no drive that is meant."""
         return {present.name for present in self._silent()
                 if present.domain == self.domain and not self._may_be_meant(present)}
 
@@ -318,7 +318,7 @@ class LocalStop:
                                    if node not in known], self._words)
 
     def answers(self) -> list[Answer]:
-        """Return what became of drives, and of bridges that others see."""
+        """Return the results of drives, and of bridges that others see."""
         found: list[Answer] = []
         for each in self._told:
             domain = None if each.present.domain == self.domain else each.present.domain
@@ -337,25 +337,25 @@ class LocalStop:
         return found
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connections."""
         for each in (*self._told, *self._passing):
             each.hang_up()
 
 
 class Early(namedtuple('Early', 'stop namespace words json')):
     """
-    A stop that has been sent before anything else was done.
+    A stop that was sent before anything else was done.
 
-    :ivar stop: what was sent.
+    :ivar stop: the stop.
     :ivar namespace: of the bridges that are meant; None: all.
     :ivar words: names, patterns or full names; none: all.
-    :ivar json: what becomes of it is to be told to a program.
+    :ivar json: the results are to be printed as JSON.
     """
 
     __slots__ = ()
 
 
-#: those that nobody has taken over
+#: those that were not claimed yet
 _early: list[Early] = []
 
 
@@ -409,13 +409,13 @@ def begun(namespace: str | None, words: Sequence[str]) -> LocalStop:
 
 
 def twins(name: str, number: int) -> Answer:
-    """Say that bridges cannot be told apart."""
+    """Return the result for bridges of the same name, which cannot be told apart."""
     return Answer(name, False, host_texts.bridges_hide_each_other.format(number=number),
                   bridge=True)
 
 
 def does_not_answer() -> str:
-    """Say it of a bridge."""
+    """Return the text for a bridge that does not answer."""
     return host_texts.bridge_does_not_answer
 
 
@@ -425,7 +425,7 @@ def may_match(present: Present, around: Iterable[str], words: Sequence[str]) -> 
 
     They do not where the graph shows as many drives of it as it has locks, and none is meant.
 
-    :param around: drives in the graph that are nobody else's.
+    :param around: drives in the graph of no other bridge.
     """
     if not words or not present.may_mean(words):
         return not words

@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The local way to a bridge: what is said on its socket, and the end of whoever asks.
+The local way to a bridge: the messages on its socket, and the caller's end of it.
 
 The socket is of the type SEQPACKET. A *message* is a list of texts; it travels in as many packets
-as it needs, each of at most :data:`PACKET` bytes. The first byte of a packet says whether more of
+as it needs, each of at most :data:`PACKET` bytes. The first byte of a packet shows whether more of
 its message follows; the rest are the texts in UTF-8 with a zero between two of them.
 
-What is asked begins with the version of all this, and an action; it is answered by messages, of
+A request begins with the version of this protocol, and an action; it is answered by messages, of
 which the last is ``end``:
 
 ====================================== ============================================================
@@ -19,7 +19,7 @@ asked                                  answered
 ``pass`` BRIDGE… '' NAME… '' WORD…     ``passing``, at once and again as long as it lasts;
                                        ``drives`` NAME…; ``passed`` NAME OK TEXT IS_BRIDGE for
                                        each; ``end``: a stop for bridges of other hosts, but for
-                                       drives that have theirs already
+                                       drives that are stopped already
 ``who``                                ``bridge`` …, ``drives`` …, ``end``
 ``enable``, ``disable``, ``reset``     ``drive`` NAME OK ONLINE TEXT for each; ``end``
 NAME…                                  (``unoffered`` NAME: it has no such service)
@@ -48,10 +48,10 @@ VERSION = '1'
 PACKET, ASKED_MAX = 4096, 65536
 #: s that a bridge may take to begin to answer
 PATIENCE = 1.0
-#: s after which one that passes a stop on says so again: it may take long, and does not hang
+#: s after which one that passes a stop on reports so again: it may take long, and does not hang
 PASSING_PERIOD = 0.25
 END, NO = 'end', 'no'
-#: what stands for a namespace: any
+#: stands for any namespace
 ANYWHERE = '*'
 _MORE, _LAST = b'+', b'.'
 _ZERO = '\0'
@@ -63,7 +63,7 @@ _KINDS: dict[str, Callable[[str], object]] = {
 
 
 def meant(words: Sequence[str], node: str) -> bool:
-    """Return whether words mean a drive: none means all."""
+    """Return whether words mean a drive; no words mean all."""
     return not words or any(matches(word, node) for word in words)
 
 
@@ -84,7 +84,7 @@ def is_pattern(word: str) -> bool:
 
 
 class Rubbish(Exception):
-    """What has come is no packet of this way."""
+    """A packet that is malformed."""
 
 
 def packets_of(message: Sequence[str]) -> list[bytes]:
@@ -98,7 +98,7 @@ def packets_of(message: Sequence[str]) -> list[bytes]:
 
 class Inbound:
     """
-    Puts messages together of packets.
+    Assembles messages from packets.
 
     :param limit: bytes of a message.
     """
@@ -109,9 +109,9 @@ class Inbound:
 
     def take(self, packet: bytes) -> list[str] | None:
         """
-        Take a packet; return the message that it is the end of.
+        Add a packet; return the message that it completes, None if it completes none.
 
-        :raises Rubbish: it is none.
+        :raises Rubbish: it is malformed.
         """
         if len(packet) > PACKET or packet[:1] not in (_MORE, _LAST):
             raise Rubbish
@@ -128,7 +128,7 @@ class Inbound:
 
 
 def value_text(value: object) -> str:
-    """Write a value with its type: a bool, a number, a text or a list of texts; '' for none."""
+    """Return a value as text with its type: bool, number, text, list of texts; '' for none."""
     if isinstance(value, bool):
         return f'b{value:d}'
     if isinstance(value, int):
@@ -144,9 +144,9 @@ def value_text(value: object) -> str:
 
 def value_of(text: str) -> object:
     """
-    Read what :func:`value_text` has written; None for none.
+    Return the value in a text of :func:`value_text`; None for none.
 
-    :raises Rubbish: it is nothing of the kind.
+    :raises Rubbish: it is no such text.
     """
     try:
         return _KINDS[text[0]](text[1:]) if text else None
@@ -155,13 +155,13 @@ def value_of(text: str) -> object:
 
 
 def user_of(peer: socket.socket) -> int:
-    """Return the user at the other end, as the kernel knows it since it has begun to listen."""
+    """Return the user at the other end, as the kernel recorded it when it began to listen."""
     found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS)
     return int.from_bytes(found[4:8], sys.byteorder)
 
 
 def trusted_users() -> tuple[int, int]:
-    """Return root, and the user of this process: nobody else is believed, or obeyed."""
+    """Return root, and the user of this process: no others are trusted, or obeyed."""
     return 0, os.geteuid()
 
 
@@ -169,7 +169,7 @@ class Line:
     """
     A connection to a bridge of this host.
 
-    :raises OSError: nobody listens there, or nobody takes calls now (``BlockingIOError``).
+    :raises OSError: there is no listener, or it accepts no calls now (``BlockingIOError``).
     :ivar believed: the bridge is root's, or of our user.
     """
 
@@ -186,18 +186,18 @@ class Line:
 
     def ask(self, *words: str) -> None:
         """
-        Ask.
+        Send a request.
 
-        :raises OSError: the bridge has gone, or takes nothing.
+        :raises OSError: the bridge is gone, or accepts nothing.
         """
         for packet in packets_of([VERSION, *words]):
             self.socket.send(packet)
 
     def take(self) -> list[str] | None:
         """
-        Return a message that has arrived; None: nothing has.
+        Return a message that has arrived; None: there is none.
 
-        :raises OSError: the other end has gone.
+        :raises OSError: the other end is gone.
         :raises Rubbish: it is no bridge.
         """
         while True:
@@ -212,5 +212,5 @@ class Line:
                 return message
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self.socket.close()

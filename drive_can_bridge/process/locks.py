@@ -8,7 +8,7 @@ There is no file: none that is left behind, that another user may not write, tha
 a symbolic link in the place of, or that a service with a ``/tmp`` of its own does not see. The
 names belong to the network namespace, as CAN interfaces do.
 
-Beside each lock its holder has a second name that says who it is; ``/proc/net/unix`` shows it to
+Beside each lock its holder has a second name that identifies it; ``/proc/net/unix`` shows it to
 everybody.
 """
 
@@ -25,16 +25,16 @@ from drive_can_bridge.process.presence import PREFIX, TABLE
 
 #: characters of a holder's name that have room in that of a socket
 _WHO_MAX = 40
-#: s until the new holder of a lock has also said who it is
+#: s until the new holder of a lock has also published its name
 _PATIENCE = 0.1
 
 
 class Held(Exception):
     """
-    Somebody has a lock.
+    A lock is held already.
 
     :param process: number of its process; None: not known.
-    :param who: what its holder calls itself; '' where that is not known.
+    :param who: the name of its holder; '' where that is not known.
     """
 
     def __init__(self, process: int | None, who: str) -> None:
@@ -50,12 +50,12 @@ class Held(Exception):
 
 class HostLock:
     """
-    One lock, from its making until it is released.
+    One lock, held from its creation until it is released.
 
     :param key: what is locked; the same on the whole host.
-    :param who: what the holder calls itself.
-    :raises Held: somebody has it, be it this very process.
-    :raises OSError: nobody can have any (no descriptor is left).
+    :param who: the name of the holder.
+    :raises Held: it is held, be it by this very process.
+    :raises OSError: no lock is possible (no descriptor is left).
     """
 
     def __init__(self, key: str, who: str) -> None:
@@ -71,7 +71,7 @@ class HostLock:
         words = re.sub(r'[^A-Za-z0-9_]+', '_', who)[:_WHO_MAX]
         try:
             self._bind(f'who/{digest}/{os.getpid()}/{words}')
-        except OSError:     # then nobody is told, but it is locked all the same
+        except OSError:     # then the holder is unknown, but it is locked all the same
             pass
 
     def _bind(self, name: str) -> None:
@@ -80,18 +80,18 @@ class HostLock:
         made.bind(f'\0{PREFIX}/{name}')
 
     def release(self) -> None:
-        """Let others have it. Idempotent."""
+        """Release it. Idempotent."""
         while self._sockets:
             self._sockets.pop().close()
 
 
 def take(keys: Sequence[str], who: str) -> list[HostLock]:
     """
-    Take several locks, or none.
+    Acquire several locks, or none.
 
     In the order of their keys, so that of two processes that want the same one gets all.
 
-    :raises Held: somebody has one of them.
+    :raises Held: one of them is held.
     """
     taken: list[HostLock] = []
     try:
@@ -105,7 +105,7 @@ def take(keys: Sequence[str], who: str) -> list[HostLock]:
 
 
 def holder(key: str) -> Held | None:
-    """Return who has a lock; None: nobody."""
+    """Return the holder of a lock; None: it is free."""
     try:
         HostLock(key, '').release()
     except Held as held:
@@ -114,7 +114,7 @@ def holder(key: str) -> Held | None:
 
 
 def _holder(digest: str) -> Held:
-    """Find out who has a lock."""
+    """Return the holder of a lock, as far as it can be found."""
     deadline = time.monotonic() + _PATIENCE
     wanted = re.compile(rf'@{PREFIX}/who/{digest}/(\d+)/(\w*)$', re.MULTILINE)
     while True:

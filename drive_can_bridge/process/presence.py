@@ -3,7 +3,7 @@
 Which bridges have drives on this host.
 
 Beside its locks (:mod:`.locks`) a bridge has a name in the abstract name space of Linux that says
-what it is called in the ROS graph. It goes with the process, as the locks do: whether the bridge
+which name it has in the ROS graph. It goes with the process, as the locks do: whether the bridge
 answers or not, it can be named. Behind that name it listens (:mod:`.local_server`), unless
 ``DRIVE_CAN_LOCAL`` is ``off``.
 
@@ -33,12 +33,12 @@ _ROOM, _KEPT = 70, 60
 
 
 def switched_on() -> bool:
-    """Return whether bridges listen on this host, and commands ask them there."""
+    """Return whether bridges of this host listen, and commands ask them there."""
     return os.environ.get(SWITCH, '').strip().lower() != 'off'
 
 
 def own_domain() -> int | None:
-    """Return the ROS domain of this shell; None: what it says is none."""
+    """Return the ROS domain of this shell; None: the variable has no valid one."""
     try:
         return int(os.environ.get('ROS_DOMAIN_ID') or '0', 0)
     except ValueError:
@@ -68,12 +68,12 @@ class Present(namedtuple('Present', 'process domain name locks')):
 
     @property
     def address(self) -> str:
-        """Where it listens."""
+        """The address of its socket."""
         return f'\0{PREFIX}/bridge/{self.process}/{self.domain}{self.name}'
 
     @property
     def has_place(self) -> bool:
-        """Its namespace is known."""
+        """Whether its namespace is known."""
         return bool(self.name) and '~' not in self.name
 
     def may_be_in(self, namespace: str | None) -> bool:
@@ -88,7 +88,7 @@ class Present(namedtuple('Present', 'process domain name locks')):
             not word.startswith('/') or _may_mean(word, place) for word in words)
 
     def silence(self, domain: int | None) -> str:
-        """Say that it does not answer in a ROS domain."""
+        """Return that it does not answer in a ROS domain."""
         where = f'process {self.process}'
         if self.domain not in (None, domain):
             where += f', ROS domain {self.domain}'
@@ -97,11 +97,11 @@ class Present(namedtuple('Present', 'process domain name locks')):
 
 class Presence:
     """
-    Tells others on this host that this process is a bridge, until it is withdrawn.
+    Shows other processes on this host that this one is a bridge, until it is withdrawn.
 
     :param name: full name of its node.
-    :ivar socket: not connected, and nobody listens there yet.
-    :ivar taken: somebody else has the name.
+    :ivar socket: bound, and not listening yet.
+    :ivar taken: another process has the name.
     """
 
     def __init__(self, domain: int, name: str) -> None:
@@ -109,7 +109,7 @@ class Presence:
         self.taken = False
         try:
             self.socket.bind(Present(os.getpid(), domain, short(name), 0).address)
-        except OSError:     # two by one name: told already
+        except OSError:     # two of one name: reported already
             self.taken = True
 
     def withdraw(self) -> None:
@@ -151,12 +151,12 @@ def _may_mean(word: str, place: str) -> bool:
 
 
 def _is_number(text: str) -> bool:
-    """Return whether a text may stand for a process, or a domain: anybody may write anything."""
+    """Return whether a text may be a process, or a domain: any process may write anything."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
 def short(name: str) -> str:
-    """Return a name as it is told: a very long one is cut, and still differs from others."""
+    """Return a name as it is shown: a very long one is cut, and still differs from others."""
     if len(name) <= _ROOM:
         return name
     import hashlib

@@ -13,18 +13,18 @@ from drive_can_bridge import host_texts
 #: are as long as the shortest period: a service call that is being answered would hold up a cycle
 #: by all of it.
 SHORTEST, LONGEST = 0.0001, 0.005
-#: handovers of the interpreter in the time between: who waits for it asks as often, and where
+#: handovers of the interpreter in the time between: a waiting thread asks as often, and where
 #: asking takes as long as that, threads that wait do nothing else, and with real-time priority
 #: they keep the one that has it from ever giving it back
 HANDOVERS = 10
 #: handovers that are measured, there and back
 ROUNDS = 20
 #: passes over the young objects until one over all: that keeps everybody from the interpreter for
-#: 0.3 us an object, 20 ms in a bridge that does nothing, 0.3 s where somebody waits for a thousand
+#: 0.3 us an object, 20 ms in an idle bridge, 0.3 s where a client waits for a thousand
 #: parameters of each of some drives 64 times over. It finds nothing while drives are exchanged
-#: with; who ends that looks for what has gone.
+#: with; the end of that does.
 PASSES = 1_000_000_000
-#: of the whole process: who has the interpreter, and with it the exchange, must not wait behind
+#: of the whole process: a thread with the interpreter, and so the exchange, must not wait behind
 #: other processes for long
 NICE = -10
 #: of the exchange; below the 50 of interrupt threads in a real-time kernel, which bring the frames
@@ -44,13 +44,13 @@ def be_punctual() -> None:
     gc.set_threshold(*gc.get_threshold()[:2], PASSES)
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICE)
-    except OSError:  # not allowed; raise_priority says so
+    except OSError:  # not allowed; raise_priority reports it
         pass
 
 
 def handover_time() -> float:
     """
-    Measure what it takes to hand the interpreter over to a thread that waits.
+    Measure how long it takes to pass the interpreter to a thread that waits.
 
     :return: s, the shortest seen, so that other processes do not count: some microseconds, or, on
         a slow processor, in a sandbox or an emulator, up to a millisecond.
@@ -77,12 +77,12 @@ def handover_time() -> float:
 
 def raise_priority() -> str:
     """
-    Let the calling thread run before whatever is not real-time, if the system allows it.
+    Raise the calling thread to real-time priority, if the system allows it.
 
     With the ordinary scheduler a thread that has used its share waits for up to some milliseconds
     behind others, which is a period. Threads that this one starts are ordinary again.
 
-    :return: what became of it, in words.
+    :return: the result, in words.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK,

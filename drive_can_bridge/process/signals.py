@@ -3,8 +3,8 @@
 SIGINT, SIGTERM, SIGHUP, SIGQUIT: the first asks for a safe stop, a second ends the process.
 
 SIGHUP is what a process gets whose terminal is closed, or whose ssh session breaks off: its drives
-are to stop like after any other signal. ``nohup`` still means that it is ignored. SIGQUIT is told
-by the exit code. SIGTSTP (Ctrl-Z) can be refused: a process that is suspended leaves motors
+are to stop like after any other signal. ``nohup`` still means that it is ignored. SIGQUIT shows
+in the exit code. SIGTSTP (Ctrl-Z) can be refused: a process that is suspended leaves motors
 running that it would have to stop.
 
 rclpy's own handlers shut the context down first, so that no neutral frame could follow. Python's
@@ -29,7 +29,7 @@ from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock, Mailbox
 from drive_can_bridge.process.beginning import let_signals_in, SIGNALS
 
-#: s after the first signal that the drives have to come to a stop, whatever follows. Who stops a
+#: s after the first signal that the drives have to come to a stop, whatever follows. A caller of a
 #: process group, or a service with all its processes, reaches the bridge directly and once more
 #: through the launch that started it: without this grace the second signal would end the process
 #: before its first neutral frame.
@@ -47,13 +47,13 @@ class SignalWatcher:
 
     Use as a context manager in the main thread, before other threads start.
 
-    :param clock: by which signals are one or two.
+    :param clock: tells two signals from one.
     :param keep: go on after the context: in the rest of the process's life, a first signal changes
         nothing any more, and a second still ends it.
-    :param refuse: called in a thread of the watcher when somebody wants to suspend the process
-        (Ctrl-Z), to say why that is refused, without waiting; None: it is not.
+    :param refuse: called in a thread of the watcher when the process is to be suspended
+        (Ctrl-Z), to print why that is refused, without waiting; None: it is not.
     :ivar last_steps: what is done, in this order, when a second signal ends the process. Each is
-        told by when (of the clock) it ends.
+        called with when (of the clock) it ends.
     """
 
     def __init__(self, clock: Clock, *, keep: bool = False,
@@ -90,16 +90,16 @@ class SignalWatcher:
 
     @property
     def signalled(self) -> bool:
-        """A signal has come."""
+        """Whether a signal has come."""
         return self._first != 0
 
     @property
     def interrupted(self) -> bool:
-        """The first signal comes from a keyboard: others at the terminal have got it as well."""
+        """Whether the first signal came from a keyboard: all processes at the terminal got it."""
         return self._first in (signal.SIGINT, signal.SIGQUIT)
 
     def exit_code(self, code: int) -> int:
-        """Return what the process ends with: ``code``, or 128 + n after SIGQUIT or a second."""
+        """Return the exit code: ``code``, or 128 + n after SIGQUIT or a second signal."""
         if self._second:
             return 128 + self._second
         return code or (128 + signal.SIGQUIT if self._first == signal.SIGQUIT else 0)
@@ -121,7 +121,7 @@ class SignalWatcher:
             return None
 
     def take(self, number: int) -> None:
-        """Take a signal that came now; does not return where it is a second one."""
+        """Handle a signal that came now; does not return where it is a second one."""
         now = self._clock.now()
         if number == signal.SIGTSTP and self._refuse is not None:
             _attempt(self._refuse)
@@ -143,7 +143,7 @@ class SignalWatcher:
 
 
 def _attempt(step: Callable[..., object], *arguments: float) -> None:
-    """Do something that must not end the watcher."""
+    """Call a step that must not end the watcher."""
     try:
         step(*arguments)
     except Exception:  # noqa: BLE001  signals are looked after, whatever happens
@@ -151,7 +151,7 @@ def _attempt(step: Callable[..., object], *arguments: float) -> None:
 
 
 def _ignore(*_: object) -> None:
-    """Take the place of a handler: the wake-up descriptor does the work."""
+    """Do nothing: the wake-up descriptor does the work."""
 
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -160,7 +160,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 @contextmanager
 def finish_first() -> Iterator[None]:
     """
-    Let SIGINT and SIGTERM take effect only when the step in here is complete.
+    Postpone SIGINT and SIGTERM until the step in here is complete.
 
     Nested steps are one step. In other threads than the main one nothing has to be done: signals
     are not handled there.
@@ -187,7 +187,7 @@ def finish_first() -> Iterator[None]:
 @contextmanager
 def signals_held() -> Iterator[None]:
     """
-    Have signals wait in a process that is started in here, until it lets them in.
+    Block signals in a process that is started in here, until it unblocks them.
 
     Else its interpreter answers one with a traceback, as soon as it is there.
     """
@@ -200,9 +200,9 @@ def signals_held() -> Iterator[None]:
 
 class Interruption:
     """
-    Whether somebody wants something to end.
+    Whether a signal has asked for the end.
 
-    :ivar number: of the signal; None: nobody does.
+    :ivar number: of the signal; None: none has.
     """
 
     def __init__(self) -> None:
@@ -214,17 +214,17 @@ class Interruption:
 
     @property
     def exit_code(self) -> int:
-        """What the process ends with, as a shell says it; as after Ctrl-C where nobody knows."""
+        """The exit code, as a shell shows it; as after Ctrl-C where the signal is unknown."""
         return 128 + (signal.SIGINT if self.number is None else self.number)
 
 
 @contextmanager
 def postponed(told: Callable[[], object]) -> Iterator[Interruption]:
     """
-    Only remember SIGINT, SIGTERM and SIGHUP; the work in here ends where it can.
+    Record SIGINT, SIGTERM and SIGHUP only; the work in here ends where it can.
 
-    :param told: called once, when the first signal comes. The terminal to which it may speak
-        has perhaps gone: that is what SIGHUP says.
+    :param told: called once, when the first signal comes. The terminal to which it may write
+        is perhaps gone: that is what SIGHUP means.
     """
     noted = Interruption()
 

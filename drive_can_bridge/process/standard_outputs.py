@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Standard outputs that keep nobody waiting.
+Standard outputs that never block their writers.
 
-Their reader may stop to: Ctrl-S in a terminal, an ssh that hangs, a log reader that was
+Their reader may stop reading: Ctrl-S in a terminal, an ssh that hangs, a log reader that was
 stopped. Then a write blocks. rcutils writes while it holds the interpreter, so that one line would
 stop every thread of the process, the exchange and the handling of signals included. It writes to
 standard error, or to standard output where its user says so.
@@ -10,9 +10,9 @@ standard error, or to standard output where its user says so.
 So both descriptors become pipes that never block their writers: rcutils, DDS,
 Python, libraries of adapters. One thread empties a pipe into a queue of bounded size, another one
 writes the queue to the real output, and waits as long as that takes. What does not fit is
-counted, and said as soon as somebody reads again.
+counted, and reported as soon as the output is read again.
 
-Last words: waited for until they are written, unless nobody takes them.
+The last lines are waited for until they are written, unless their reader hangs.
 """
 
 from array import array
@@ -28,7 +28,7 @@ import threading
 from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock
 
-#: s after which nobody takes what is being written
+#: s after which the reader of a write counts as hung
 PATIENCE = 2.0
 #: s between two looks
 MOMENT = 0.05
@@ -36,14 +36,14 @@ MOMENT = 0.05
 
 class Taking:
     """
-    Whether somebody takes what a thread writes; a context manager around each single write.
+    Whether the reader takes what a thread writes; a context manager around each single write.
 
-    That a thread has not begun to write says nothing: on a busy machine it has to wait for its
-    turn. A write that does not end does, unless the whole process stood still meanwhile. So the
-    time is that which somebody has seen pass.
+    That a thread has not begun to write is no sign: on a busy machine it has to wait for its
+    turn. A write that does not end is one, unless the whole process was stalled meanwhile. So the
+    time is that which a watcher has seen pass.
 
     :param now: the steady time.
-    :param patience: s after which nobody does.
+    :param patience: s after which the reader counts as hung.
     """
 
     def __init__(self, now: Callable[[], float], patience: float = PATIENCE) -> None:
@@ -59,7 +59,7 @@ class Taking:
 
     def watch(self) -> Callable[[], bool]:
         """
-        Return what, asked every :data:`MOMENT`, tells that nobody takes what is being written.
+        Return a function that, called every :data:`MOMENT`, returns whether the reader hangs.
 
         It has not been taken for so long that it never will be.
         """
@@ -79,7 +79,7 @@ class Taking:
 QUEUE_MAX = 1 << 20
 #: bytes that may be written before the emptying thread gets its turn
 PIPE_SIZE = 1 << 18
-#: bytes of one write: that somebody reads slowly is seen
+#: bytes of one write: so that slow reading is seen
 _PIECE = 4096
 
 
@@ -87,9 +87,9 @@ class Output:
     """
     Keeps descriptors of one output from blocking; use as a context manager.
 
-    Not across ``exec``: the pipe would go along, but not who empties it.
+    Not across ``exec``: the pipe would go along, but not the thread that empties it.
 
-    :param clock: says how long nobody has taken anything.
+    :param clock: measures how long nothing was read.
     :param name: of the output, in words.
     :param descriptors: all of them go where the first one does.
     """
@@ -109,7 +109,7 @@ class Output:
     def __enter__(self) -> 'Output':
         try:
             self._real = os.dup(self._descriptors[0])
-        except OSError:  # it was closed; nobody will ever wait for it
+        except OSError:  # it was closed; no thread will wait for it
             return self
         self._source, sink = os.pipe()
         try:
@@ -128,17 +128,17 @@ class Output:
         if self._real < 0:
             return
         for descriptor in self._descriptors:
-            os.dup2(self._real, descriptor)     # at last nobody can write into the pipe
+            os.dup2(self._real, descriptor)     # from here on no thread can write into the pipe
         self.flush()
 
     @property
     def is_terminal(self) -> bool:
-        """Somebody looks at it."""
+        """Whether it is a terminal."""
         return self._real >= 0 and os.isatty(self._real)
 
     def flush(self, deadline: float | None = None) -> bool:
         """
-        Wait until all is written that was, unless nobody takes it.
+        Wait until everything is written, unless the reader hangs.
 
         :param deadline: of the clock, at the latest; None: however long that takes.
         :return: False: it is not.
@@ -158,7 +158,7 @@ class Output:
         source.register(self._source, select.POLLIN)
         while not self._ending:
             source.poll()
-            # what has left the pipe is in the queue: nobody sees it in neither of them
+            # what has left the pipe is in the queue: it is always seen in one of them
             with self._changed:
                 chunk = os.read(self._source, 65536)
                 if not chunk:
@@ -192,7 +192,7 @@ class Output:
                 else:
                     return
             if not self._put(chunk):
-                lines = self._dropped       # nobody is left to be told
+                lines = self._dropped       # there is no reader
             with self._changed:
                 if lines:
                     self._dropped -= lines
@@ -201,7 +201,7 @@ class Output:
                 self._changed.notify_all()
 
     def _put(self, chunk: bytes) -> bool:
-        """Write a chunk, however long that takes; False: there is nobody to read it."""
+        """Write a chunk, however long that takes; return False: the reader is gone."""
         while chunk:
             with self._taking:
                 try:

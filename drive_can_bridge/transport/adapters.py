@@ -2,7 +2,7 @@
 """
 What python-can knows about its adapters, without opening one.
 
-Used by the configuration check: an interface that does not exist or lacks its driver never will
+Used by the configuration check: an interface that does not exist or lacks its driver will never
 work, and a key that the adapter's class does not name is probably misspelt. Most classes swallow
 unknown keywords silently.
 """
@@ -34,7 +34,7 @@ def adapter_keywords(interface: str) -> set[str] | None:
     """
     Return the keyword arguments that an adapter's class, or one it inherits from, names.
 
-    :return: None where the class cannot be imported: nothing can be said then.
+    :return: None where the class cannot be imported: then nothing is known.
     """
     try:
         adapter = _adapter_class(interface)
@@ -54,7 +54,7 @@ def adapter_keywords(interface: str) -> set[str] | None:
 
 
 def missing_keywords(interface: str, given: Container[str]) -> list[str]:
-    """Return the keys without which an adapter's class cannot be made."""
+    """Return the required keys of an adapter's class that are missing."""
     try:
         parameters = inspect.signature(_adapter_class(interface)).parameters.values()
     except (_Unusable, TypeError, ValueError):
@@ -65,7 +65,7 @@ def missing_keywords(interface: str, given: Container[str]) -> list[str]:
 
 
 def check_interface(interface: str) -> Sentence | None:
-    """Say why an interface can never be used on this machine; None: it may."""
+    """Return why an interface can never be used on this machine; None: it may."""
     known = sorted(can.interfaces.BACKENDS)
     if interface not in can.interfaces.BACKENDS:
         if re.fullmatch(r'v?s?l?can[0-9]+', interface):
@@ -90,7 +90,7 @@ def check_interface(interface: str) -> Sentence | None:
 
 
 def check_channel(interface: str, channel: str | int) -> Sentence | None:
-    """Say why a channel can be no channel of an interface; None: it may."""
+    """Return why a channel is impossible for an interface; None: it may be possible."""
     if interface not in SERIAL_INTERFACES:
         return None
     text = str(channel)
@@ -101,10 +101,10 @@ def check_channel(interface: str, channel: str | int) -> Sentence | None:
 
 def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
     """
-    Say why an adapter cannot be set to a bit rate; None: it may be possible.
+    Return why an adapter cannot be set to a bit rate; None: it may be possible.
 
-    Known for adapters whose class has a closed table of bit rates (slcan). The others tell when
-    they are opened.
+    Known for adapters whose class has a closed table of bit rates (slcan). The others report it
+    when they are opened.
     """
     try:
         rates = getattr(_adapter_class(interface), '_BITRATES', None)
@@ -118,7 +118,7 @@ def check_bitrate(interface: str, bitrate: int) -> Sentence | None:
 
 
 def check_name(interface: str, name: str) -> Sentence | None:
-    """Say why an adapter of this name cannot be meant; None: it can."""
+    """Return why the name of an adapter is wrong; None: it is not."""
     row = BY_NAME.get(name)
     if row is None:
         fitting = [each.name for each in BY_NAME.values() if each.interface == interface]
@@ -141,7 +141,7 @@ def serial_port(bus: BusConfiguration) -> tuple[str, ...]:
 
 def detected(interface: str) -> list[Mapping[str, Any]]:
     """
-    Return what an interface finds of its devices on this host, as python-can describes it.
+    Return the devices that an interface finds on this host, as python-can describes them.
 
     :raises Exception: whatever its library throws.
     """
@@ -152,7 +152,7 @@ def detected(interface: str) -> list[Mapping[str, Any]]:
 
 
 class _Unusable(Exception):
-    """The class of an adapter cannot be had."""
+    """The class of an adapter cannot be imported."""
 
 
 def _adapter_class(interface: str) -> type[Any]:

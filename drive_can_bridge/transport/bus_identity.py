@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Which buses are the same one, as far as that can be told without opening them; locks of ports.
+Which buses are the same one, as far as that shows without opening them; locks of ports.
 
-A serial port has many names: the device, the links of udev below ``/dev/serial``, links of one's
-own. They are the same port when the device is the same. While there is no device (an adapter that
-is not plugged in), the name has to do.
+A serial port has many names: the device, the links of udev below ``/dev/serial``, links made by
+users. They are the same port when the device is the same. While there is no device (an adapter
+that is not plugged in), the name has to do.
 """
 
 from array import array
@@ -23,12 +23,12 @@ from drive_can_bridge.core.errors import BusUnavailable
 
 #: interfaces of python-can whose channel is a serial port
 SERIAL_INTERFACES = frozenset(('slcan', 'robotell', 'serial', 'seeedstudio'))
-#: options without which a channel does not say which bus is meant
+#: options that are needed to know which bus is meant
 _DISTINGUISHING = ('host', 'port', 'unique_hardware_id', 'serial', 'device_id')
 #: major device numbers of pseudo-terminals
 PSEUDO_TERMINALS = range(136, 144)
 _FLEETING = '/dev/pts/'
-#: Python's termios has no name for it; where the number is another one, nobody is asked
+#: Python's termios has no name for it; where the number is another one, nothing is requested
 _TIOCGEXCL = 0x80045440
 _LOCKS = Path('/proc/locks')
 
@@ -47,7 +47,7 @@ class BusIdentity(NamedTuple):
 
 
 def identity_of(bus: BusConfiguration) -> BusIdentity:
-    """Say which bus is meant."""
+    """Return the identity of a bus."""
     channel = str(bus.channel)
     if bus.interface in SERIAL_INTERFACES:
         return BusIdentity(_port_names(channel, device_of(bus)), channel)
@@ -72,7 +72,7 @@ def adapter_of(bus: BusConfiguration) -> str:
 
 
 def is_absent(bus: BusConfiguration) -> bool:
-    """Return whether the adapter of a bus is not there, as far as that can be seen."""
+    """Return whether the adapter of a bus is absent, as far as that can be seen."""
     device = device_of(bus)
     if device is not None:
         return not os.path.exists(device)
@@ -104,20 +104,21 @@ def _port_names(channel: str, path: str | None) -> tuple[str, ...]:
 
 class DeviceLock:
     """
-    The lock of one serial device, from its making until it is released.
+    The lock of one serial device, held from its creation until it is released.
 
     Two containers may share a serial port, by one device node or by two. ``flock`` is of the
     node, so it does not meet where there are two; TIOCEXCL is of the device, but root opens it
-    all the same: that is why it is asked for. On a pseudo-terminal TIOCEXCL would outlive its
+    all the same: so its state is read. On a pseudo-terminal TIOCEXCL would outlive its
     process, and keep out the process that starts next: there ``flock`` has to do.
 
-    The device is asked before python-can opens it, which sets its speed and throws away what has
+    Its state is read before python-can opens it, which sets its speed and discards what has
     arrived; an SLCAN adapter's first bytes would end the exchange of the process that has it.
 
     What is no terminal, or cannot be opened, is not locked: the adapter says what is wrong.
 
     :param path: of the device.
-    :param exclusive: keep others from opening it, too; None: unless it is a pseudo-terminal.
+    :param exclusive: keep other processes from opening it, too; None: unless it is a
+        pseudo-terminal.
     :raises BusUnavailable: another process has it (``taken``).
     """
 
@@ -144,16 +145,16 @@ class DeviceLock:
             raise BusUnavailable(bus_sentences.port_in_use(holder=holder), taken=True) from None
 
     def keep_out(self) -> None:
-        """Let nobody open the device any more; a process that has it open keeps it."""
+        """Keep other processes from opening the device; one that has it open keeps it."""
         if self._exclusive:
             fcntl.ioctl(self._descriptor, termios.TIOCEXCL)
 
     def release(self) -> None:
-        """Let others have it. Idempotent, never raises."""
+        """Release the device. Idempotent, never raises."""
         if self._exclusive:
             try:
                 fcntl.ioctl(self._descriptor, termios.TIOCNXCL)
-            except OSError:  # the device has gone
+            except OSError:  # the device is gone
                 pass
         self._close()
 
@@ -172,7 +173,7 @@ class DeviceLock:
 
 
 def _holder(path: str) -> str:
-    """Say who has the lock of a file, where the kernel tells."""
+    """Return which process has the lock of a file, where the kernel shows it."""
     try:
         node = os.stat(path)
         name = f'{os.major(node.st_dev):02x}:{os.minor(node.st_dev):02x}:{node.st_ino}'

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Whether an adapter hands back what it was handed to send.
+Whether an adapter returns the frames that it sends.
 
-Some firmware and gateways do. One frame says nothing: another master may send the same. So it is
-decided for the whole bus, by many frames, anew after each opening.
+Some firmware and gateways do. One frame is no proof: another master may send the same. So it is
+decided for the whole bus, by many frames, again after each opening.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ _PATIENCE = 1.0
 
 
 class EchoVerdict(Enum):
-    """What is known."""
+    """What is known of an adapter's echoes."""
 
     OPEN = 'open'
     ECHOES = 'echoes'
@@ -59,13 +59,13 @@ class Echo:
             self._sent.append(_Sent(self._now(), frame))
 
     def not_sent(self) -> None:
-        """Take the last one back: it was refused."""
+        """Forget the last frame: it was refused."""
         with self._lock:
             if self._sent:
                 self._sent.pop()
 
     def is_echo(self, frame: Frame) -> bool:
-        """Return whether a frame that has arrived is nobody's, because it is one of ours."""
+        """Return whether a frame that has arrived is an echo of a sent one."""
         with self._lock:
             self._look(self._now())
             if self.verdict is EchoVerdict.SILENT:
@@ -88,7 +88,7 @@ class Echo:
             return True
 
     def _look(self, now: float) -> None:
-        """Judge what does not come back any more."""
+        """Drop frames whose echo is overdue, and count them as not returned."""
         patience = WITHIN if self.verdict is EchoVerdict.OPEN else _PATIENCE
         while self._sent and now - self._sent[0].at > patience:
             came = self._sent.popleft().came

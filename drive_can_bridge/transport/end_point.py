@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What a link needs of an open bus."""
+"""The interface of an open bus, as a link uses it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -12,12 +12,12 @@ from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
 class Counts(NamedTuple):
     """
-    What went wrong on a bus, as far as its adapter tells. Can be added and subtracted.
+    The counts of a bus's errors, as far as its adapter reports them. Can be added and subtracted.
 
     :param error_frames: seen.
     :param bus_off: how often the controller went bus-off.
-    :param overflowed: received frames that were lost because nobody fetched them in time.
-    :param refused: frames that the adapter refused after it had been handed them.
+    :param overflowed: received frames that were lost because they were not fetched in time.
+    :param refused: frames that the adapter refused after it had accepted them.
     """
 
     error_frames: int = 0
@@ -40,13 +40,14 @@ class EndPoint(ABC):
 
     :ivar age: s between the reception of the last received frame and the return of ``receive``.
     :ivar punctual: ``receive`` ends when its time-out does, to well below a millisecond.
-    :ivar host_stamps: what a witness sees is stamped by this machine, when it arrived.
+    :ivar host_stamps: what a witness gets is stamped by this machine, when it arrived.
     :ivar error_frames: error frames seen.
     :ivar last_error: the last of them that asks for something to be done; None: there was none.
-    :ivar controller: state of the controller as far as it tells, '' while all is well.
+    :ivar controller: state of the controller as far as it is reported, '' while all is well.
     :ivar rejected_frames: what arrived and is of no use.
-    :ivar tell: takes what people should know of it, once each; None: nobody does.
-    :ivar error_witness: sees the identifier and data of every error frame; None: nobody does.
+    :ivar tell: logs what people should know of it, once each; None: not logged.
+    :ivar error_witness: called with the identifier and data of every error frame; None: not
+        called.
     """
 
     def __init__(self) -> None:
@@ -74,7 +75,7 @@ class EndPoint(ABC):
     @abstractmethod
     def send(self, frame: Frame, timeout: float) -> None:
         """
-        Hand a frame to the adapter.
+        Pass a frame to the adapter.
 
         :param timeout: s to wait for room in the adapter's queue.
         :raises TransportError: this frame was not sent, but the bus is still there (queue full).
@@ -87,10 +88,10 @@ class EndPoint(ABC):
 
     @property
     def has_room(self) -> bool | None:
-        """A frame could be sent now; None: this adapter does not tell."""
+        """Whether a frame could be sent now; None: this adapter does not report it."""
         return None
 
     @property
     def counts(self) -> Counts:
-        """What has been counted since it was opened."""
+        """The counts since it was opened."""
         return Counts(self.error_frames, self.bus_off_count)

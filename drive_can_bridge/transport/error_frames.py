@@ -2,8 +2,8 @@
 """
 Error frames of SocketCAN in words.
 
-An error frame is no frame of the bus: the driver of a CAN controller makes it to tell what went
-wrong. Its identifier says which classes of errors there are, its eight data bytes the details
+An error frame is no frame of the bus: the driver of a CAN controller makes it to report what went
+wrong. Its identifier holds the classes of errors, its eight data bytes the details
 (linux/can/error.h):
 
 ==== =============================================================
@@ -75,7 +75,7 @@ _WIRES = {
     0x70: 'CAN_L shorted to ground', 0x80: 'CAN_L shorted to CAN_H',
 }
 
-#: what to do when nobody acknowledges
+#: advice where no other node acknowledges
 ADVICE_ALONE = bus_sentences.nobody_acknowledges()
 ADVICE_DISTURBED = bus_sentences.bus_is_disturbed()
 ADVICE_OVERFLOW = bus_sentences.frames_were_lost()
@@ -83,10 +83,10 @@ ADVICE_OVERFLOW = bus_sentences.frames_were_lost()
 
 class BusError(NamedTuple):
     """
-    What an error frame says.
+    The meaning of an error frame.
 
     :param text: all of it in words.
-    :param state: of the controller from now on; None: nothing is said about it.
+    :param state: of the controller from now on; None: not in the frame.
     :param advice: what to look at; '' when there is nothing to do.
     """
 
@@ -97,7 +97,7 @@ class BusError(NamedTuple):
 
 def decode_error_frame(classes: int, data: bytes) -> BusError:
     """
-    Put an error frame into words. Never raises.
+    Return an error frame in words. Never raises.
 
     :param classes: the error classes, the identifier of the frame.
     :param data: its data bytes; missing ones count as 0.
@@ -144,7 +144,7 @@ def decode_error_frame(classes: int, data: bytes) -> BusError:
 def protocol_error(kind: int, place: int, *, sending: bool,
                    counters: tuple[int, int]) -> tuple[int, bytes]:
     """
-    Return classes and data of an error frame that tells of a violated protocol.
+    Return classes and data of an error frame for a violated protocol.
 
     :param kind: 1 bit error, 2 form error, 4 stuff error; anything else is none of them.
     :param place: where in the frame, as the SJA1000 numbers it (and linux/can/error.h).
@@ -171,7 +171,7 @@ def _controller(byte: int) -> tuple[list[str], str | None, str]:
         receiving = byte & (_RECEIVE_PASSIVE if state == ERROR_PASSIVE else _RECEIVE_WARNING)
         sides = ' and '.join(['sending'] * bool(sending) + ['receiving'] * bool(receiving))
         texts.append(f'{state} ({sides})')
-        # who sends with nobody there to acknowledge counts errors of sending only
+        # a sender without another node to acknowledge counts errors of sending only
         advice = ADVICE_ALONE if sending and not receiving else ADVICE_DISTURBED
     if byte & _RECEIVE_OVERFLOW:
         texts.append('receive overflow of the controller')
@@ -196,6 +196,6 @@ def _violation(kind: int, place: int) -> str:
 
 
 def _transceiver(byte: int) -> str:
-    # one half for each wire; 80h is a fault of both and says so alone
+    # one half for each wire; 80h is a fault of both by itself
     texts = [_WIRES[part] for part in (byte & 0x0F, byte & 0xF0) if part in _WIRES]
     return ' and '.join(texts) or 'transceiver fault'

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What python-can's adapters throw, and what it means.
+What python-can's adapters raise, and what it means.
 
 They fail in many ways: NameError, NotImplementedError, OSError, ValueError, CanError and its
-children, whatever a vendor's library throws.
+children, whatever a vendor's library raises.
 """
 
 import errno
@@ -29,21 +29,21 @@ def in_words(error: BaseException) -> str:
 
 
 def with_cause(error: BaseException) -> str:
-    """Return what an adapter says, with the reason that it may keep to itself."""
+    """Return an adapter's message, with the cause that it may leave out."""
     text, cause = in_words(error), error.__cause__
     reason = in_words(cause) if cause is not None else ''
     return text if reason in text else around(text, behind=f': {reason}')
 
 
 def with_outlook(reason: str, period: float) -> str:
-    """Add to the reason why a bus is down what becomes of it."""
+    """Return why a bus is down, with what happens next."""
     if isinstance(reason, Sentence) and reason.kind is BusLoss.UNPLUGGED:
         return bus_sentences.down_until_back(reason=reason)
     return bus_sentences.down_and_tried(reason=reason, period=period)
 
 
 def is_malformed(error: BaseException) -> bool:
-    """Return whether what came was no frame: python-can reads packets without looking."""
+    """Return whether an exception means a malformed packet: python-can reads them unchecked."""
     return (isinstance(error, _CONTENT) or isinstance(error.__cause__, _CONTENT)
             # of python-can's ``serial``, which has no class for it
             or error.__cause__ is None and 'invalid delimiter' in str(error))
@@ -69,7 +69,7 @@ def is_undefined(error: BaseException) -> bool:
 
 
 def _is_missing_library(error: OSError) -> bool:
-    """Return whether a vendor's library is not installed: told in words, not by the kernel."""
+    """Return whether a vendor's library is not installed: the error has words, and no errno."""
     text = str(error).lower()
     return error.errno is None and any(words in text for words in (
         'library not found', 'cannot open shared object file', 'could not find module'))

@@ -12,7 +12,7 @@ class ForeignClock:
     """
     The clock of an adapter, or of the computer behind a gateway.
 
-    When it began is not known, and it drifts. The frame that took least from stamp to arrival in
+    Its start is not known, and it drifts. The frame that took least from stamp to arrival in
     the last 10 s counts as one that took no time: of the others it is known how much longer they
     took, which is how old they are.
     """

@@ -28,7 +28,7 @@ PATIENCE = 5.0
 NOT_ASKED = frozenset((
     'socketcan', 'serial', 'slcan', 'seeedstudio', 'robotell', 'virtual', 'udp_multicast',
     'cantact'))
-#: keys that say which of several devices is meant
+#: keys that select one of several devices
 _WHICH = ('host', 'port', 'serial', 'unique_hardware_id', 'app_name', 'device', 'index')
 #: a timer that no period of ours minds, in s
 _SHORT = 0.002
@@ -37,7 +37,7 @@ _SHORT = 0.002
 @dataclass(frozen=True)
 class FoundAdapter:
     """
-    An adapter.
+    An adapter that was found.
 
     :param what: it is, in words.
     :param options: further keys of the file.
@@ -60,7 +60,7 @@ class FoundAdapter:
 
 
 def of_host() -> Iterator[FoundAdapter]:
-    """Yield what the kernel has: CAN interfaces, and serial ports."""
+    """Yield the kernel's adapters: CAN interfaces, and serial ports."""
     for each in kernel_interfaces():
         yield _of_kernel(each)
     for port in serial_ports():
@@ -99,7 +99,7 @@ def _of_port(port: str) -> FoundAdapter:
 
 def ask_libraries(clock: Clock, interfaces: Callable[[], Any] = lambda: can.interfaces.BACKENDS,
                   ) -> tuple[list[FoundAdapter], list[str]]:
-    """Return what libraries of makers find, and the interfaces whose library has not come back."""
+    """Return what vendors' libraries find, and the interfaces whose library has not returned."""
     answers: dict[str, list[FoundAdapter] | None] = {}
     asked, workers = [], []
     for name in sorted(set(interfaces()) - NOT_ASKED):

@@ -3,9 +3,9 @@
 A CAN bus behind socketcand, in place of python-can's class.
 
 That one (4.3.1 to 4.6.1) tries to connect for ten seconds without a pause, and logs each attempt;
-waits for the first words of a gateway without a limit; sends without a limit, too; takes a
+waits for the first message of a gateway without a limit; sends without a limit, too; takes a
 connection that was closed for one on which nothing comes; and keeps a message that it cannot read,
-and fails at it again whenever it is asked.
+and fails at it again at every call.
 """
 
 from collections import deque
@@ -21,7 +21,7 @@ from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.text import printable
 from drive_can_bridge.transport.serial_writer import Below, SerialWriter
 
-#: s that it may take to connect, with all that the gateway has to say first
+#: s that it may take to connect, greetings of the gateway included
 OPEN_TIMEOUT = 2.0
 #: bytes of messages that may wait here: as for a terminal, nothing old is to pile up
 _QUEUE = 4096
@@ -31,11 +31,11 @@ _CHUNK = 65536
 
 
 class GatewayError(OSError):
-    """What is wrong with a gateway, in words."""
+    """An error of a gateway, in words."""
 
 
 class _Connection:
-    """What a :class:`.SerialWriter` and a port need of the connection: that of a terminal."""
+    """The connection as a terminal, for a :class:`.SerialWriter` and a port."""
 
     def __init__(self, connected: socket.socket) -> None:
         self.socket = connected
@@ -47,7 +47,7 @@ class _Connection:
         return self.socket.fileno() if self.socket.fileno() >= 0 else None
 
     def reset_output_buffer(self) -> None:
-        """Let nothing leave any more of what waits here when it is closed."""
+        """Discard what still waits here when the connection is closed."""
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b'\1\0\0\0\0\0\0\0')
 
     def close(self) -> None:
@@ -141,7 +141,7 @@ class Gateway(can.BusABC):
         return data
 
     def take_message(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        """Wait for a message. python-can's name for it is below."""
+        """Wait for a message. python-can's name for this is below."""
         if not self._messages:
             if not select.select([self.socket], [], [], timeout)[0]:
                 return None, False
@@ -173,7 +173,7 @@ class Gateway(can.BusABC):
 
 
 def _message_of(text: bytes) -> 'can.Message | ValueError':
-    """Return a message of raw mode: ``< frame 123 1700000000.123456 0F00``, or what is wrong."""
+    """Return a message of raw mode, ``< frame 123 1700000000.123456 0F00``, or its fault."""
     try:
         mark, kind, identifier, stamp, *data = text.decode('ascii').split()
         if mark != '<' or kind not in ('frame', 'error') or len(''.join(data)) > 16:
@@ -181,7 +181,7 @@ def _message_of(text: bytes) -> 'can.Message | ValueError':
         return can.Message(
             timestamp=float(stamp), arbitration_id=int(identifier, 16),
             is_extended_id=len(identifier) != 3, is_error_frame=kind == 'error',
-            # of an error, socketcand says no more than its classes
+            # of an error, socketcand passes on its classes only
             data=bytes(8) if kind == 'error' else bytes.fromhex(''.join(data)))
     except ValueError as error:
         return ValueError(f'{text!r}: {error}')

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-CAN interfaces of the kernel, as it tells by netlink: state, bit rate, driver.
+CAN interfaces of the kernel, as netlink shows them: state, bit rate, driver.
 
-Anybody may ask, and nothing is opened. What ``ip -details link show type can`` shows, without
+Every user may ask, and nothing is opened. What ``ip -details link show type can`` shows, without
 ``ip``.
 """
 
@@ -26,7 +26,7 @@ _HEAD, _LINK, _ATTRIBUTE = struct.Struct('=IHHII'), struct.Struct('=BxHiII'), st
 _STATES = ('error-active', 'error-warning', 'error-passive', 'bus-off', 'stopped', 'sleeping')
 #: s for an answer of the kernel, and bytes of one
 _PATIENCE, _ANSWER = 2.0, 65536
-#: bits that say how the content of an attribute is to be read
+#: bits that define how the content of an attribute is to be read
 _TYPE = 0x3FFF
 
 
@@ -55,7 +55,7 @@ class KernelInterface(NamedTuple):
 
 
 def kernel_interfaces() -> list[KernelInterface]:
-    """Return the CAN interfaces of this network namespace; none where the kernel does not tell."""
+    """Return the CAN interfaces of this network namespace; none without netlink."""
     try:
         with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as asked:
             asked.settimeout(_PATIENCE)
@@ -72,7 +72,7 @@ def kernel_interfaces() -> list[KernelInterface]:
 
 
 def kernel_interface(name: str) -> KernelInterface | None:
-    """Return the CAN interface of this name; None: there is none, or nobody knows."""
+    """Return the CAN interface of this name; None: there is none, or it is unknown."""
     return next((each for each in kernel_interfaces() if each.name == name), None)
 
 
@@ -103,7 +103,7 @@ def has_can() -> bool:
 
 def why_lost(name: str, index: int) -> str:
     """
-    Say what has become of an interface that does not work; '': nothing that can be seen.
+    Return why an interface does not work; '': nothing can be seen.
 
     :param index: its number when it worked; 0: it never has.
     """

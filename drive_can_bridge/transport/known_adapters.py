@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-CAN adapters that people own: a row for each, of which docs/adapters.md and ``validate`` are made.
+CAN adapters that people own: the rows from which docs/adapters.md and ``validate`` are made.
 
 ``python -m drive_can_bridge.cli.adapters`` writes the page in a checkout; a test compares it.
 """
@@ -27,7 +27,7 @@ class Row:
     """
     One adapter, or one interface of python-can.
 
-    :param name: what the key ``adapter`` of a bus calls it.
+    :param name: its name in the key ``adapter`` of a bus.
     :param title: what people call it.
     :param interface: of python-can.
     :param channel: an example.
@@ -38,7 +38,7 @@ class Row:
     :param usb: how the USB device begins to name itself: number, then product.
     :param uart: a real serial line is behind the port, whose speed counts.
     :param line_bits: bits on that line for each bit on the bus.
-    :param latency: s that it may keep what it has received, whatever the host says.
+    :param latency: s that it may keep what it has received, whatever the host shows.
     :param listen_only: what makes it listen only.
     :param drops: what it never sends.
     :param module: of Python, as pip calls it, without which there is no such interface.
@@ -70,7 +70,7 @@ class Row:
 
     @property
     def lines(self) -> str:
-        """What stands in the parameter file, in one line."""
+        """Its keys in a parameter file, in one line."""
         keys = {'interface': self.interface, 'channel': self.channel, **dict(self.options)}
         return ', '.join(f'{key}: {value}' for key, value in keys.items())
 
@@ -228,7 +228,7 @@ ROWS: tuple[Row, ...] = (
         'by the source of python-can-wuensche 1.0.0', module='python-can-wuensche'),
 )
 
-#: interfaces of python-can without a row -> why nobody on Linux has one
+#: interfaces of python-can without a row -> why they cannot be used on Linux
 NOT_ON_LINUX = {
     'etas': 'its library is for Windows',
     'iscan': 'its library is for Windows',
@@ -237,12 +237,12 @@ NOT_ON_LINUX = {
 
 BY_NAME = {row.name: row for row in ROWS}
 _DEFAULT_RATES = {'seeedstudio': 2_000_000}
-#: keys that say how fast a serial line is
+#: keys with the speed of a serial line
 _RATE_KEYS = ('tty_baudrate', 'ttyBaudrate', 'baudrate')
 
 
 def row_of(bus: BusConfiguration) -> Row | None:
-    """Return the row of the adapter of a bus: as the file says, else as USB or interface show."""
+    """Return the row of the adapter of a bus: by the file, else by USB or interface."""
     if bus.adapter:
         return BY_NAME.get(bus.adapter)
     device = device_of(bus)
@@ -264,7 +264,7 @@ def row_of_port(path: str) -> Row | None:
 
 
 def what_helps(interface: str) -> str:
-    """Say what makes an interface usable whose driver is missing; '': nothing is known."""
+    """Return what makes an interface usable whose driver is missing; '': nothing is known."""
     return next((row.helps for row in ROWS if row.interface == interface), '')
 
 

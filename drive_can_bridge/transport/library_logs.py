@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What python-can and other libraries log: lines of ours, and never more than can be read."""
+"""The logs of python-can and other libraries, as limited lines of our own log."""
 
 from collections.abc import Callable
 import logging
@@ -13,11 +13,11 @@ LINES_MAX = 100
 
 class LibraryLogs(logging.Handler):
     """
-    Takes what libraries log, from :meth:`install` on.
+    Handles what libraries log, from :meth:`install` on.
 
-    Where nobody does, Python writes it to standard error, as it is and as often as it comes.
+    Without a handler, Python writes it to standard error, as it is and as often as it comes.
 
-    :param say: takes a topic, the same for all lines of one place, and a line.
+    :param say: logs a line under a topic, which is the same for all lines of one place.
     :param now: the steady time.
     """
 
@@ -29,21 +29,21 @@ class LibraryLogs(logging.Handler):
         self._count = 0
 
     def install(self) -> None:
-        """Take it in place of who did before."""
+        """Install this handler in place of an earlier one."""
         self.take_away()
         logging.getLogger().addHandler(self)
         logging.captureWarnings(True)
 
     @staticmethod
     def take_away() -> None:
-        """Let nobody take it any more."""
+        """Remove the handler."""
         root = logging.getLogger()
         for handler in [each for each in root.handlers if isinstance(each, LibraryLogs)]:
             root.removeHandler(handler)
         logging.captureWarnings(False)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a line. From any thread; the lock of this handler is held."""
+        """Handle a line. From any thread; the lock of this handler is held."""
         now = self._now()
         if now - self._since >= 1.0:
             left_out, self._count, self._since = self._count - LINES_MAX, 0, now
@@ -54,7 +54,7 @@ class LibraryLogs(logging.Handler):
             return
         try:
             text = record.getMessage()
-        except Exception:   # noqa: BLE001  whatever it wanted to say, it must not fail by that
+        except Exception:   # noqa: BLE001  whatever the line was, it must not fail by that
             text = str(record.msg)
         self._say(f'{record.name} {record.lineno}', f'{record.name}: {printable(text)}')
 
@@ -74,7 +74,7 @@ class Few:
         self._told: dict[str, int] = {}
 
     def say(self, topic: str, line: str) -> None:
-        """Take a line."""
+        """Write a line, if it is among the first of its topic."""
         told = self._told[topic] = self._told.get(topic, 0) + 1
         if told < self.MOST:
             self._write(line)

@@ -4,17 +4,17 @@ The link to one bus: opened, read by a thread of its own, reopened when lost.
 
 The reader thread is the only one that reads and closes the port, so that none of it ever happens
 with a lock held. The thread that holds the exchange's lock sends. Each attempt to open it has a
-thread of its own, because a library may not give it back: that is told, no other is made before,
-nobody waits for it at the end, and what it opens after that is closed.
+thread of its own, because a library may not return: that is reported, no other is made before,
+the end does not wait for it, and what it opens after that is closed.
 
-A bus on which nothing leaves any more (no other node acknowledges, the transmit queue is full) is
-*blocked*: the exchange is told that it is down, and nothing more is put into the queue. Where the
+A bus that sends nothing any more (no other node acknowledges, the transmit queue is full) is
+*blocked*: it is reported as down, and nothing more is put into the queue. Where the
 queue can be looked at, the port stays open, so that what waits in it goes on counting, and the bus
-is back when there is room again; other adapters are closed and opened anew, which empties them.
-Both happen every ``reconnect_period``. While it is not known yet that somebody is there again, the
+is back when there is room again; other adapters are closed and opened again, which empties them.
+Both happen every ``reconnect_period``. While no other node has shown up again, the
 first frame without room blocks the bus at once.
 
-An adapter whose other end has gone may well open once more, and fail when it is read. So a bus
+An adapter whose other end is gone may well open once more, and fail when it is read. So a bus
 counts as open only after its first read.
 """
 
@@ -36,41 +36,41 @@ from drive_can_bridge.transport.whereabouts import Whereabouts
 
 #: s that a receive may block: how soon a stop, or a loss seen by a sender, is noticed
 RECEIVE_TIMEOUT = 0.02
-#: send time-outs, and s, that nothing may leave until the bus counts as blocked
+#: send time-outs, and s, in which nothing leaves, until the bus counts as blocked
 BLOCKED_TIMEOUTS = 4
 BLOCKED_AFTER = 0.05
 #: looks, and s between them, at the name of a device that has failed
 _GOING, _MOMENT = 10, 0.01
-#: s after which an attempt to open that has not come back is told
+#: s after which an attempt to open that has not returned is reported
 OPEN_TIMEOUT = 2.0
 
 
 class LinkListener(Protocol):
     """
-    What a link tells its exchange, until it is stopped. From the link's reader thread.
+    The callbacks of a link, until it is stopped. From the link's reader thread.
 
-    :ivar frames_rejected: counts what arrived and was nobody's; the link adds what was no frame.
+    :ivar frames_rejected: counts what arrived without an owner; the link adds what was no frame.
     """
 
     frames_rejected: int
 
     def frame_received(self, frame: Frame, age: float) -> None:
-        """Take a frame that was received ``age`` seconds ago."""
+        """Handle a frame that was received ``age`` seconds ago."""
 
     def bus_opened(self) -> None:
-        """Note that the bus is there (again)."""
+        """Handle a bus that is there (again)."""
 
     def bus_lost(self, reason: str) -> None:
-        """Note that the bus is gone, or could not be opened; ``reason`` is new."""
+        """Handle a bus that is gone, or could not be opened; ``reason`` is new."""
 
     def bus_told(self, text: str) -> None:
-        """Note what people should know of the adapter."""
+        """Log what people should know of the adapter."""
 
     def bus_misconfigured(self, reason: str) -> None:
-        """No attempt will ever succeed. The link has given up."""
+        """Handle a bus that no attempt will ever open. The link has given up."""
 
     def link_failed(self, reason: str) -> None:
-        """Note that the reader thread ended by a defect of the program."""
+        """Handle the end of the reader thread by an internal error."""
 
 
 class _Attempt:
@@ -105,7 +105,7 @@ class _Attempt:
         self.ended.ring()
 
     def take(self, *, give_up: bool) -> EndPoint | None:
-        """Return what it has opened, or raise why not; None: it goes on, and nobody waits."""
+        """Return the opened port, or raise why there is none; None: the attempt goes on."""
         with self._lock:
             self._given_up = give_up
             port = self._port
@@ -172,7 +172,7 @@ class Link:
         self._thread.start()
 
     def wait_first_attempt(self, timeout: float) -> bool:
-        """Wait until the bus was tried once; False if that takes longer than ``timeout`` s."""
+        """Wait until the bus was tried once; return False after ``timeout`` s."""
         if not self._tried:
             self._first_attempt.wait(self._now() + timeout)
         return self._tried
@@ -218,7 +218,7 @@ class Link:
         """
         Return a frame that is there already, and its age in s; None: there is none.
 
-        In the reader thread, while it hands over the frame before.
+        In the reader thread, while it delivers the frame before.
         """
         port = self._port
         if port is None or self._loss is not None or self._blocked is not None:
@@ -243,12 +243,12 @@ class Link:
 
     @property
     def is_open(self) -> bool:
-        """The bus is there."""
+        """Whether the bus is there."""
         return self._port is not None and self._loss is None and self._blocked is None
 
     @property
     def last_bus_error(self) -> BusError | None:
-        """The last error frame that asks for something to be done."""
+        """The last error frame that needs action."""
         port = self._port
         return (port.last_error if port is not None else None) or self._closed_bus_error
 
@@ -260,7 +260,7 @@ class Link:
 
     @property
     def counts(self) -> Counts:
-        """What has been counted since the start."""
+        """The counts since the start."""
         port = self._port
         return self._closed_counts if port is None else self._closed_counts.plus(port.counts)
 
@@ -286,14 +286,14 @@ class Link:
         self._first_attempt.ring()
 
     def _read_on(self) -> None:
-        """Keep the port after a defect, until the drives were stopped: answers show that."""
+        """Read on after an internal error, until the drives were stopped: answers show that."""
         while not self._closing:
             try:
                 port = self._port
                 frame = None if port is None else port.receive(RECEIVE_TIMEOUT)
                 if frame is not None and port is not None:
                     self._listener.frame_received(frame, port.age)
-            except Exception:   # noqa: BLE001  more of what was told, or the bus is gone
+            except Exception:   # noqa: BLE001  more of what was reported, or the bus is gone
                 frame = None
             if frame is None:
                 self._end.wait(self._now() + RECEIVE_TIMEOUT)
@@ -313,7 +313,7 @@ class Link:
                 frame = port.receive(RECEIVE_TIMEOUT)
                 received_at = self._now() - port.age
                 self._loss = self._blocked = self._no_room_since = None
-                # after a loss nobody knows whether anybody is there before somebody was heard
+                # after a loss other nodes count as absent until one was heard
                 self._heard = not opened
                 if opened:
                     self.reconnections += 1
@@ -335,14 +335,14 @@ class Link:
             self._end.wait(self._now() + self.bus.reconnect_period)
 
     def _report(self, reason: str) -> None:
-        """Report why the bus is not there; once."""
+        """Report why the bus is not there, once for each reason."""
         if reason != self._reported:
             self._listener.bus_lost(reason)
         self._reported = reason
         self._tell_tried()
 
     def _tell_once(self, text: str) -> None:
-        """Report what is the same after each opening."""
+        """Report what is the same after each opening, once."""
         if text not in self._told:
             self._told.add(text)
             self._listener.bus_told(text)
@@ -364,11 +364,11 @@ class Link:
         return port
 
     def _ended(self) -> bool:
-        """Return whether it was stopped meanwhile, by another thread."""
+        """Return whether another thread has stopped the link meanwhile."""
         return self._closing
 
     def _gone(self) -> bool:
-        """Return whether the adapter was unplugged; its name goes a moment after it."""
+        """Return whether the adapter was unplugged; its name disappears a moment later."""
         if device_of(self.bus) is not None:
             for _ in range(_GOING):
                 if is_absent(self.bus) or self._closing:
@@ -397,7 +397,7 @@ class Link:
 
     def _sit_out(self, port: EndPoint, reason: str) -> None:
         """
-        Wait until something leaves again. Frames of that time are nobody's: all drives are lost.
+        Block until the bus accepts a frame; discard those received: all drives are lost.
 
         :raises BusUnavailable: the bus is lost, or has to be opened anew to find out.
         """
@@ -424,6 +424,6 @@ class Link:
         if port is not None:
             self._closed_bus_error = port.last_error
             self._closed_counts = self._closed_counts.plus(port.counts)
-            # a controller that is being tried again is in no other state that anybody knows
+            # a controller that is being tried again has no other known state
             self._closed_controller = BUS_OFF if port.controller == BUS_OFF else ''
             port.close()

@@ -2,7 +2,7 @@
 """
 An open CAN bus, and the way to open one.
 
-Whatever python-can's adapters throw becomes one of two errors here:
+Whatever python-can's adapters raise becomes one of two errors here:
 :class:`~drive_can_bridge.core.errors.BusMisconfigured` (never going to work) and
 :class:`~drive_can_bridge.core.errors.BusUnavailable` (worth another attempt).
 """
@@ -46,26 +46,26 @@ from drive_can_bridge.transport.serial_writer import Below, watched
 # The kernel's time stamp of a frame is believed if it is that much older than now at most, or if
 # the frame may have waited for so long: clocks that were set fall out.
 _STAMP_AGE_MAX = 0.1
-# So many returns without a frame in so many s, although it was to wait: the other end has gone.
+# So many returns without a frame in so many s, although it was to wait: the other end is gone.
 _EARLY_MAX, _EARLY_TIME = 1000, 0.1
-# Behind so many it is asked whether it has gone, where the kernel knows: also on a busy machine.
+# Behind so many the kernel is asked, where it knows, whether it is gone: also on a busy machine.
 _EARLY_LOOK = 100
 # So many frames may be confirmed at once: what a terminal keeps.
 _UNCONFIRMED_MAX = 4096
-# Looks at what a serial adapter has to say of the commands that opened it, and s for each.
+# Reads of a serial adapter's answers to the commands that opened it, and s for each.
 _ANSWER_LOOKS, _ANSWER_TIME = 8, 0.02
 # Data bytes of a classical CAN frame.
 _LENGTH_MAX = 8
 # s that the last command to a serial adapter may take.
 _CLOSE_TIMEOUT = 0.1
-# An adapter that sends rubbish and nothing else for that many lines is opened anew.
+# An adapter that sends malformed lines only, for that many lines, is opened again.
 _MALFORMED_MAX = 1000
 # Bytes of an unfinished line of a serial adapter that are kept; robotell has packets instead.
 _LINE_MAX = 4096
 _UNFINISHED = '_buffer', '_rxbuffer'
 # Interfaces whose error frames are those of the Linux kernel; others have layouts of their own.
 _KERNEL_ERRORS = ('socketcan', 'socketcand')
-# Interfaces that hand back what they have sent, and say so. Others may mark what another program
+# Interfaces that return what they have sent, and mark it. Others may mark what another program
 # sends by the same adapter, which is another master.
 _MARKS_OWN = ('gs_usb', 'cantact')
 # Where python-can keeps the serial port of an interface.
@@ -81,9 +81,9 @@ class Port(EndPoint):
     CAN FD frames, which no protocol here has, and a serial adapter's line with bytes lost.
 
     :param host_stamps: the kernel of this machine makes the stamps.
-    :param marks_own: it marks what it hands back of what it was handed to send.
+    :param marks_own: it marks returned frames that it has sent itself.
     :param lock: of its device, released when it is closed.
-    :ivar witness: sees every message that arrives, whatever it is; None: nobody does.
+    :ivar witness: called with every message that arrives, of any kind; None: not called.
     """
 
     def __init__(self, bus: can.BusABC, clock: Clock, *, kernel_errors: bool = False,
@@ -162,7 +162,7 @@ class Port(EndPoint):
             return None
         data = bytes(message.data)
         highest = EXTENDED_IDENTIFIER_MAX if message.is_extended_id else STANDARD_IDENTIFIER_MAX
-        # the kernel tells of the nine ways to say eight (ISO 11898-1); elsewhere a digit is wrong
+        # the kernel reports the nine ways to write eight (ISO 11898-1); elsewhere a digit is wrong
         length = min(message.dlc, _LENGTH_MAX) if self.host_stamps else message.dlc
         if (len(data) != length or len(data) > _LENGTH_MAX
                 or not 0 <= message.arbitration_id <= highest):
@@ -173,10 +173,10 @@ class Port(EndPoint):
         return frame if self._echo is None or self._is_new(self._echo, frame) else None
 
     def _receive_directly(self, raw: RawSocket, timeout: float) -> Frame | None:
-        """Wait for a frame of SocketCAN; what becomes of it is as above."""
+        """Wait for a frame of SocketCAN; handled like in ``receive``."""
         try:
             received = raw.receive(timeout)
-        except (OSError, ValueError) as error:      # ValueError: somebody has closed it
+        except (OSError, ValueError) as error:      # ValueError: it was closed
             self._lost = True
             raise BusUnavailable(bus_sentences.receive_failed(in_words(error))) from error
         now = self._now()
@@ -197,11 +197,11 @@ class Port(EndPoint):
                                    STANDARD_IDENTIFIER_MAX), data, extended)
 
     def _is_new(self, echo: Echo, frame: Frame) -> bool:
-        """Look whether a frame is not one of ours that came back."""
+        """Return whether a frame is no echo of a sent one."""
         before = echo.verdict
         if not echo.is_echo(frame):
             return True
-        if echo.verdict is not EchoVerdict.ECHOES:      # perhaps: nobody's
+        if echo.verdict is not EchoVerdict.ECHOES:      # perhaps an echo: without an owner
             self.rejected_frames += 1
         elif before is not echo.verdict and self.tell is not None:
             self.tell(bus_sentences.adapter_echoes())
@@ -218,9 +218,9 @@ class Port(EndPoint):
 
     def _returned_early(self, now: float) -> None:
         """
-        Look whether an adapter says again and again that nothing is there, without waiting.
+        Count early returns; raise when the other end is gone.
 
-        python-can's socketcand does so for ever when its gateway has closed the connection.
+        python-can's socketcand returns early for ever when its gateway has closed the connection.
         """
         heard = 0 if self._below is None else self._below.heard
         if self._unconfirmed:       # a frame may have been confirmed
@@ -240,7 +240,7 @@ class Port(EndPoint):
 
     def await_answers(self, bitrate: int) -> None:
         """
-        Hear what a serial adapter has to say of the commands that opened it.
+        Read a serial adapter's answers to the commands that opened it.
 
         :raises BusUnavailable: it refuses what nothing works without.
         """
@@ -256,7 +256,7 @@ class Port(EndPoint):
             raise BusUnavailable(refusal)
 
     def send(self, frame: Frame, timeout: float) -> None:
-        """Hand a frame to the adapter. See the base class."""
+        """Pass a frame to the adapter. See the base class."""
         if self._direct is not None:
             self._send_directly(self._direct, frame, timeout)
             return
@@ -305,18 +305,18 @@ class Port(EndPoint):
             raise TransportError(bus_sentences.queue_full())
 
     def shorten_queue(self, frames: int) -> None:
-        """Let about so many frames wait in the kernel at most, where that can be set."""
+        """Limit the kernel's transmit queue to about so many frames, where that can be set."""
         if self._socket is not None:
             self._socket.shorten_queue(frames)
 
     @property
     def has_room(self) -> bool | None:
-        """A frame could be sent now; None: this adapter does not tell."""
+        """Whether a frame could be sent now; None: this adapter does not report it."""
         return None if self._socket is None else self._socket.has_room(0.0)
 
     @property
     def counts(self) -> Counts:
-        """What has been counted since it was opened."""
+        """The counts since it was opened."""
         return Counts(self.error_frames, self.bus_off_count,
                       0 if self._socket is None else self._socket.overflowed_frames,
                       0 if self._answers is None else self._answers.refused)
@@ -325,7 +325,7 @@ class Port(EndPoint):
         """
         Close the bus. Never raises.
 
-        What a lost serial adapter has not taken is thrown away: when it goes on reading one day,
+        What a lost serial adapter has not read is discarded: when it goes on reading one day,
         it must not find setpoints of long ago.
         """
         steps: list[Callable[[], object]] = []
@@ -456,7 +456,7 @@ def _open(bus: BusConfiguration, clock: Clock, routes: Sequence[Route],
             text = bus_sentences.adapter_not_there(adapter=adapter_of(bus))
         raise BusUnavailable(text) from error
     try:
-        # SocketCAN opens an interface that is down; the first look tells
+        # SocketCAN opens an interface that is down; the first read shows it
         port.receive(0.0)
         port.await_answers(bus.bitrate)
         if bus.interface == 'socketcan':
@@ -478,9 +478,9 @@ def _open_serial(adapter: type[Any], bus: BusConfiguration, clock: Clock,
 
 def _check_carrier(channel: str) -> None:
     """
-    See whether a controller takes part in the bus.
+    Check that a controller takes part in the bus.
 
-    :raises BusUnavailable: it is bus-off. Its driver takes frames all the same, and drops them.
+    :raises BusUnavailable: it is bus-off. Its driver accepts frames all the same, and drops them.
     """
     try:
         carrier = Path('/sys/class/net', channel, 'carrier').read_text(encoding='ascii')
@@ -493,7 +493,7 @@ def _check_carrier(channel: str) -> None:
 
 def _abandon(error: BaseException) -> None:
     """
-    Let go of the bus whose constructor failed; nobody else knows of it.
+    Close the bus whose constructor failed; there is no other reference to it.
 
     Before 4.4 python-can tries to shut it down when it is collected, and shows a traceback.
     """

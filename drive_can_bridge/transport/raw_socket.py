@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The socket below python-can's SocketCAN: its frames, how long its queues are, what they have lost.
+The socket below python-can's SocketCAN: its frames, the lengths of its queues, their losses.
 
 python-can opens it, with its filters and options. Frames pass it by: for each, python-can makes a
 message of a dozen attributes, looks for room twice and for its logger twice, which costs more than
@@ -48,7 +48,7 @@ class RawSocket:
     The socket of one SocketCAN interface.
 
     A frame that was sent waits in the kernel until the controller has brought it to the bus, and
-    stays there while no other node acknowledges it: nobody can take it back. So the queue is kept
+    stays there while no other node acknowledges it: it cannot be withdrawn. So the queue is kept
     as short as the kernel lets it be, and a frame for which there is no room is not sent at all.
     """
 
@@ -72,7 +72,7 @@ class RawSocket:
 
         :param timeout: s.
         :return: the identifier with the bits of this module, the data, and when the kernel had it,
-            in ns since 1970 (0: it does not say); None after the time-out.
+            in ns since 1970 (0: no stamp); None after the time-out.
         :raises OSError: the interface is down, or has gone.
         """
         if not select.select(self._waiting, (), (), timeout)[0]:
@@ -91,9 +91,9 @@ class RawSocket:
 
     def send(self, frame: Frame, timeout: float) -> bool:
         """
-        Hand a frame to the kernel; False: there was no room for ``timeout`` s.
+        Pass a frame to the kernel; return False: there was no room for ``timeout`` s.
 
-        :raises OSError: it does not take it.
+        :raises OSError: it refuses the frame.
         """
         if not select.select((), self._waiting, (), timeout)[1]:
             return False
@@ -103,12 +103,12 @@ class RawSocket:
         return True
 
     def has_room(self, timeout: float) -> bool:
-        """Wait until a frame could be sent; False after ``timeout`` s."""
+        """Wait until a frame could be sent; return False after ``timeout`` s."""
         return bool(select.select((), self._waiting, (), timeout)[1])
 
     def shorten_queue(self, frames: int) -> None:
         """
-        Let the socket count as full when about so many frames wait.
+        Make the socket count as full when about so many frames wait.
 
         The kernel keeps at least 4.5 kB, half of which fills it: three frames.
         """
@@ -117,7 +117,7 @@ class RawSocket:
 
     @property
     def overflowed_frames(self) -> int:
-        """Frames that found the receive queue full; 0 where the kernel does not tell (< 4.12)."""
+        """The frames that found the receive queue full; 0 with kernels before 4.12."""
         if not self._readable_memory:
             return 0
         try:

@@ -2,7 +2,7 @@
 """
 Serial ports below python-can's adapters: written to in a limited time, from the first byte.
 
-pyserial's ``write`` looks at the clock even after everything was written, and so takes a busy
+pyserial's ``write`` checks the clock even after everything was written, and so takes a busy
 machine for a dead adapter; its ``flush`` waits without a limit for an adapter that has stopped to
 read. Both are replaced as soon as the port is there, because python-can's constructors write, too.
 
@@ -25,7 +25,7 @@ from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 
 #: what ends a line or packet that was begun and never finished, whatever is lacking, so that
-#: nothing comes of it. On an adapter in which nothing was begun it is a question, or noise.
+#: it is ignored. On an adapter in which nothing was begun it is a question, or noise.
 #: On USBtin and LAWICEL a *whole* line that lacks only its end goes out all the same: they do not
 #: look at what follows the data.
 FILLERS = {
@@ -43,11 +43,11 @@ FILLERS = {
 #: s of silence behind the filler until commands are sent, and s that it is waited for at most
 _QUIET, _NOISE = 0.05, 0.3
 REFUSED, DONE = '\a', '\r'
-#: of lines that are data frames: where their length stands, one digit in front of the data
+#: of lines that are data frames: where their length is, one digit in front of the data
 _LENGTH_AT = {'t': 4, 'T': 9, 'x': 9}
 #: characters of the time stamp that may follow: none, ms, µs
 _STAMPS = (0, 4, 8)
-#: frames refused in a row, and s that this has to last, until nothing leaves any more
+#: frames refused in a row, and s that this has to last, until nothing counts as sent any more
 REFUSED_MAX = 4
 REFUSED_TIME = 0.05
 #: s that each command to a serial adapter may take while it is opened
@@ -56,7 +56,7 @@ OPEN_TIMEOUT = 0.5
 
 class AdapterAnswers:
     """
-    The answers of one adapter since it was opened.
+    The answers of one serial adapter since it was opened.
 
     It refuses one by a BEL, when its queue is full or it is off the bus; that comes later than
     the frame was written. Some adapters confirm what they take by CR, ``z`` CR or ``Z`` CR,
@@ -88,14 +88,14 @@ class AdapterAnswers:
 
     def refusal(self, bitrate: int) -> Sentence:
         """
-        End the opening: say what was refused; '': nothing that is known.
+        End the opening; return what was refused, '' for nothing known.
 
         Healthy adapters refuse to close what is closed, and to open what is open.
         """
         commands, self._commands = self._commands or [], None
         if len(self._said) < len(commands):
             return NOTHING
-        # what came first may be about something before
+        # the first ones may answer earlier commands
         said = list(zip(commands, self._said[-len(commands):]))
         if any(refused and command[0] in 'Ss' and before == 'C'
                for (command, refused), (before, _) in zip(said[1:], said)):
@@ -109,13 +109,13 @@ class AdapterAnswers:
         self._unanswered += 1
 
     def take(self, line: str, now: float) -> None:
-        """Take a line of the adapter, with its end."""
+        """Handle a line of the adapter, with its end."""
         if self._commands is not None:
             if line in (REFUSED, DONE):
                 self._said.append(line == REFUSED)
             return
         if not line.endswith(REFUSED):
-            self._in_row = 0    # it took one, or hears somebody
+            self._in_row = 0    # it took one, or receives frames
         elif self._unanswered:
             self._unanswered -= 1
             self.refused += 1
@@ -123,7 +123,7 @@ class AdapterAnswers:
             self._in_row += 1
 
     def takes_nothing(self, now: float) -> bool:
-        """Return whether it refuses whatever it is handed."""
+        """Return whether the adapter refuses everything."""
         return self._in_row >= REFUSED_MAX and now - self._since >= REFUSED_TIME
 
 
@@ -145,7 +145,7 @@ class SerialWriter:
 
     @classmethod
     def take_over(cls, port: Any, now: Callable[[], float]) -> 'SerialWriter | None':
-        """Write for this port from now on; None: it is not one of a POSIX system."""
+        """Return a writer for this port; None: it is not one of a POSIX system."""
         if not isinstance(getattr(port, 'fd', None), int):
             return None
         writer = cls(port, now, OPEN_TIMEOUT)
@@ -173,7 +173,7 @@ class SerialWriter:
         return len(data)
 
     def flush(self) -> None:
-        """Do not wait for the adapter."""
+        """Do nothing: a frame does not wait for the adapter."""
 
     @property
     def _descriptor(self) -> int:
@@ -186,10 +186,10 @@ class SerialWriter:
 
 def check_line(line: str) -> None:
     """
-    Look whether a line of an SLCAN adapter is whole, as far as its length tells.
+    Check that a line of an SLCAN adapter is complete, as far as its length shows.
 
-    python-can takes as many data as the line says, wherever they begin. Where a serial port has
-    lost bytes, other digits stand there: a frame that nobody has sent.
+    python-can reads as many data as the line claims, wherever they begin. Where a serial port has
+    lost bytes, other digits stand there: a frame that was never sent.
 
     :raises ValueError: it lacks something, or has too much.
     """
@@ -202,7 +202,7 @@ def check_line(line: str) -> None:
 
 class _SlcanLines:
     """
-    Mix-in for python-can's SLCAN: listens to answers, and sends no empty line.
+    A mix-in for python-can's SLCAN: reads the answers, and sends no empty line.
 
     python-can sends one where no data bit rate is given.
     """
@@ -230,12 +230,12 @@ class _SlcanLines:
 @dataclass(slots=True)
 class Below:
     """
-    What is below an opened adapter.
+    The port and its writer below an opened adapter.
 
     :param port: of pyserial.
     :param writer: None: the port is not one of a POSIX system.
     :param filler: of :data:`FILLERS`.
-    :param answers: None: its answers are not listened to.
+    :param answers: None: its answers are not read.
     :param heard: counts what has arrived, whatever it is.
     """
 
@@ -247,17 +247,17 @@ class Below:
 
     @property
     def hung_up(self) -> bool:
-        """The other end has gone: unplugged, or closed. False: it is there, or nobody knows."""
+        """Whether the other end is known to be gone: unplugged, or closed."""
         place = getattr(self.port, 'fd', None)
         if not isinstance(place, int) or place < 0:
             return False
         look = select.poll()
-        look.register(place, 0)     # a hang-up is told without being asked for
+        look.register(place, 0)     # a hang-up is reported without being asked for
         return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL)
                    for _, event in look.poll(0))
 
     def clear(self) -> None:
-        """Throw away what the adapter has not taken, and end what it has taken a part of."""
+        """Discard what the adapter has not read, and end what it has read a part of."""
         self.port.reset_output_buffer()
         self.port.write(self.filler)
 
@@ -297,14 +297,14 @@ def watched(adapter: type[Any], interface: str, attribute: str, now: Callable[[]
 
 
 def _hurry(port: Any) -> None:
-    """Let frames leave at once where the port is a connection: pyserial does not."""
+    """Send frames at once where the port is a connection: pyserial does not."""
     connection = getattr(port, '_socket', None)
     if isinstance(connection, socket.socket):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def _await_quiet(port: Any, now: Callable[[], float]) -> None:
-    """Close the channel; let go by what the adapter has to say: none of it answers a command."""
+    """Close the channel, and discard what the adapter sends: none of it answers a command."""
     port.write(b'C\r')
     patience, port.timeout = port.timeout, _QUIET
     until = now() + _NOISE

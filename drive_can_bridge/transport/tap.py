@@ -54,15 +54,15 @@ def message_of(record: Record, channel: int) -> can.Message:
 
 class Tap:
     """
-    One bus, listened to.
+    A bus that is recorded without taking part.
 
-    :param label: what its entries give as their channel.
-    :param records: takes the entries.
-    :param complain: takes a line when the bus is lost, and when it is back.
+    :param label: the channel of its entries.
+    :param records: the queue for the entries.
+    :param complain: called with a line when the bus is lost, and when it is back.
     :ivar was_down: the bus was lost at least once, and what was on it then.
-    :ivar lost: entries that nobody took in time.
+    :ivar lost: entries that were not taken in time.
     :ivar heard_until: until when everything that was on the bus is among the entries, s by the
-        clock of this machine. That nobody put an entry there does not say that there was none.
+        clock of this machine. A time without entries is no proof that there were no frames.
     :raises BusUnavailable: the bus cannot be opened now.
     :raises BusMisconfigured: it never can.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Serial ports of this host as the kernel shows them: who made them, and how long they keep bytes.
+Serial ports of this host as the kernel shows them: their makers, and how long they keep bytes.
 
 Nothing is opened: all of it stands in ``/sys``.
 """
@@ -23,7 +23,7 @@ _PORTS = ('ttyUSB', 'ttyACM', 'ttyAMA', 'ttyXRUSB', 'rfcomm')
 
 class UsbDevice(NamedTuple):
     """
-    A device on USB, as it names itself; '' for what it does not say.
+    A USB device, by its own descriptors; '' where they are empty.
 
     :param number: vendor and product, ``0403:6001``.
     """

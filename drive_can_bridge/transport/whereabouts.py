@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What has become of the adapter of a bus that was lost, in words."""
+"""What happened to the adapter of a bus that was lost, in words."""
 
 from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
@@ -10,7 +10,7 @@ from drive_can_bridge.transport.kernel_interfaces import index_of, why_lost
 
 class Whereabouts:
     """
-    Of one bus, from its first opening on.
+    The adapter of one bus, watched from its first opening on.
 
     An interface of the kernel keeps its number when it is renamed: so that is remembered.
     """
@@ -20,16 +20,16 @@ class Whereabouts:
         self._number = 0
 
     def opened(self) -> None:
-        """Note that it is there."""
+        """Record that it is there."""
         if self._bus.interface == 'socketcan':
             self._number = index_of(str(self._bus.channel))
 
     def reason(self, error: BaseException, *, absent: bool) -> str:
         """
-        Say why it does not work any more.
+        Return why it does not work any more.
 
-        :param error: as its adapter says it.
-        :param absent: it was there, and is not to be seen.
+        :param error: of its adapter.
+        :param absent: it was there, and is gone.
         """
         if self._bus.interface == 'socketcan':
             return why_lost(str(self._bus.channel), self._number) or in_words(error)
