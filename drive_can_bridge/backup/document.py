@@ -18,10 +18,10 @@ The file of a backup: what it is of, as comments, and the settings as ROS parame
 
 No settings are setpoints of any mode, the control word, the mode of operation, what process data
 alone carry (no command writes them), and the bits that the profile's section ``restore`` sets and
-clears: they say in which mode a drive is. A parameter with such bits comes last, as its other bits
+clears: they hold the mode of a drive. A parameter with such bits comes last, as its other bits
 are written with them.
 
-Reading is strict: whatever is not plainly a backup is named with its line, and nothing is used.
+Reading is strict: whatever is not clearly a backup is reported with its line, and nothing is used.
 Output of ``ros2 param dump`` has no head, and ``null`` for what a drive did not give.
 """
 
@@ -46,20 +46,20 @@ from drive_can_bridge.protocols.families import FAMILIES
 
 
 def value_in_file(parameter: Parameter, raw: int) -> str:
-    """Write a raw integer as a value that YAML, rcl and :func:`raw_in_file` understand."""
+    """Return a raw integer as a value that YAML, rcl and :func:`raw_in_file` understand."""
     value = parameter.value_from_raw(raw)
     text = show(value)
     if not isinstance(value, float) or not math.isfinite(value):
         return text
     if _nearest_raw(parameter, float(text)) != raw:
         text = repr(value)
-    # without a point, YAML takes 4e+12 for a string
+    # without a point, YAML reads 4e+12 as a string
     return text.replace('e', '.0e') if 'e' in text and '.' not in text else text
 
 
 def raw_in_file(parameter: Parameter, value: object) -> int:
     """
-    Return the raw integer that a value stands for, whether or not it may be written.
+    Return the raw integer of a value, whether or not it may be written.
 
     :raises ValueRefused: a value of another kind.
     """
@@ -89,11 +89,11 @@ def _nearest_raw(parameter: Parameter, value: float) -> int:
 @dataclass(frozen=True, slots=True)
 class ModeBits:
     """
-    What a restored backup does to a parameter that has bits of a mode.
+    The treatment of a parameter with bits of a mode, when a backup is restored.
 
     :param mask: those bits.
-    :param at_end: what they are afterwards.
-    :param ended: those of them in which a drive is left that was not taken out of the mode: set
+    :param at_end: their state afterwards.
+    :param ended: those of them that show a drive left in the mode: set
         before, and otherwise afterwards.
     """
 
@@ -105,7 +105,8 @@ class ModeBits:
         """
         Return the word that a drive is to have in the end.
 
-        :param found: what it has: also the result where it has the setting and is not in the mode.
+        :param found: the drive's word: also the result where it has the setting and is not in the
+            mode.
         :param wanted: in the backup.
         """
         word = wanted & ~self.mask | self.at_end
@@ -128,7 +129,7 @@ def mode_bits(table: RestoreTable | None) -> dict[str, ModeBits]:
 
 
 def modes_of(drive: Drive) -> tuple[str, ...]:
-    """Return the names of the parameters that tell whether a drive was left in a mode."""
+    """Return the names of the parameters that show whether a drive was left in a mode."""
     found = [drive.find(name) for name, bits in mode_bits(drive.facts.restore).items()
              if bits.ended]
     return tuple(parameter.name for parameter in found
@@ -164,20 +165,20 @@ def settings_of(drive: Drive) -> tuple[str, ...]:
 
 
 def in_order(drive: Drive, names: list[str]) -> tuple[str, ...]:
-    """Sort names as the profile has them, then raw ones; what has bits of a mode comes last."""
+    """Return names in the profile's order, then raw ones; those with bits of a mode last."""
     bits = mode_bits(drive.facts.restore)
     order = {name: place for place, name in enumerate(drive.parameters)}
     return tuple(sorted(names, key=lambda name: (name in bits, order.get(name, len(order)))))
 
 
-#: names that readers of YAML 1.1 take for true, false or nothing
+#: names that readers of YAML 1.1 read as true, false or nothing
 _WORDS = frozenset(['y', 'yes', 'n', 'no', 'true', 'false', 'on', 'off', 'null'])
 
 
 @dataclass(frozen=True, slots=True)
 class Head:
     """
-    What the comments at the head say; '' where they do not.
+    The comments at the head of a backup; '' for missing ones.
 
     :param time: UTC, as ISO 8601 has it.
     :param bus: name, interface, channel and bit rate.
@@ -211,23 +212,23 @@ class Backup:
 
     @property
     def drive(self) -> str:
-        """Name of the drive that it was made of; '' where the section is for any node."""
+        """The name of the drive that it was made of; '' where the section is for any node."""
         name = self.node.rsplit('/', 1)[-1]
         return '' if '*' in name else name
 
     @property
     def without_value(self) -> list[str]:
-        """Names that the drive did not give when the file was made."""
+        """The names without a value when the file was made."""
         return [name for name in self.lines if name not in self.values]
 
     def problem(self, name: str, message: str) -> str:
-        """Write what is wrong with a value as a line."""
+        """Return what is wrong with a value as a line."""
         return printable(f'{self.file}:{self.lines.get(name, 1)}: {printable(name)}: {message}',
                          None)
 
 
 def head_of(facts: DriveFacts, *, time: str, identity: str) -> Head:
-    """Say what a backup is of."""
+    """Return the head of a backup of a drive."""
     return Head(time, f'{facts.bus} ({facts.interface} {facts.channel}, {facts.bitrate} bit/s)',
                 facts.protocol, str(facts.station), facts.profile, facts.profile_sha256, identity)
 
@@ -240,7 +241,7 @@ def node_of(facts: DriveFacts) -> str:
 def written(facts: DriveFacts, head: Head, settings: Iterable[tuple[Parameter, int]], *,
             remarks: Iterable[str] = ()) -> str:
     """
-    Write a backup.
+    Return the text of a backup.
 
     :param settings: parameters and raw integers, in the order in which they are written back; at
         least one.
@@ -311,7 +312,7 @@ def _described(value: object) -> str:
 
 def _flat(data: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...],
                                                                              object]]:
-    """Go through nested mappings: ``ros2 param dump`` splits names at their dots."""
+    """Yield the values of nested mappings: ``ros2 param dump`` splits names at their dots."""
     for key, value in data.items():
         if isinstance(value, dict):
             yield from _flat(value, (*above, key))

@@ -1,19 +1,19 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Bring the settings of a backup back into a drive.
+Restore the settings of a backup into a drive.
 
 .. code-block:: text
 
     before      steps of the profile: a device wants to be in a mode for it
-    rounds      what differs is written and read back; what was refused, or not taken, is tried
-                again after the others, as long as that gets on
-    after       steps of the profile, whatever happened: written without a look, for a drive whose
-                answers get lost may hear them all the same; one that cannot be read a few times
+    rounds      what differs is written and read back; what was refused, or not stored, is tried
+                again after the others, as long as that helps
+    after       steps of the profile, whatever happened: written without reading, for a drive whose
+                answers get lost may receive them all the same; one that cannot be read a few times
                 at most, for it may be what stores
     read back   everything that is to be as in the file
 
-``stopped`` is asked between two writes, so that each is verified before anything ends. Before each
-the drive is asked whether somebody has enabled it: then only the steps afterwards follow.
+``stopped`` is called between two writes, so that each is verified before anything ends. Before
+each it is checked whether the drive was enabled meanwhile: then only the steps afterwards follow.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,10 +33,10 @@ from drive_can_bridge.core.requests import Failure, FailureKind
 from drive_can_bridge.core.roles import Role
 from drive_can_bridge.core.text import printable, value_text
 
-#: s that a drive which has gone away is waited for, so that it is not left in a mode
+#: s that a drive which is gone is waited for, so that it is not left in a mode
 PATIENCE = 10.0
 _PATIENCE_STEP = 0.5
-#: times that a step afterwards is written to a drive of which nothing is heard, for its cells may
+#: times that a step afterwards is written to a silent drive, for its cells may
 #: wear, and to one that is there and does not answer it
 _ATTEMPTS = 3
 _NO_PARAMETER = Failure(FailureKind.INVALID, sentences.drive_has_not())
@@ -55,7 +55,7 @@ class LeftAlone(Enum):
 
     @property
     def text(self) -> str:
-        """In words, with what helps."""
+        """The reason in words, with what helps."""
         return _LEFT_ALONE[self]
 
 
@@ -95,14 +95,14 @@ class SettingChange:
 
     @property
     def note(self) -> str:
-        """What is to be said of it; '' where it will be as in the file."""
+        """The remark on it; '' where it will be as in the file."""
         if self.left_alone is not None:
             return self.left_alone.text
         return _ENDED.format(value_text(self.value)) if self.not_all else ''
 
     @property
     def value(self) -> Value:
-        """What is to be written, as the client takes it."""
+        """The value to be written, as the client writes it."""
         return value_of_word(self.parameter, self.word)
 
 
@@ -112,7 +112,7 @@ class NotAsInFile:
     A setting that is not as in the file in the end.
 
     :param found: what the drive has; None: it could not be read.
-    :param reason: what its last write, or reading it, failed with; '' where nobody complained.
+    :param reason: the failure of its last write, or of reading it; '' without one.
     """
 
     name: str
@@ -132,8 +132,8 @@ class RestorePlan:
     :param words: all that is to be as in the file afterwards, by name.
     :param wanted: the same as values.
     :param found: what the drive has of all that was read.
-    :param unread: what the drive did not give.
-    :param absent: settings that it says it does not have.
+    :param unread: settings that could not be read.
+    :param absent: settings that it reports it does not have.
     """
 
     changes: tuple[SettingChange, ...]
@@ -147,7 +147,7 @@ class RestorePlan:
 
 
 def problems_in(backup: Backup, drive: Drive) -> list[str]:
-    """Check a file against what is known of a drive; return a line for each problem."""
+    """Check a file against a drive's table; return a line for each problem."""
     found = []
     for name, value in backup.values.items():
         parameter = drive.find(name)
@@ -167,9 +167,9 @@ def problems_in(backup: Backup, drive: Drive) -> list[str]:
 
 def other_type(backup: Backup, drive: Drive) -> str:
     """
-    Say of which other drive type a file is, most of which can only be wrong then; '': of this one.
+    Return of which other drive type a file is, and so useless here; '': of this one.
 
-    Without a head it is one of which the drive knows no name at all.
+    Without a head it is one of which the drive has no name at all.
     """
     head, facts = backup.head, drive.facts
     here = f'{drive.name} has {facts.profile} ({facts.protocol})'
@@ -184,7 +184,7 @@ def other_type(backup: Backup, drive: Drive) -> str:
 
 
 def strangers(backup: Backup, drive: Drive, identity: str) -> list[str]:
-    """Say in which way a file is of another drive: a line each; nothing where it is not."""
+    """Return in which ways a file is of another drive: a line each; empty where it is not."""
     head, facts = backup.head, drive.facts
     found = []
     if head.profile_sha256 and head.profile_sha256 != facts.profile_sha256:
@@ -205,7 +205,7 @@ def says_nothing(head: Head) -> bool:
 def plan_restore(backup: Backup, drive: Drive, outcomes: Mapping[str, ReadOutcome], *,
                  include_protected: bool) -> RestorePlan:
     """
-    Compare a file that is all right with what was read of the drive.
+    Compare a valid file with what was read of the drive; return the plan.
 
     :param outcomes: of :func:`names_to_read`.
     """
@@ -254,13 +254,13 @@ def names_to_restore(backup: Backup, drive: Drive) -> tuple[str, ...]:
 
 
 def names_to_read(backup: Backup, drive: Drive) -> tuple[str, ...]:
-    """Return what to read before: these settings, and what tells the mode of the drive."""
+    """Return what to read before: these settings, and those that show the mode of the drive."""
     return in_order(drive, list(dict.fromkeys([
         *names_to_restore(backup, drive), *modes_of(drive)])))
 
 
 def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftAlone | None:
-    """Say why a parameter of a file is not written; None: it is."""
+    """Return why a parameter of a file is not written; None: it is."""
     role = drive.role(name)
     if role is Role.CONTROL:
         return LeftAlone.CONTROL
@@ -279,12 +279,12 @@ def why_left_alone(drive: Drive, name: str, *, include_protected: bool) -> LeftA
 
 
 def value_of_word(parameter: Parameter, word: int) -> Value:
-    """Return a word as the client takes it: raw names take raw integers."""
+    """Return a word as the client writes it: raw names have raw integers."""
     return parameter.value_from_raw(parameter.raw_from_word(word)) if parameter.listed else word
 
 
 def _difference(wanted: str, found: str) -> str:
-    """Name the parts of an identity that differ: those of the file, and those of the drive."""
+    """Return the parts of an identity that differ: those of the file, and those of the drive."""
     there, here = wanted.split(), found.split()
     only_there = [part for part in there if part not in here]
     only_here = [part for part in here if part not in there]
@@ -293,7 +293,7 @@ def _difference(wanted: str, found: str) -> str:
 
 
 class StepKind(Enum):
-    """What a step of a profile is for."""
+    """The purposes of a profile's steps."""
 
     BEFORE = 'before'
     AFTER = 'after'
@@ -310,7 +310,7 @@ class FailedStep:
 
     @property
     def text(self) -> str:
-        """In words, with what follows from it."""
+        """The failure in words, with its consequence."""
         if self.kind is StepKind.STORE and self.unknown:
             follows = 'Whether what was written is stored is not known'
         else:
@@ -319,7 +319,7 @@ class FailedStep:
 
     @property
     def unknown(self) -> bool:
-        """The drive may have done it all the same."""
+        """Whether the drive may have done it all the same."""
         return self.failure.kind.unheard
 
 
@@ -337,14 +337,14 @@ _FOLLOWS = {
 @dataclass(slots=True)
 class RestoreResult:
     """
-    What became of it.
+    The result of a restore.
 
     :param written: names of the settings that were written, in that order.
     :param unconfirmed: that under way when the conversation ended, which may have been written.
     :param steps: steps of the profile that failed.
-    :param stored: the drive was told to store all, and said that it has.
+    :param stored: the drive was commanded to store all, and confirmed it.
     :param wrong: what is not as in the file. Empty after an interruption: nothing was compared.
-    :param enabled: somebody enabled the drive meanwhile.
+    :param enabled: the drive was enabled meanwhile.
     :param stopped: it was interrupted, or the drive enabled; these were not written.
     :param trouble: what ended the conversation with the drive.
     """
@@ -360,7 +360,7 @@ class RestoreResult:
 
     @property
     def complete(self) -> bool:
-        """Everything is as in the file."""
+        """Whether everything is as in the file."""
         return not (self.steps or self.wrong or self.enabled or self.stopped or self.trouble)
 
 
@@ -368,12 +368,12 @@ class Restorer:
     """
     Restores one drive.
 
-    :param stopped: tells whether the user wants it to end.
+    :param stopped: returns whether the user wants it to end.
     :param clock: s.
     :param wait: waits for so many seconds.
-    :param told: is told each outcome of a write.
-    :param hint: takes what the user should know while it goes on. Where neither can say it (the
-        terminal has gone), the drive is not left in its mode because of that.
+    :param told: called with each outcome of a write.
+    :param hint: called with what the user should know meanwhile. Where neither can print it (the
+        terminal is gone), the drive is not left in its mode because of that.
     """
 
     def __init__(self, drive: Drive, plan: RestorePlan, *, stopped: Callable[[], bool],
@@ -389,7 +389,7 @@ class Restorer:
         self._is_stopped = stopped
         self._interrupted = False
         self._lost = False          # of what could be read before, nothing can be now
-        self._unanswered = False    # of a step: nobody knows what became of it
+        self._unanswered = False    # of a step: its outcome is unknown
         self._attempted = False
         self._wrote = False
         self._words = dict(plan.found)
@@ -441,7 +441,7 @@ class Restorer:
 
     @property
     def _complete(self) -> bool:
-        """All settings have been attempted, nothing has come between."""
+        """Whether all settings have been attempted, without an interruption."""
         return self._attempted and not (self._stopped or self._result.enabled)
 
     def _rounds(self) -> None:
@@ -454,7 +454,7 @@ class Restorer:
             if len(left) == len(pending):
                 break
             pending = left
-            # what was acknowledged and not taken is not written, until it is at the next attempt
+            # what was acknowledged and not stored is not written, until it is at the next attempt
             for change in pending:
                 if change.name in self._result.written:
                     self._result.written.remove(change.name)
@@ -465,7 +465,7 @@ class Restorer:
             if self._may_not_write():
                 return
             outcome = self._write(change.name, change.value)
-            # what could be read before, and cannot now: no refusal, the drive has gone
+            # what could be read before, and cannot now: no refusal, the drive is gone
             if not (outcome.ok or self._drive.read(change.name)[change.name].ok):
                 self._lost = True
                 return
@@ -505,7 +505,7 @@ class Restorer:
     # -- the steps of the profile -----------------------------------------------------------------
 
     def _finish(self) -> None:
-        """Take the steps afterwards; a drive that has gone away may come back."""
+        """Run the steps afterwards; a drive that is gone may come back."""
         if not self._after or self._result.enabled and not self._wrote:
             return
         failed = self._result.steps
@@ -544,7 +544,7 @@ class Restorer:
         return f'{", ".join(names)} is set back' if names else 'it stores what was written'
 
     def _kind(self, step: RestoreStep) -> StepKind:
-        """Report what a step afterwards is for."""
+        """Return what a step afterwards is for."""
         parameter = self._drive.find(step.parameter)
         return (StepKind.STORE if parameter is not None and parameter.stores
                 else StepKind.AFTER)
@@ -556,7 +556,7 @@ class Restorer:
             self._result.stored = failure is None
 
     def _take(self, step: RestoreStep) -> Failure | None:
-        """Take a step before the settings; return why it failed."""
+        """Run a step before the settings; return why it failed."""
         parameter = self._drive.find(step.parameter)
         if parameter is None:
             return _NO_PARAMETER
@@ -572,9 +572,9 @@ class Restorer:
 
     def _take_back(self, step: RestoreStep, *, blind: bool, last: bool) -> Failure | None:
         """
-        Take a step after the settings; return why it failed.
+        Run a step after the settings; return why it failed.
 
-        :param blind: nothing is read first, unless nobody knows yet which bits are to be kept.
+        :param blind: nothing is read first, unless the bits to be kept are unknown.
         :param last: there is no other attempt.
         """
         parameter = self._drive.find(step.parameter)
@@ -614,11 +614,11 @@ class Restorer:
         return None
 
     def _put(self, parameter: Parameter, word: int, *, blind: bool) -> Failure | None:
-        """Write what a step wants; return why it is not there."""
+        """Write the word of a step; return why the drive does not have it."""
         name = parameter.name
         written = self._write_step(name, value_of_word(parameter, word), blind=blind)
         if not written.ok:
-            # it may have been taken all the same, or the drive refuses what it has already
+            # it may have been done all the same, or the drive refuses what it has already
             if not parameter.readable:
                 self._lost = written.unheard and not self._is_there()
             else:
@@ -641,7 +641,7 @@ class Restorer:
         return tried[-1]
 
     def _is_there(self) -> bool:
-        """Return whether the drive answers, by something that it gave before."""
+        """Return whether the drive answers, by a setting that it answered before."""
         name = next(iter(self._plan.found), None)
         return name is None or not self._drive.read(name)[name].unheard
 

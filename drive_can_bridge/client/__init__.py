@@ -12,9 +12,9 @@ The parameters of drives for people and scripts: directly, or through a running 
     except DriveCanError as error:
         print(error)
 
-See :mod:`drive_can_bridge.client.drive` for what a drive can be asked; both ways to it are made of
+See :mod:`drive_can_bridge.client.drive` for the interface of a drive; both ways to it implement
 that: :mod:`.direct`, and :mod:`.bridge`. To a bridge of this host it is the local one
-(:mod:`.local`), where that leads to it, else that through ROS (:mod:`.ros_way`).
+(:mod:`.local`), where that reaches it, else that through ROS (:mod:`.ros_way`).
 """
 
 from collections.abc import Callable, Sequence
@@ -36,16 +36,16 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
                 nmt_start: bool = False, clock: Clock | None = None,
                 slow: Callable[[], AbstractContextManager[object]] = nullcontext) -> DriveSource:
     """
-    Say which drives there are, before anything is sent.
+    Return the source of drives, before anything is sent.
 
     :param params_file: its drives, directly on its buses; None: those of a running bridge.
     :param namespace: of the bridge, where several run.
     :param nmt_start: directly: start CANopen nodes before they are asked.
-    :param clock: what everything waits by; None: that of this machine.
-    :param slow: is entered for what may take more than a moment.
+    :param clock: the clock of all waiting; None: that of this machine.
+    :param slow: entered for steps that may take more than a moment.
     :raises ConfigurationError: the file is wrong.
     :raises DriveCanError: the file cannot be read; no bridge is running, or several in different
-        namespaces; an argument that means nothing to the way that is taken.
+        namespaces; an argument that does not apply to the way that is used.
     """
     clock = clock or SteadyClock()
     if params_file is not None and namespace is not None:
@@ -74,7 +74,7 @@ def find_source(params_file: str | Path | None = None, *, namespace: str | None 
 def open_drives(params_file: str | Path | None = None, *, only: str | Sequence[str] = ('*',),
                 namespace: str | None = None, nmt_start: bool = False) -> Drives:
     """
-    Open drives.
+    Open drives, and return them as a context manager.
 
     :param only: their names, or shell patterns; one, or several.
     :raises DriveCanError: no drive of such a name, and what :func:`find_source` and

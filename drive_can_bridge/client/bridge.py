@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The way to drives through a running bridge."""
+"""Drives through a running bridge."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ _TYPES = {ValueKind.DOUBLE: float, ValueKind.INTEGER: int, ValueKind.BOOL: bool}
 
 
 def parameter_of(message: Described, *, listed: bool = True) -> Parameter | None:
-    """Return what a descriptor describes; None: no parameter of a drive."""
+    """Return the parameter of a descriptor; None: no parameter of a drive."""
     facts = facts_in(message.facts)
     if 'access' not in facts:
         return None
@@ -56,7 +56,7 @@ def role_of(message: Described) -> Role | None:
 
 
 def raw_of(parameter: Parameter, value: Value) -> int:
-    """Return the raw integer that a value of the bridge was made of."""
+    """Return the raw integer behind a value of the bridge."""
     if parameter.scaled:
         return round((value - parameter.offset) / parameter.scale)
     return int(value)
@@ -73,20 +73,20 @@ _NO_VALUE = sentences.no_value()
 _DIAGNOSTICS_MARGIN = 5.0
 _ENABLED = {'online': Enabled.YES, 'not armed': Enabled.YES, 'disabled': Enabled.NO,
             'fault': Enabled.NO}
-#: parts of a ``control_state`` in which a motor may move, whatever the drive is told
+#: parts of a ``control_state`` in which a motor may move, whatever the drive is commanded
 _MOVING = ('enabled', 'enable sent', 'quick stop', 'fault reaction')
 
 
 class BridgedDrive(Drive):
     """
-    One drive.
+    One drive of a bridge.
 
-    :param name: of it.
+    :param name: of the drive.
     :param way: to its bridge.
     :param node: full name of its node.
     :param table: the parameters that it lists.
     :param roles: what the bridge uses them for.
-    :param knowledge: asks the bridge for the rest.
+    :param knowledge: reads the rest from the bridge.
     """
 
     def __init__(self, name: str, way: Way, node: str, table: dict[str, Parameter],
@@ -146,7 +146,7 @@ class BridgedDrive(Drive):
         return made
 
     def _reasons(self, names: Sequence[str]) -> list[str]:
-        """Ask why there is no value."""
+        """Read why there is no value."""
         if not names:
             return []
         return [facts_in(message.facts).get('error') or _NO_VALUE
@@ -186,7 +186,7 @@ class BridgeSource:
     """
     The drives of a running bridge, or of all bridges of one namespace.
 
-    :param way: to them.
+    :param way: to the bridges.
     """
 
     listens = False
@@ -206,7 +206,7 @@ class BridgeSource:
         return self._way.listed(self._node_of(drive))
 
     def open(self, names: Sequence[str]) -> Drives:
-        """Ask for what is known of these drives."""
+        """Open drives by reading what their bridges know of them."""
         opened = {}
         for name in self._bridges:
             if name in names:
@@ -215,7 +215,7 @@ class BridgeSource:
         return Drives(opened, self.close)
 
     def close(self) -> None:
-        """End the way. Idempotent."""
+        """Close the way. Idempotent."""
         self._way.close()
 
     def _node_of(self, drive: str) -> str:
@@ -225,7 +225,7 @@ class BridgeSource:
         """Return parameters of a bridge; None for those that it does not have."""
         values = [None if isinstance(value, tuple) else value
                   for value in self._way.get(bridge, names)]
-        if len(values) != len(names):   # rclpy answers nothing where one name is unknown
+        if len(values) != len(names):   # rclpy returns nothing where one name is unknown
             values = [self._values(bridge, [name])[name] if len(names) > 1 else None
                       for name in names]
         return dict(zip(names, values))
@@ -255,7 +255,7 @@ class BridgeSource:
             persist_writes=self._values(bridge, [persist])[persist] is not False)
 
     def identity(self, drive: str) -> str:
-        """Return who a drive is, as its bridge has asked it."""
+        """Return the identity of a drive, as its bridge has read it."""
         name = f'drives.{drive}.identity'
         return str(self._values(self._bridges[drive], [name])[name] or '')
 
@@ -275,7 +275,7 @@ class BridgeSource:
 
 
 def _restore_table(text: Any) -> 'RestoreTable | None':
-    """Read what :func:`..declare.restore_text` has written."""
+    """Return the table in a text of :func:`..declare.restore_text`."""
     from drive_can_bridge.core.profile import RestoreStep, RestoreTable
     try:
         read = json.loads(text)

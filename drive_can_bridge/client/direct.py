@@ -3,9 +3,9 @@
 The direct way to drives: on the buses of a parameter file, while no bridge has them.
 
 The sessions only *serve* (see :meth:`.Session.serve`): nothing is sent but the acyclic frames of
-the requests that are handed in. What only a master sends to a drive of these buses, and was not
+the submitted requests. What only a master sends to a drive of these buses, and was not
 sent by this process, ends the conversation. A drive that is not there costs a few time-outs, not
-one for each parameter: while nobody knows whether it is there (at the beginning, and after a
+one for each parameter: while its presence is unknown (at the beginning, and after a
 request of which nothing was answered), it is greeted by single reads before anything else. What
 did not answer when its node was to be started is not greeted again at once.
 """
@@ -39,7 +39,7 @@ from drive_can_bridge.protocols.families import FAMILIES
 
 #: s that a bus has to open
 _OPEN_TIMEOUT = 5.0
-#: s between two looks whether all is well, however many wait for something
+#: s between two checks of the bus, however many wait for something
 _PATIENCE = 0.1
 
 
@@ -47,7 +47,7 @@ class BusConversation:
     """
     One open bus.
 
-    :param drives: those that will be asked.
+    :param drives: those that will be used.
     :param neighbours: all drives that are known on the bus: no other master may talk to them.
     :param ownership: of the bus; kept as long as its threads run, closed or not.
     :raises DriveCanError: the bus cannot be opened.
@@ -92,7 +92,7 @@ class BusConversation:
 
     def listen(self, seconds: float) -> None:
         """
-        Do nothing but listen.
+        Wait, and only listen for another master.
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
@@ -104,7 +104,7 @@ class BusConversation:
 
     def submit(self, drive: str, request: Request) -> None:
         """
-        Hand in a request; :meth:`wait` brings its outcomes.
+        Submit a request; :meth:`wait` returns its outcomes.
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost or closed.
         """
@@ -113,7 +113,7 @@ class BusConversation:
 
     def wait(self, request: Request) -> tuple[Outcome, ...]:
         """
-        Wait for the outcomes of a request that was handed in.
+        Wait for the outcomes of a submitted request.
 
         :raises DriveCanError: another master talks to a drive, or the bus is lost.
         """
@@ -127,7 +127,7 @@ class BusConversation:
         """
         Send a frame that is no parameter request.
 
-        :raises BusUnavailable: the bus does not take it.
+        :raises BusUnavailable: the bus refuses it.
         """
         with self._exchange.lock:
             if not self._exchange.link.send(frame):
@@ -135,7 +135,7 @@ class BusConversation:
                     bus=self.bus.name, reason=self._exchange.link.last_error))
 
     def close(self) -> None:
-        """Close the bus; later requests are told so. Idempotent."""
+        """Close the bus; later requests raise. Idempotent."""
         self._exchange.close()
         self._fail(DriveCanError(sentences.bus_closed(bus=self.bus.name)))
 
@@ -151,7 +151,7 @@ class BusConversation:
     # -- from the exchange ------------------------------------------------------------------------
 
     def completed(self, request: Request, outcomes: tuple[Outcome, ...]) -> None:
-        """Take what became of a request."""
+        """Record the outcomes of a request."""
         self._outcomes[id(request)] = outcomes
         self._changed.ring()
 
@@ -164,36 +164,36 @@ class BusConversation:
                     bus=self.bus.name, drive=name, frame=frame)))
 
     def bus_opened(self, bus: str) -> None:
-        """Let requests go out: the bus is there."""
+        """Release the requests: the bus is there."""
         self._opened = True
         self._changed.ring()
 
     def bus_lost(self, bus: str, reason: str) -> None:
-        """End: what the drives do now nobody knows."""
+        """End the conversation: the state of the drives is unknown."""
         self._fail(BusUnavailable(sentences.bus_because(bus=bus, reason=reason)))
 
     def bus_told(self, bus: str, text: str) -> None:
-        """Go on: what an adapter does otherwise changes no answer."""
+        """Do nothing: the remark on the adapter changes no answer."""
 
     def fatal(self, bus: str, reason: str, *, misconfigured: bool) -> None:
-        """End likewise."""
+        """End the conversation."""
         kind = BusMisconfigured if misconfigured else DriveCanError
         self._fail(kind(sentences.bus_because(bus=bus, reason=reason)))
 
 
 class _Ears(DriveListener):
-    """Listens to one session: only answered requests matter."""
+    """The listener of one session: only completed requests matter."""
 
     def __init__(self, conversation: BusConversation) -> None:
         self._conversation = conversation
 
     def handle_event(self, event: Event) -> None:
-        """Hand on what became of a request."""
+        """Pass on the outcomes of a request."""
         if isinstance(event, RequestCompleted):
             self._conversation.completed(event.request, event.outcomes)
 
 
-#: parameters that are handed to a session at once: two frames where four share one; and how many
+#: parameters in one request to a session: two frames where four share one; and how many
 #: such requests wait in it, so that the drive never waits for us
 BLOCK = 8
 AHEAD = 3
@@ -209,7 +209,7 @@ _START_HINT = sentences.node_not_operational()
 
 
 class DirectDrive(Drive):
-    """One drive, asked by this process."""
+    """One drive on a bus of this process."""
 
     def __init__(self, drive: DriveConfiguration, bus: BusConfiguration,
                  conversation: BusConversation, nmt_start: bool) -> None:
@@ -223,7 +223,7 @@ class DirectDrive(Drive):
             drive.profile.parameters, lambda name: family.raw_parameter(drive, name)))
         self._conversation = conversation
         self._session = conversation.sessions[drive.name]
-        self._absent: tuple[float, Failure] | None = None   # since when, and what it said
+        self._absent: tuple[float, Failure] | None = None   # since when, and the failure
         self._start_frame = family.make_prober(drive).start_frame()
         self._nmt_start = nmt_start
 
@@ -236,7 +236,7 @@ class DirectDrive(Drive):
         if self._nmt_start and self._start_frame is not None:
             self._start()
             end = self._conversation.now() + _START_PATIENCE
-            while True:     # until its heartbeat, too, says that it has started
+            while True:     # until its heartbeat, too, reports that it has started
                 self._conversation.listen(_START_PAUSE)
                 failure = self._greet()[1]
                 if failure is None or self._conversation.now() >= end:
@@ -272,12 +272,12 @@ class DirectDrive(Drive):
 
     def _outcomes(self, asked: Sequence[tuple[str, Parameter]],
                   ) -> Iterator[tuple[str, Parameter, Outcome]]:
-        """Ask in blocks; the next one waits in the session while one is being served."""
+        """Request in blocks; the next one waits in the session while one is being served."""
         blocks = [asked[start:start + BLOCK] for start in range(0, len(asked), BLOCK)]
         waiting: list[tuple[Sequence[tuple[str, Parameter]], ReadRequest]] = []
         while blocks or waiting:
             if blocks and not self._session.online:
-                # nobody answered last time, or ever: not a time-out for each parameter
+                # no answer last time, or ever: not a time-out for each parameter
                 known, failure = self._look([each for _, each in blocks[0]])
                 if failure is not None:
                     for block in blocks:
@@ -344,7 +344,7 @@ class DirectDrive(Drive):
             name, parameter, reason=self._explained(failure), kind=failure.kind)
 
     def _explained(self, failure: Failure) -> str:
-        """Add what may be the matter with a drive that says nothing at all."""
+        """Return the reason of a failure, with a hint for a drive that never answers."""
         silent = not self._session.online and failure.kind in (
             FailureKind.OFFLINE, FailureKind.NO_ANSWER)
         if silent and self._start_frame is not None and not self._nmt_start:
@@ -354,7 +354,7 @@ class DirectDrive(Drive):
     # -- writing ----------------------------------------------------------------------------------
 
     def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
-        if not (blind or self._session.online):     # what does not answer is told nothing
+        if not (blind or self._session.online):     # nothing is written to a silent drive
             _, failure = self._look()
             if failure is not None:
                 return self._not_written(name, parameter, failure)
@@ -430,7 +430,7 @@ class DirectSource:
         return tuple(self.configuration.drives[drive].profile.parameters)
 
     def open(self, names: Sequence[str]) -> Drives:
-        """Take the locks, open the buses of these drives, listen for another master."""
+        """Acquire the locks, open the buses of these drives, and listen for another master."""
         configuration = self.configuration
         wanted = [drive for name, drive in configuration.drives.items() if name in names]
         everyone = [*wanted, *(drive for drive in configuration.drives.values()
@@ -450,7 +450,7 @@ class DirectSource:
                 conversations[bus] = BusConversation(
                     configuration.buses[bus], [drive for drive in wanted if drive.bus == bus],
                     drives, ownership, self._clock)
-            seconds = LISTEN    # they all hear at the same time
+            seconds = LISTEN    # they all listen at the same time
             for conversation in conversations.values():
                 conversation.listen(seconds)
                 seconds = 0.0
@@ -464,11 +464,11 @@ class DirectSource:
         return Drives(opened, close, warnings=warnings)
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: nothing is open."""
 
 
 def _program() -> str:
-    """Return what this process is called, for those that want the same drives."""
+    """Return the name of this process, for others that want the same drives."""
     words = [Path(word).name for word in sys.argv]
     subcommand = next((word for word in words[1:] if word.isidentifier()), '')
     return f'{words[0]} {subcommand}' if words[0] == 'drive_can' else words[0] or 'script'

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Drives as a person or a script sees them: parameters with names, units and reasons.
+Drives for people and scripts: parameters with names, units and reasons.
 
-The same interface stands on two ways to the drives: directly on the buses of a parameter file, and
-through a running bridge (see :func:`drive_can_bridge.client.open_drives`).
+There are two ways to the drives with the same interface: directly on the buses of a parameter
+file, and through a running bridge (see :func:`drive_can_bridge.client.open_drives`).
 
 .. code-block:: python
 
@@ -11,9 +11,9 @@ through a running bridge (see :func:`drive_can_bridge.client.open_drives`).
         outcome = drives['conveyor'].read('ramp_time')['ramp_time']
         print(outcome.value if outcome.ok else outcome.reason)
 
-Whatever the drive itself has to do with a request ends in an *outcome*, one for each name, never
+Whatever depends on the drive itself ends in an *outcome*, one for each name, never
 in an exception. Exceptions are for what ends the whole conversation: another master, a lost bus, a
-bridge that has gone, all of them :class:`~drive_can_bridge.core.errors.DriveCanError`.
+bridge that is gone, all of them :class:`~drive_can_bridge.core.errors.DriveCanError`.
 
 :func:`~drive_can_bridge.client.find_source` gives names before anything is opened, which is what
 commands need that have to know which drive is meant:
@@ -48,7 +48,7 @@ ENDED_BEFORE = 'ended before'
 
 
 class Enabled(Enum):
-    """Whether a drive may move by the word of its master."""
+    """Whether a drive may move by command of its master."""
 
     YES = 'enabled'
     NO = 'not enabled'
@@ -58,10 +58,10 @@ class Enabled(Enum):
 @dataclass(frozen=True, slots=True)
 class ReadOutcome:
     """
-    What became of reading one parameter.
+    The outcome of reading one parameter.
 
     :param name: as it was asked for.
-    :param parameter: None where nobody knows the name.
+    :param parameter: None where the name is unknown.
     :param raw: integer read by the parameter's type; None where reading failed.
     :param value: in the unit of the parameter; None where reading failed.
     :param reason: why it failed, in words; '' where it did not.
@@ -77,30 +77,30 @@ class ReadOutcome:
 
     @property
     def ok(self) -> bool:
-        """There is a value."""
+        """Whether there is a value."""
         return self.raw is not None
 
     @property
     def unheard(self) -> bool:
-        """It failed, and no frame of the drive came."""
+        """Whether it failed, and no frame of the drive came."""
         return self.kind is not None and self.kind.unheard
 
     @property
     def absent(self) -> bool:
-        """The drive says that it has no such parameter."""
+        """Whether the drive reports that it has no such parameter."""
         return self.kind is FailureKind.ABSENT
 
 
 @dataclass(frozen=True, slots=True)
 class WriteOutcome:
     """
-    What became of writing one parameter.
+    The outcome of writing one parameter.
 
-    :param ok: acknowledged by the drive, or read back; or sent, where ``reason`` says that nothing
-        more is known (``verify_writes: false``).
+    :param ok: acknowledged by the drive, or read back; or sent, where ``reason`` notes that
+        nothing more is known (``verify_writes: false``).
     :param reason: why it failed, in words; or that note.
-    :param trouble: what ended the conversation while the drive was asked to take it: whether it
-        did nobody knows; None: nothing.
+    :param trouble: what ended the conversation during the write: whether the drive
+        has the value is unknown; None: nothing.
     :param kind: why it failed, for programs; None where it did not.
     """
 
@@ -113,12 +113,12 @@ class WriteOutcome:
 
     @property
     def unheard(self) -> bool:
-        """It failed, and no frame of the drive came: the drive may have done it all the same."""
+        """Whether it failed, and no frame of the drive came: it may still have the value."""
         return self.kind is not None and self.kind.unheard
 
     @classmethod
     def under_way(cls, name: str, parameter: Parameter, trouble: DriveCanError) -> 'WriteOutcome':
-        """Return that of a write under way when the conversation ended."""
+        """Return the outcome of a write under way when the conversation ended."""
         return cls(name, False, parameter, NOT_CONFIRMED, trouble, FailureKind.UNAVAILABLE)
 
 
@@ -152,11 +152,11 @@ class DriveFacts:
 
 class Drive(ABC):
     """
-    One drive.
+    One drive: the interface of both ways.
 
-    Calls block until everything is done. They belong into one thread.
+    Calls block until everything is done. They are for one thread.
 
-    :param find_facts: returns what is known of it; called when that is wanted first.
+    :param find_facts: returns what is known of it; called at the first use.
     :ivar name: of the drive in the configuration.
     """
 
@@ -174,7 +174,7 @@ class Drive(ABC):
         """
         What is known of the drive without asking it.
 
-        :raises DriveCanError: its bridge, who knows it, does not answer.
+        :raises DriveCanError: its bridge does not answer.
         """
         return self._find_facts()
 
@@ -184,14 +184,14 @@ class Drive(ABC):
         The parameters that the profile lists, by name, in its order.
 
         Limits (``minimum``, ``maximum``) that come through a bridge are those in effect: where the
-        profile has none, what the type can carry.
+        profile has none, the range of the type.
         """
         return self._directory.listed
 
     @property
     def readable_names(self) -> list[str]:
         """
-        What ``read`` reads when no name is given.
+        The names that ``read`` reads when none is given.
 
         What exists in process data only can be read only while these are received: through a
         bridge, where they are mapped.
@@ -207,7 +207,7 @@ class Drive(ABC):
     @abstractmethod
     def role(self, name: str) -> Role | None:
         """
-        Say what a bridge uses a parameter for itself; None: nothing, or an unknown name.
+        Return what a bridge uses a parameter for itself; None: nothing, or an unknown name.
 
         What is ``CONTROL`` or ``CYCLIC`` and writable cannot be written here either way; ``MAP``
         only directly.
@@ -215,7 +215,7 @@ class Drive(ABC):
 
     def check(self, name: str, value: object) -> str:
         """
-        Say why a value cannot be written, without asking the drive; '' if nothing is known.
+        Return why a value cannot be written, without asking the drive; '' if nothing is known.
 
         Unknown name, read-only, wrong type, out of range, a setpoint, a control word.
         """
@@ -233,9 +233,9 @@ class Drive(ABC):
 
     def contradicted(self, values: Mapping[str, Value]) -> dict[str, str]:
         """
-        Say which values cannot be written together, and why: two for one parameter.
+        Return which values cannot be written together, and why: two for one parameter.
 
-        What :meth:`check` speaks against is left out.
+        What :meth:`check` refuses is left out.
         """
         items = {}
         for name, value in values.items() if len(values) > 1 else ():
@@ -250,7 +250,7 @@ class Drive(ABC):
         """
         Read parameters: those named, or all readable listed ones.
 
-        :param told: is told each outcome as soon as it is known, in any order.
+        :param told: called with each outcome as soon as it is known, in any order.
         :return: one outcome for each name, in the order asked.
         """
         wanted = names or self.readable_names
@@ -262,7 +262,7 @@ class Drive(ABC):
         return {name: found[name] for name in wanted}
 
     def _read_all(self, names: Sequence[str]) -> Iterator[ReadOutcome]:
-        """Report first what cannot be read at all; of the rest, neighbours share frames."""
+        """Yield first what cannot be read at all; of the rest, neighbours share frames."""
         asked: list[tuple[str, Parameter]] = []
         for name in dict.fromkeys(names):
             parameter = self.find(name)
@@ -281,12 +281,12 @@ class Drive(ABC):
         Write parameters one after the other, in the order given, each one verified.
 
         :param values: in the units of the parameters; raw names take raw integers.
-        :param blind: nobody looks first whether the drive is there, or has the value already: it
-            may hear although its answers get lost.
-        :param told: is told each outcome before the next write begins; also that of one under way
-            when the conversation ends.
+        :param blind: sent without checking whether the drive is there, or has the value already:
+            it may receive although its answers get lost.
+        :param told: called with each outcome before the next write begins; also with that of one
+            under way when the conversation ends.
         :raises KeyboardInterrupt: on Ctrl-C; not before the write under way has its outcome, and
-            ``told`` knows it.
+            ``told`` was called with it.
         """
         found = {}
         contradicted = self.contradicted(values)
@@ -308,39 +308,39 @@ class Drive(ABC):
 
     @abstractmethod
     def enabled(self) -> Enabled:
-        """Return whether the drive is enabled, asking for its status where that is possible."""
+        """Return whether the drive is enabled, reading its status where that is possible."""
 
     @abstractmethod
     def identity(self) -> str:
         """
-        Say who the drive is: ``firmware=10205 serial_number=4711``.
+        Return the drive's identity: ``firmware=10205 serial_number=4711``.
 
-        What the profile section ``identity`` names, as far as it can be read; '' where there is
-        none.
+        The parameters in the profile section ``identity``, as far as they can be read; '' where
+        there is none.
         """
 
     # -- what the way to the drive decides, for the methods above ---------------------------------
 
     @abstractmethod
     def write_refusal(self, name: str, parameter: Parameter) -> str:
-        """Say why a parameter cannot be written whatever the value; '' if it can."""
+        """Return why a parameter cannot be written whatever the value; '' if it can."""
 
     @abstractmethod
     def ask(self, asked: Sequence[tuple[str, Parameter]]) -> Iterator[ReadOutcome]:
-        """Ask for parameters that can be read; their outcomes come in any order."""
+        """Read parameters that can be read; their outcomes come in any order."""
 
     @abstractmethod
     def put(self, name: str, parameter: Parameter, value: Value, *, blind: bool) -> WriteOutcome:
         """
-        Write a value that nothing speaks against; without looking first if ``blind``.
+        Write a value that passed :meth:`check`; without looking first if ``blind``.
 
-        :raises DriveCanError: the conversation has ended, before the drive was asked to take it.
+        :raises DriveCanError: the conversation has ended, before the value was sent.
         """
 
 
 class NoDrive(DriveCanError, KeyError):
     """
-    There is no drive of this name, or none that a pattern fits.
+    There is no drive of this name, or none that matches a pattern.
 
     :param known: those that there are.
     """
@@ -361,7 +361,7 @@ class Drives(Mapping[str, Drive]):
     A context manager: leaving it closes the buses, or leaves the ROS graph.
 
     :param close: closes everything; called once.
-    :ivar warnings: what the user should know before anything is written, a line each.
+    :ivar warnings: lines that the user should know before anything is written.
     """
 
     def __init__(self, drives: Mapping[str, Drive], close: Callable[[], object], *,
@@ -396,7 +396,7 @@ class Drives(Mapping[str, Drive]):
             self._closers.pop(0)()
 
     def also_close(self, close: Callable[[], object]) -> None:
-        """Have something else closed afterwards."""
+        """Add a function that :meth:`close` calls afterwards."""
         self._closers.append(close)
 
     def __enter__(self) -> 'Drives':
@@ -408,11 +408,11 @@ class Drives(Mapping[str, Drive]):
 
 class DriveSource(Protocol):
     """
-    Where drives come from: known by name before anything is opened or sent.
+    The drives of a file or a bridge: names are known before anything is opened or sent.
 
     Made by :func:`drive_can_bridge.client.find_source`.
 
-    :ivar listens: to open drives takes a moment.
+    :ivar listens: opening drives takes a moment.
     """
 
     listens: bool
@@ -428,10 +428,10 @@ class DriveSource(Protocol):
         """
         Open the drives of these names.
 
-        Directly: takes the locks, opens their buses, listens for another master for 1.2 s.
+        Directly: acquires the locks, opens their buses, listens for another master for 1.2 s.
 
-        :raises DriveCanError: in use, another master, bus not available, a bridge that has gone.
+        :raises DriveCanError: in use, another master, bus not available, a bridge that is gone.
         """
 
     def close(self) -> None:
-        """Leave the ROS graph, if that is where it is. Idempotent."""
+        """Leave the ROS graph, where it was entered. Idempotent."""

@@ -3,9 +3,9 @@
 A setpoint held for a while through the bridge, by the topic that any node could use.
 
 Neutral until the setpoint is armed, the value, neutral until the bridge has sent that. From the
-first sign that something is not as it should be the value is never published again. What the
-bridge sends is seen on ``~/request``, that the drive answers on ``~/response``; who else commands
-it is asked of the bridge, because a process that has just begun does not know the graph.
+first sign of a fault the value is never published again. What the
+bridge sends is seen on ``~/request``, that the drive answers on ``~/response``; other publishers
+are asked of the bridge, because a process that has just started does not know the graph.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ RATE, IN_TIMEOUT = 20.0, 4
 LONGEST_TIMEOUT = 2.0
 #: s until the setpoint is armed; until what is published is sent; until neutral was answered
 ARMING_TIMEOUT, TAKING_TIMEOUT, NEUTRAL_TIMEOUT = 5.0, 1.0, 2.0
-#: s between two questions to the bridge: whether it is armed, and who else commands
+#: s between two questions to the bridge: whether it is armed, and which others command
 ASK_PERIOD = 0.1
 #: s that an answer of the bridge may take
 ANSWER_TIMEOUT = 5.0
@@ -53,12 +53,12 @@ _UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'
 
 
 class JogRefused(DriveCanError):
-    """It cannot be done; nothing was published. Says why."""
+    """The setpoint cannot be moved, with the reason; nothing was published."""
 
 
 class JogOutcome(NamedTuple):
     """
-    What became of it.
+    The outcome of holding a setpoint.
 
     :param ok: an answered exchange carried the value, and a later one neutral.
     """
@@ -70,7 +70,7 @@ class JogOutcome(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Target:
     """
-    What is moved, and how.
+    The setpoint to be moved, and its value.
 
     :param node: full name of the drive.
     :param shown: the actual values of the drive, for people.
@@ -87,12 +87,12 @@ class Target:
 
     @property
     def topic(self) -> str:
-        """Where it is commanded."""
+        """The topic of its commands."""
         return f'{self.node}/command/{self.parameter.name}'
 
     @property
     def period(self) -> float:
-        """Seconds from command to command."""
+        """The seconds from command to command."""
         return min(1.0 / RATE, self.timeout / IN_TIMEOUT)
 
     def in_words(self, value: Value) -> str:
@@ -108,7 +108,7 @@ def with_unit(parameter: Parameter, value: Value) -> str:
 def find_target(graph: Graph, namespace: str | None, drive: str, name: str | None,
                 value: str) -> Target:
     """
-    Find out what is meant, and refuse what must not be moved like this.
+    Return the setpoint that is meant, or refuse what must not be moved like this.
 
     :param drive: its name, or its full name.
     :param name: of the setpoint; None: the only one there is.
@@ -148,9 +148,9 @@ def find_target(graph: Graph, namespace: str | None, drive: str, name: str | Non
 
 
 def _why_not_ready(state: str, facts: Mapping[str, str], drive: str) -> Sentence:
-    """Say what keeps a drive from being moved, and what to type about it."""
+    """Return what keeps a drive from being moved, and what to type about it."""
     if state == 'fault':
-        # without a control word nobody can reset it from here
+        # without a control word it cannot be reset from here
         reset = (f'drive_can reset {drive}' if 'control_state' in facts
                  else str(sentences.reset_at_drive()))
         return sentences.jog_fault(fault=printable(facts.get('fault_code', '')), reset=reset)
@@ -161,13 +161,13 @@ def _why_not_ready(state: str, facts: Mapping[str, str], drive: str) -> Sentence
 def _values(graph: Graph, node: str, names: Sequence[str]) -> list[Any]:
     answer = graph.call(node, 'get_parameters', GetParameters.Request(names=list(names)),
                         ANSWER_TIMEOUT)
-    if len(answer.values) != len(names):    # rclpy answers nothing where one name is unknown
+    if len(answer.values) != len(names):    # rclpy returns nothing where one name is unknown
         raise JogRefused(sentences.jog_not_told())
     return [value_of(value) for value in answer.values]
 
 
 def _read(text: Any) -> list[dict[str, Any]] | None:
-    """Read what the bridge says of its setpoints; None: nothing."""
+    """Return the setpoints in a parameter of the bridge; None: it has none."""
     try:
         return [each for each in json.loads(text) if isinstance(each['name'], str)]
     except (TypeError, ValueError, KeyError):
@@ -193,7 +193,7 @@ def _choose(setpoints: Sequence[dict[str, Any]], name: str | None, node: str) ->
 
 
 def _described(graph: Graph, node: str, names: Sequence[str]) -> list[Parameter]:
-    """Return parameters of a drive; the first of them is there."""
+    """Return parameters of a drive; the first of them exists."""
     answer = graph.call(node, 'describe_parameters', DescribeParameters.Request(
         names=list(names)), ANSWER_TIMEOUT)
     found = [parameter_of(described(each)) for each in answer.descriptors]
@@ -203,7 +203,7 @@ def _described(graph: Graph, node: str, names: Sequence[str]) -> list[Parameter]
 
 
 def _parsed(parameter: Parameter, text: str) -> Value:
-    """Read a value as a command of this type carries it, and judge it as the bridge will."""
+    """Return a value as a command of this type carries it, checked as the bridge will."""
     value: Value
     if text.lower() in ('true', 'false'):
         value = text.lower() == 'true'
@@ -220,10 +220,10 @@ def _parsed(parameter: Parameter, text: str) -> Value:
 
 class Jog:
     """
-    One setpoint, held for a while.
+    Holds one setpoint for a while.
 
     :param seconds: how long the value is published.
-    :param stopped: whether somebody wants it to end; is asked before each command.
+    :param stopped: returns whether to end; called before each command.
     :ivar values: actual values of the drive, by name.
     """
 
@@ -248,7 +248,7 @@ class Jog:
         self._phase, self._since = _Phase.ARMING, graph.now()
         self._published_at = self._due = self._ask_at = -math.inf
         self._asking = self._armed = False
-        self._sent: Value | None = None     # by the bridge, as its last message says
+        self._sent: Value | None = None     # by the bridge, as its last message shows
         self._sent_at = self._answers = 0   # ns; answers to exchanges that may have carried it
         self._value_answered = self._neutral_answered = False
         self._why: Sentence | None = None
@@ -257,7 +257,7 @@ class Jog:
         """
         Hold the value, and return when neutral was sent.
 
-        :param show: is called, again and again, with the s for which the value is published.
+        :param show: called again and again with the s for which the value is published.
         """
         try:
             self._graph.wait(lambda now: self._look(now, show), math.inf)
@@ -274,14 +274,14 @@ class Jog:
         return JogOutcome(True, sentences.jog_done(value=value))
 
     def close(self) -> None:
-        """Publish nothing any more."""
+        """Destroy the publisher and the subscriptions."""
         for part in (*self._inboxes, self._out):
             part.close()
 
     # -- inside -----------------------------------------------------------------------------------
 
     def _look(self, now: float, show: Callable[[float], object]) -> bool:
-        """Take what has arrived, and publish what is due; return whether all is over."""
+        """Handle what has arrived, and publish what is due; return whether all is over."""
         for inbox in self._inboxes:
             inbox.look()
         self._calls.look(now)
@@ -303,7 +303,7 @@ class Jog:
         return False
 
     def _judge(self, now: float) -> None:
-        """See what comes next: the value only while everything is as it should be."""
+        """Choose what is published next: the value only without a sign of a fault."""
         if self._phase is _Phase.ENDING:
             return
         if self._stopped():
@@ -332,7 +332,7 @@ class Jog:
             self._why = why
 
     def _ask(self, now: float) -> None:
-        """Ask the bridge whether the setpoint is armed, and who else commands it."""
+        """Ask the bridge whether the setpoint is armed, and which other nodes command it."""
         prefix = f'drives.{self._target.node.rpartition("/")[2]}.'
         self._asking, self._ask_at = True, now + ASK_PERIOD
 
@@ -384,7 +384,7 @@ class Jog:
             self._neutral_answered = True
 
     def _is_sent(self, value: Value) -> bool:
-        """Return whether a value is what the bridge sent last: the same raw integer."""
+        """Return whether the bridge sent a value last: the same raw integer."""
         parameter = self._target.parameter
         try:
             return self._sent is not None and (
@@ -405,7 +405,7 @@ def _ns(message: ParameterEvent) -> int:
 
 
 def _others(text: Any, own: str) -> Iterator[str]:
-    """Yield who else publishes, by node and topic; our own node may not be known yet."""
+    """Yield the other publishers, by node and topic; our own node may not be known yet."""
     try:
         publishers = [str(each) for each in json.loads(text)]
     except (TypeError, ValueError):

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The local way to bridges (:mod:`..process.local_way`), where it leads to all that are meant.
+The local way to bridges (:mod:`..process.local_way`), where it reaches all that are meant.
 
-Wherever it does not, whatever the reason, the way through ROS is taken as if there were no other.
+Wherever it does not, whatever the reason, the way through ROS is used as if there were no other.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,17 +23,17 @@ from drive_can_bridge.process.presence import (
 
 #: s between two looks at what has arrived
 LOOK_PERIOD = 0.0005
-#: s that an answer may take: many reads that nobody answers are slow
+#: s that an answer may take: many reads without an answer are slow
 CALL_TIMEOUT = 120.0
-#: what comes of taking apart what no bridge says
+#: what parsing raises for an answer that is no bridge's
 _SENSELESS = (Rubbish, ValueError, IndexError)
 
 
 class _Bridge:
     """
-    A bridge of this host that is asked one thing after the other.
+    A bridge of this host that gets one request after the other.
 
-    :ivar name: as it says itself; '' until then.
+    :ivar name: as it answers; '' until then.
     :ivar drives: full names of its drives, in the order of the configuration.
     :ivar seen: full names of the bridges that it sees.
     :raises OSError: it does not listen.
@@ -49,18 +49,18 @@ class _Bridge:
 
     @property
     def believed(self) -> bool:
-        """It is root's, or of our user."""
+        """Whether it is root's, or of our user."""
         return self._line.believed
 
     def ask(self, *words: str) -> None:
         """
-        Ask.
+        Send a request.
 
-        :raises OSError: it has gone.
+        :raises OSError: it is gone.
         """
         try:
             self._line.ask(*words)
-        except OSError:     # it hangs up on who has asked nothing for long, or has ended
+        except OSError:     # it hangs up on callers that are idle for long, or has ended
             self._line.close()
             self._line = self._called_again()
             if not self._line.believed:
@@ -71,7 +71,7 @@ class _Bridge:
         """
         Return a new line, to a successor of the same name where it has ended.
 
-        :raises OSError: nobody is there.
+        :raises OSError: there is none.
         """
         try:
             return Line(self._present)
@@ -84,10 +84,10 @@ class _Bridge:
 
     def answers(self, until: float) -> list[list[str]]:
         """
-        Return all that is said, up to the end.
+        Return all messages, up to the end.
 
-        :raises TimeoutError: nothing was until then.
-        :raises OSError: it has gone.
+        :raises TimeoutError: there was none until then.
+        :raises OSError: it is gone.
         :raises Rubbish: it is no bridge.
         """
         found: list[list[str]] = []
@@ -106,7 +106,7 @@ class _Bridge:
                 found.append(message)
 
     def introduce(self, until: float) -> None:
-        """Have it say who it is, after it was asked."""
+        """Read its name, after it was asked for."""
         for kind, *words in self.answers(until):
             if kind == 'drives':
                 self.drives = words
@@ -114,16 +114,16 @@ class _Bridge:
                 self.name, self.seen = words[0], words[2:]
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._line.close()
 
 
 def _found(namespace: str | None, clock: Clock) -> list[_Bridge] | None:
     """
-    Return the bridges that may be meant, each of which has said who it is.
+    Return the bridges that may be meant, each with its name.
 
     :param namespace: in which they are, or a pattern of some; None: anywhere.
-    :return: None: not all of those that anybody knows of are reached this way.
+    :return: None: not all known ones are reached this way.
     """
     domain = own_domain()
     present = [each for each in bridges() if each.domain == domain and each.may_be_in(namespace)]
@@ -160,7 +160,7 @@ def _without_others(found: Sequence[_Bridge], namespace: str | None) -> list[_Br
     """
     Return the bridges that are meant; None: some of them are elsewhere.
 
-    :raises WhichBridge: they do not stand together.
+    :raises WhichBridge: they are not in one namespace, or share a name.
     """
     here, names = _meant(found, namespace)
     if not is_some(namespace):
@@ -186,9 +186,9 @@ class LocalWay:
 
     def _ask(self, action: str, node: str, *words: str) -> list[list[str]]:
         """
-        Ask a bridge about one of its nodes.
+        Call a bridge about one of its nodes.
 
-        :raises NoAnswer: it does not answer, or has gone.
+        :raises NoAnswer: it does not answer, or is gone.
         """
         bridge = self._at[node]
         try:
@@ -215,7 +215,7 @@ class LocalWay:
             return [_value(words[0]) for _, *words in self._ask('get', node, *names)]
 
     def describe(self, node: str, names: Sequence[str]) -> Sequence[Described]:
-        """Return what a drive says of parameters."""
+        """Return the descriptions of parameters of a drive."""
         with _sense(node):
             return [Described(name, text, facts, _limit(minimum), _limit(maximum))
                     for _, name, text, facts, minimum, maximum in self._ask(
@@ -232,13 +232,13 @@ class LocalWay:
             return done == '1', reason
 
     def condition(self, drive: str, *, age: float, patience: float) -> Mapping[str, str]:
-        """Return what diagnostics say of a drive now; none: its bus hangs."""
+        """Return the present diagnostics of a drive; none: its bus hangs."""
         node = f'{self.bridge_of[drive].rpartition("/")[0]}/{drive}'
         with _sense(node):
             return {words[0]: words[1] for _, *words in self._ask('status', node)}
 
     def close(self) -> None:
-        """Hang up. Idempotent."""
+        """Close the connections. Idempotent."""
         for each in self._found:
             each.close()
 
@@ -246,9 +246,9 @@ class LocalWay:
 @contextmanager
 def _sense(node: str) -> Iterator[None]:
     """
-    Take apart what was said of a node.
+    Parse the answer of a node.
 
-    :raises NoAnswer: no bridge says such things.
+    :raises NoAnswer: it is no answer of a bridge.
     """
     try:
         yield
@@ -291,11 +291,11 @@ def local_way(namespace: str | None, clock: Clock) -> LocalWay | None:
 
 
 class NoWay(Exception):
-    """The local way does not lead to all that are meant."""
+    """The local way does not reach all that are meant."""
 
 
 class LocalWays:
-    """The local ways to the drives that orders are for."""
+    """The local ways to the drives that commands are for."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -308,7 +308,7 @@ class LocalWays:
 
         :param place: None: the only one.
         :raises WhichBridge: there are several, and not together.
-        :raises NoWay: some of them are reached another way, or nobody is.
+        :raises NoWay: some of them are reached another way, or none is.
         """
         found = _found(place, self._clock) or []
         self._found += found
@@ -358,14 +358,14 @@ class LocalWays:
         return [answers[node] for node in nodes]
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connections."""
         for each in self._found:
             each.close()
 
 
 @contextmanager
 def local_ways(clock: Clock) -> Iterator[LocalWays]:
-    """Have ways as long as they are needed."""
+    """Yield ways that are closed afterwards."""
     ways = LocalWays(clock)
     try:
         yield ways

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""The way to a running bridge through ROS, as any node could go it."""
+"""The way to a running bridge through ROS, as any node could use it."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from drive_can_bridge.ros.messages import limits_of, parameter_message, plain
 
 
 def described(message: ParameterDescriptor) -> Described:
-    """Return what a message says of a parameter."""
+    """Return the description in a message."""
     return Described(message.name, message.description, message.additional_constraints,
                      *limits_of(message))
 
@@ -48,7 +48,7 @@ class RosWay:
         return [plain(value) for value in answer.values]
 
     def describe(self, node: str, names: Sequence[str]) -> Sequence[Described]:
-        """Return what a drive says of parameters."""
+        """Return the descriptions of parameters of a drive."""
         answer = self._graph.call(node, 'describe_parameters',
                                   DescribeParameters.Request(names=list(names)))
         return list(map(described, answer.descriptors))

@@ -1,21 +1,21 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""What a way to a running bridge has to offer: through ROS, or past it on this host."""
+"""The interface of a way to a running bridge: through ROS, or past it on this host."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from drive_can_bridge.core.parameters import Value
 
-#: what a node may have as the value of a parameter; None: nothing, or of another type
+#: the value of a parameter of a node; None: none, or of another type
 Found = Value | str | tuple[str, ...] | None
 
 
 class Described(NamedTuple):
     """
-    What a node says of a parameter.
+    A node's description of a parameter.
 
     :ivar facts: ``key=value`` pairs in one line.
-    :ivar minimum: None: not told.
+    :ivar minimum: None: unlimited.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Way(Protocol):
     """
     A way to the drives of a bridge, or of all bridges of one namespace.
 
-    Nodes are called by their full names. Whatever is asked may raise :class:`.NoAnswer`.
+    Nodes are given by their full names. Every request may raise :class:`.NoAnswer`.
     """
 
     @property
@@ -40,7 +40,7 @@ class Way(Protocol):
         """Return values of parameters; fewer where a bridge does not know one of them."""
 
     def describe(self, node: str, names: Sequence[str]) -> Sequence[Described]:
-        """Return what a drive says of parameters."""
+        """Return the descriptions of parameters of a drive."""
 
     def listed(self, node: str) -> Sequence[str]:
         """Return the names of the parameters that a drive lists."""
@@ -57,4 +57,4 @@ class Way(Protocol):
         """
 
     def close(self) -> None:
-        """End it. Idempotent."""
+        """Close it. Idempotent."""

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The buses and drives of a configuration: each of them, and what drives of a bus do to each other.
+The checks of buses and drives: each by itself, and the drives of a bus together.
 
 A drive is built even when parts of it are wrong, with defaults in place of the wrong parts, so
 that everything else about it can be checked in the same run.
@@ -30,9 +30,9 @@ from drive_can_bridge.core.text import duration_text, nearest, seems_limit, show
 from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.protocols.family import Claim, Complaint, Family
 
-#: how much a key has to look like one of ours to be taken for a slip of the pen
+#: how similar a key has to be to one of ours to count as misspelt
 _SLIP = 0.8
-#: what several adapters call a mode in which they send nothing
+#: the name of several adapters for a mode in which they send nothing
 _LISTEN_ONLY = 'listen_only'
 _COMMAND = '_command'
 #: what makers call the control word, see ``_plain``
@@ -44,30 +44,30 @@ class Adapters(Protocol):
     """
     What is known about CAN adapters (the module :mod:`drive_can_bridge.transport.adapters`).
 
-    Handed in, because only the transport knows python-can, and because a check without it is
-    still worth something.
+    Passed as an argument, because only the transport knows python-can, and because a check without
+    it is still useful.
     """
 
     def adapter_keywords(self, interface: str) -> set[str] | None:
         """Return the keyword arguments that an adapter's class names; None: unknown."""
 
     def missing_keywords(self, interface: str, given: Container[str]) -> list[str]:
-        """Return the keys without which an adapter's class cannot be made."""
+        """Return the required keys of an adapter's class that are missing."""
 
     def check_interface(self, interface: str) -> Sentence | None:
-        """Say why an interface cannot be used here; None: it can."""
+        """Return why an interface cannot be used here; None: it can."""
 
     def check_channel(self, interface: str, channel: str | int) -> Sentence | None:
-        """Say why a channel can be none of an interface; None: it may."""
+        """Return why a channel is impossible for an interface; None: it may be possible."""
 
     def check_bitrate(self, interface: str, bitrate: int) -> Sentence | None:
-        """Say why an adapter cannot be set to a bit rate; None: it may be possible."""
+        """Return why an adapter cannot be set to a bit rate; None: it may be possible."""
 
     def serial_port(self, bus: BusConfiguration) -> tuple[str, ...]:
         """Return what the serial port of a bus is known by here; empty: there is none."""
 
     def check_name(self, interface: str, name: str) -> Sentence | None:
-        """Say why an adapter of this name cannot be meant; None: it can."""
+        """Return why the name of an adapter is wrong; None: it is not."""
 
     def traits(self, bus: BusConfiguration) -> AdapterTraits | None:
         """Return what is known of the adapter of a bus; None: nothing."""
@@ -99,7 +99,7 @@ def check_buses(tree: Tree, adapters: Adapters | None) -> dict[str, BusConfigura
 
 def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Adapters | None,
                    ) -> set[str] | None:
-    """Check what the adapter decides; return the keywords that it takes, None: unknown."""
+    """Check what the adapter decides; return the keywords that it accepts, None: unknown."""
     interface = values.get('interface')
     if adapters is None or interface is None:
         return None
@@ -120,7 +120,7 @@ def _check_adapter(tree: Tree, path: Path, values: dict[str, Any], adapters: Ada
 
 
 def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str] | None) -> None:
-    """Look for keys that are neither ours nor the adapter's."""
+    """Report keys that are neither the bridge's nor the adapter's."""
     ours = definition('bus')['properties']
     for key in entry:
         if key in ours or (keywords is not None and key in keywords):
@@ -136,7 +136,7 @@ def _check_keys(tree: Tree, path: Path, entry: dict[str, Any], keywords: set[str
 
 
 def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> None:
-    """Look whether the place of traces can be named, if there will be any."""
+    """Check that the directory of traces can be named, if there will be any."""
     if values['trace_seconds'] > 0.0:
         try:
             pathlib.Path(values['trace_directory']).expanduser()
@@ -147,7 +147,7 @@ def _check_trace_directory(tree: Tree, path: Path, values: dict[str, Any]) -> No
 
 def _look_for_twin(tree: Tree, bus: BusConfiguration, others: dict[str, BusConfiguration],
                    adapters: Adapters | None) -> None:
-    """Look for an earlier bus at the same place; a serial port can be opened only once."""
+    """Report an earlier bus at the same place; a serial port can be opened only once."""
     path = ('buses', bus.name, 'channel')
     port = set(adapters.serial_port(bus)) if adapters is not None else set()
     for other in others.values():
@@ -197,9 +197,9 @@ def _by_family(drives: Iterable[DriveConfiguration],
 def check_identifiers(tree: Tree, drives: Iterable[DriveConfiguration],
                       buses: Mapping[str, BusConfiguration]) -> None:
     """
-    Look for drives that use identifiers of an earlier one on their bus.
+    Report drives that use identifiers of an earlier one on their bus.
 
-    Whatever that is called: a bus that is opened twice has two masters for what stands twice.
+    Whatever the names: on a bus that is opened twice, a drive listed twice has two masters.
     """
     claimed: dict[str, list[tuple[Claim, DriveConfiguration]]] = {}
     for drive in drives:
@@ -243,7 +243,7 @@ def check_load(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfigur
 
 
 def check_rounds(tree: Tree, bus: BusConfiguration, drives: Iterable[DriveConfiguration]) -> None:
-    """Look for drives whose round of polling does not fit their period."""
+    """Report drives whose round of polling does not fit their period."""
     for drive in drives:
         shortest = FAMILIES[drive.protocol].shortest_period(drive, bus.bitrate)
         # rounded up, but not for what binary fractions add: what is named here has to pass
@@ -263,7 +263,7 @@ _FRAME_BITS = 160
 
 def check_adapter(tree: Tree, bus: BusConfiguration, drives: Sequence[DriveConfiguration],
                   traits: AdapterTraits) -> None:
-    """Look for what an adapter cannot do, and these drives need."""
+    """Report what these drives need and an adapter cannot do."""
     path = ('buses', bus.name)
     if bus.options.get(_LISTEN_ONLY):
         instead = traits.listen_only
@@ -291,7 +291,7 @@ def check_adapter(tree: Tree, bus: BusConfiguration, drives: Sequence[DriveConfi
 
 def _check_latency(tree: Tree, bus: BusConfiguration, drive: DriveConfiguration,
                    traits: AdapterTraits) -> None:
-    """Look whether a drive's answers come within its period, as long as the adapter keeps them."""
+    """Check that a drive's answers come within its period, with the latency of the adapter."""
     family = FAMILIES[drive.protocol]
     # of those that are polled, each answer is waited for before the next question
     exchanges = 1 if family.cyclic else max(1, round(
@@ -304,7 +304,7 @@ def _check_latency(tree: Tree, bus: BusConfiguration, drive: DriveConfiguration,
 
 
 def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
-    """Look for what drives of one bus cannot do together, family by family."""
+    """Report what drives of one bus cannot do together, family by family."""
     for family, together in _by_family(drives):
         for drive, (key, message) in family.check_together(together):
             path = ('drives', drive.name, *(key.split('.') if key else ()))
@@ -312,7 +312,7 @@ def check_neighbours(tree: Tree, drives: Iterable[DriveConfiguration]) -> None:
                 tree.wrong(path, message)
 
 
-#: characters of a topic or service that ROS takes: 255, without what it puts in front
+#: characters of a topic or service that ROS accepts: 255, without what it puts in front
 _TOPIC_MAX = 247
 #: the longest name of those that every drive has
 _SERVICE = 'set_parameters_atomically'
@@ -320,7 +320,7 @@ _SERVICE = 'set_parameters_atomically'
 
 def check_topics(tree: Tree, drives: Iterable[DriveConfiguration], namespace: str) -> None:
     """
-    Look for names that are too long together: ROS refuses them in the middle of configuring.
+    Report names that are too long together: ROS refuses them in the middle of configuring.
 
     :param namespace: of the bridge, without the slash at its end.
     """
@@ -406,7 +406,7 @@ class _JointChecker:
 
     def _check_counter(self, named: dict[str, str], factors: dict[str, float],
                        continuous: bool | int) -> None:
-        """Check what becomes of the position where its counter wraps."""
+        """Check the position where its counter wraps."""
         position, command = named.get('position'), named.get(f'position{_COMMAND}')
         if continuous is not False and position is None:
             self._wrong('continuous', complaints.continuous_without_position())
@@ -492,7 +492,7 @@ class _JointChecker:
 BRIDGE_NAME = 'drive_can_bridge'
 _NO_PROFILE = Profile('', '', '', ())
 LISTS = ('cyclic_request', 'cyclic_response')
-#: keys that a drive does not simply have as they are given
+#: keys whose values a drive does not use as they are
 _MADE = ('profile', 'protocol', 'rearm', 'joint')
 
 #: s, from which on a period was probably meant in ms
@@ -574,7 +574,7 @@ class DriveChecker:
         self._loaded = loaded
 
     def _list(self, key: str, family: Family | None) -> tuple[Parameter, ...]:
-        """Resolve a list of parameter names; what has a problem is a stand-in, not listed."""
+        """Resolve a list of parameter names; one with a problem becomes an unlisted stand-in."""
         found: list[Parameter] = []
         path = (*self._path, key)
         for position, name in enumerate(self._entry.get(key, [])):
@@ -646,7 +646,7 @@ class DriveChecker:
                             at=(*self._path, 'cyclic_request', position))
 
     def _look_for_limits(self, drive: DriveConfiguration) -> None:
-        """Point to limits that nobody said are limits: the drive has none of it until armed."""
+        """Warn of setpoints that look like limits and are not marked: they are 0 until armed."""
         control, joint = drive.profile.control, drive.joint
         no_limits = {None if control is None else control.parameter}
         if joint is not None:
@@ -690,7 +690,7 @@ class DriveChecker:
 
     def _place(self, complaints: Iterator[Complaint],
                note: Callable[[Tree, Path, Sentence], None]) -> None:
-        """Put what a family complains about where it belongs."""
+        """Record a family's complaints at their places."""
         for key, message in complaints:
             parts = tuple(key.split('.')) if key else ()
             if parts[:1] == ('profile',) and len(parts) > 1 and self._loaded is not None:
@@ -700,7 +700,7 @@ class DriveChecker:
 
 
 def _built_in(name: str, family: Family | None) -> Sentence:
-    """Say that a name means what the family exchanges by itself; '' if it does not."""
+    """Return that the family exchanges a name by itself; '' if it does not."""
     if family is None or not family.control_built_in:
         return NOTHING
     plain = _plain(name)
@@ -712,12 +712,12 @@ def _built_in(name: str, family: Family | None) -> Sentence:
 
 
 def _plain(name: str) -> str:
-    """Return a name without what makers write differently: Statusword, status_word."""
+    """Return a name without differences of spelling between makers: Statusword, status_word."""
     return name.lower().replace('_', '')
 
 
 def _direction_problem(key: str, parameter: Parameter) -> Sentence:
-    """Say why a parameter cannot travel in this direction; '' if it can."""
+    """Return why a parameter cannot be exchanged in this direction; '' if it can."""
     if not parameter.listed:
         return NOTHING
     name = parameter.name

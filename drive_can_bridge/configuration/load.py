@@ -2,8 +2,8 @@
 """
 From a parameter file, or from the parameter overrides of a node, to a checked configuration.
 
-Both ways run the same checks, and all of them: a user sees every problem at once. Also what the
-node declares, and what may change while it runs.
+Both ways run the same checks, and all of them: a user sees every problem at once. Also the
+parameters that the node declares, and those that may change while it runs.
 """
 
 from array import array
@@ -46,7 +46,7 @@ __all__ = ['check_dynamic', 'configuration_from_file', 'configuration_from_overr
 
 def tree_from_overrides(overrides: Mapping[str, object]) -> Tree:
     """
-    Nest dotted names.
+    Return a tree of parameters with dotted names.
 
     rcl turns ``[]`` into a parameter without type, which rclpy shows as None; hence None is the
     empty list. A name that is a value and holds others is noted as a problem.
@@ -85,12 +85,12 @@ DYNAMIC_KEYS = ('diagnostics_period',)
 
 
 def identity_name(drive: str) -> str:
-    """Return the name of the parameter that says who a drive is; the bridge itself sets it."""
+    """Return the name of the parameter with a drive's identity, which the bridge itself sets."""
     return f'drives.{drive}.identity'
 
 
 def restore_text(table: RestoreTable) -> str:
-    """Write the ``restore`` section of a profile for clients of the node."""
+    """Return the ``restore`` section of a profile as text for clients of the node."""
     return json.dumps({phase: [[step.parameter, step.bits, step.mask] for step in steps]
                        for phase, steps in (('before', table.before), ('after', table.after))})
 
@@ -116,7 +116,7 @@ def declared_parameters(configuration: BridgeConfiguration) -> list[DeclaredPara
 
 def check_dynamic(name: str, value: object) -> Sentence | None:
     """
-    Say why a parameter cannot be set to a value while the node runs; None: it can.
+    Return why a parameter cannot be set to a value while the node runs; None: it can.
 
     An integer is accepted for a number.
     """
@@ -206,7 +206,7 @@ def configuration_from_overrides(overrides: Mapping[str, object], *,
     Check the parameter overrides of a node.
 
     :param overrides: values by dotted name, as rclpy gives them; None is rcl's empty list.
-    :param namespace: of the node, which no file tells; without a slash at its end.
+    :param namespace: of the node, which is in no file; without a slash at its end.
     :param setter: which file sets the profile of a drive.
     :raises ConfigurationError: with one line per problem, ``key.path: message``; what is wrong
         inside a profile still has its file and line.
@@ -256,7 +256,7 @@ def _configuration(tree: Tree, adapters: Adapters | None,
 def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
                     drives: Mapping[str, DriveConfiguration],
                     checkers: Mapping[str, DriveChecker], adapters: Adapters | None) -> None:
-    """Check what drives do to each other, as far as enough is known of them."""
+    """Check drives together, as far as enough is known of them."""
     placed = {name: drive for name, drive in drives.items()
               if checkers[name].is_sound('bus', 'protocol', 'station')}
     paced = [drive for name, drive in drives.items()
@@ -275,7 +275,7 @@ def _check_together(tree: Tree, buses: Mapping[str, BusConfiguration],
 
 
 def _forget_findings(tree: Tree) -> None:
-    """Leave out what the bridge finds out by itself: ``ros2 param dump`` writes that too."""
+    """Remove what the bridge sets by itself: ``ros2 param dump`` writes that too."""
     if isinstance(tree.data.get('bridges'), list):
         del tree.data['bridges']
     drives = tree.data.get('drives')
@@ -300,7 +300,7 @@ def _look_for_directories(tree: Tree, directories: list[str]) -> None:
 
 
 def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | None:
-    """Say what needs to know more than the schema does, see :data:`.schema.Override`."""
+    """Return the sentence that needs more than the schema, see :data:`.schema.Override`."""
     if path[:1] != ('drives',) or len(path) != 3 or keyword not in (
             'enum', 'type', 'additionalProperties'):
         return None
@@ -325,7 +325,7 @@ def _sentence(tree: Tree, path: Path, value: Any, keyword: str) -> Sentence | No
 
 
 def of_one_bus(configuration: BridgeConfiguration, name: str) -> BridgeConfiguration:
-    """Return what is left of a configuration with one of its buses."""
+    """Return the part of a configuration with one of its buses."""
     return replace(
         configuration, buses={name: configuration.buses[name]},
         drives={drive.name: drive for drive in configuration.drives.values()
@@ -344,7 +344,7 @@ def bridge_names(buses: Iterable[str]) -> dict[str, str]:
 
 
 class _Dumper(yaml.SafeDumper):     # type: ignore[misc]  # has no types
-    """Quotes text that rcl would take for something else: ``y``, ``1e5``, ``08``."""
+    """Quotes text that rcl would read as something else: ``y``, ``1e5``, ``08``."""
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:

@@ -3,7 +3,7 @@
 Find the bridge's parameters in a ROS parameter file.
 
 A file may serve many nodes: ``NODE: {ros__parameters: …}``, the node name possibly split over
-nested namespaces. ``validate`` and ``simulate`` take the one section that holds ``buses``, and
+nested namespaces. ``validate`` and ``simulate`` use the one section that holds ``buses``, and
 like rcl all others for the same node, such as ``/**``: the last in the file counts. What makes rcl
 refuse the whole file counts in every section, what only garbles parameters counts in ours.
 """
@@ -23,11 +23,11 @@ from drive_can_bridge.core.messages import Sentence
 from drive_can_bridge.core.text import nearest
 
 PARAMETERS_KEY = 'ros__parameters'
-#: tells the section of a bridge from those of other nodes
+#: distinguishes the section of a bridge from those of other nodes
 MARK = 'buses'
-#: what holds entries by name, and what one of them is
+#: keys that hold entries by name, and the key of one of them
 _OURS = {'buses': 'bus', 'drives': 'drive'}
-#: tell a profile, which is no file for nodes
+#: keys that show a profile, which is no file for nodes
 _PROFILE_KEYS = {'protocols', 'parameters'}
 #: how much a key has to look like that to be a slip of the pen, and no namespace
 _SLIP = 0.75
@@ -53,7 +53,7 @@ class NodeSection(NamedTuple):
 
 class _FileReader:
     """
-    Read all sections of a parameter file, and note what rcl does not take.
+    Reads all sections of a parameter file, and records what rcl refuses.
 
     :raises OSError: the file cannot be read.
     """
@@ -161,14 +161,14 @@ def section_names(path: FilePath) -> list[str]:
 def unseen_problems(paths: Iterable[FilePath], node: str,
                     ) -> tuple[list[Problem], list[Problem]]:
     """
-    Look for what rcl does to the parameters of a node without a word.
+    Return what rcl does silently to the parameters of a node.
 
-    Of keys that stand twice it takes the last, and what follows an empty mapping it puts into
-    that: a node that only sees what is left cannot tell.
+    Of duplicate keys it uses the last, and what follows an empty mapping it puts into
+    that: a node that only sees the result cannot notice.
 
     :param node: full name of the node.
     :return: duplicate keys; and what makes all that the node sees doubtful. Nothing of a file that
-        has gone since: launch removes those that it wrote.
+        is gone since: launch removes those that it wrote.
     """
     found: list[Problem] = []
     garbled: list[Problem] = []
@@ -207,7 +207,7 @@ def directory_that_sets(paths: Iterable[FilePath], node: str, key: Path,
 
 
 def _is_for(section: str, node: str) -> bool:
-    """Return whether rcl takes a section for a node: ``*`` is one token, ``**`` are any."""
+    """Return whether a section is for a node: ``*`` is one token, ``**`` are any."""
     # several in a row are one: tried in all ways, they would take for ever
     section = re.sub(r'(/\*\*)+', '/**', f'/{section.removeprefix("/")}')
     pattern = re.escape(section)
@@ -227,7 +227,7 @@ def read_parameter_file(path: FilePath) -> tuple[Tree | None, list[Problem]]:
     problems = reader.problems
     if reader.broken:
         return None, problems
-    # one with drives, but without buses, is meant for us, too: what is wrong with it can be told
+    # one with drives, but without buses, is meant for us, too: its faults can be reported
     ours = reader.sections_with(MARK) or reader.sections_with('drives')
     if len(ours) == 1:
         tree = _as_rcl_merges(reader.sections, ours[0])
@@ -253,10 +253,10 @@ def _as_rcl_merges(sections: Iterable[NodeSection], own: NodeSection) -> Tree:
     """
     Return what the node of a section gets from all sections of a file.
 
-    Those that are for it in other namespaces are told: nobody knows here where it will run.
+    Those that are for it in other namespaces give a warning: where it will run is unknown here.
     """
     node = _some_node(own.name)
-    together: dict[str, list[Tree]] = {}     # rcl lets a name stand where it stands first
+    together: dict[str, list[Tree]] = {}     # rcl keeps a name at its first place
     elsewhere: list[Problem] = []
     for name, tree, *_ in sections:
         other = _some_node(name)
@@ -284,7 +284,7 @@ def _some_token(pattern: str) -> str:
 
 
 def _lay_over(below: Tree, above: Tree) -> None:
-    """Lay the parameters of a section over those of an earlier one."""
+    """Merge the parameters of a section over those of an earlier one."""
     def lay(path: Path, under: dict[str, Any], over: dict[str, Any]) -> None:
         for key, value in over.items():
             there, here = under.get(key), (*path, key)

@@ -3,7 +3,7 @@
 Problems, and where they are.
 
 A :class:`Tree` is a piece of configuration with the place it came from: a section of a parameter
-file, a profile, or the overrides of a node (which have no file). All checks note in trees what
+file, a profile, or the overrides of a node (which have no file). All checks record in trees what
 they find, so that the same check names ``FILE:LINE: key.path`` or ``key.path``.
 """
 
@@ -19,7 +19,7 @@ Path = tuple[Union[str, int], ...]
 
 #: characters of a message, which names what may be many
 MESSAGE_MAX = 2000
-#: lines that anybody reads; a file of 4 MiB may have a million mistakes
+#: lines that a user may read; a file of 4 MiB may have a million mistakes
 PROBLEMS_MAX = 1000
 
 
@@ -39,7 +39,7 @@ class Problem(NamedTuple):
     message: Sentence
 
     def __str__(self) -> str:
-        """Write the line that users see; it stays one, whatever a key or value contains."""
+        """Return the line that users see; always one line, whatever a key or value contains."""
         place = f'{printable(self.file, None)}:{self.line}: ' if self.file else ''
         key = f'{printable(self.key)}: ' if self.key else ''
         return f'{place}{key}{printable(self.message, MESSAGE_MAX)}'
@@ -54,11 +54,11 @@ class Problem(NamedTuple):
 @dataclass(frozen=True)
 class Tree:
     """
-    Nested mappings, lists and scalars with their places, and what was found in them.
+    Nested mappings, lists and scalars with their places, and the problems found in them.
 
     :param lines: line of every key and list item, by path.
     :param damaged: paths whose value is missing or useless because of a problem noted already.
-    :param incomplete: paths of mappings that had a key nobody could read: what seems to be
+    :param incomplete: paths of mappings that had an unreadable key: what seems to be
         missing in them may have been meant by it.
     :param problems: what is wrong, in the order in which it was found.
     :param warnings: what is allowed but suspicious, likewise.
@@ -81,7 +81,7 @@ class Tree:
 
     def wrong(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
         """
-        Note a problem with the value at ``path``.
+        Record a problem with the value at ``path``.
 
         :param at: path of the line, where it is another one (an item of a list).
         """
@@ -89,11 +89,11 @@ class Tree:
         self.problems.append(self.problem(path, message, at=at))
 
     def suspicious(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
-        """Note that the value at ``path`` is allowed, but probably not what is meant."""
+        """Record that the value at ``path`` is allowed, but probably not what is meant."""
         self.warnings.append(self.problem(path, message, at=at))
 
     def problem(self, path: Path, message: Sentence, *, at: Path | None = None) -> Problem:
-        """Describe a problem with the value at ``path`` without noting it."""
+        """Return a problem with the value at ``path`` without recording it."""
         key = '.'.join(part for part in path if isinstance(part, str))
         return Problem(self.file, self.line(path if at is None else at), key, message)
 
@@ -107,7 +107,7 @@ class Tree:
             parent.pop(path[-1], None)
 
     def is_damaged(self, path: Path) -> bool:
-        """Return whether the value at ``path``, or what it stands in, was found useless."""
+        """Return whether the value at ``path``, or what contains it, was found useless."""
         return any(path[:length] in self.damaged for length in range(len(path) + 1))
 
     def is_sound(self, path: Path) -> bool:
@@ -119,7 +119,7 @@ class Tree:
 
 def report(problems: Iterable[Problem]) -> list[Sentence]:
     """
-    Write problems as lines: no line twice, those of one file together and in its order.
+    Return problems as lines: without duplicates, by file and in its order.
 
     Of more than :data:`PROBLEMS_MAX` the last line says how many.
     """

@@ -3,7 +3,7 @@
 From the tree of a profile, section by section, to a parameter table.
 
 Checked here is what holds for every drive that uses the profile. What a protocol family cannot do
-with it is the family's business, see :meth:`drive_can_bridge.protocols.family.Family.check`.
+with it the family checks, see :meth:`drive_can_bridge.protocols.family.Family.check`.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,12 +32,12 @@ RESERVED = frozenset((
     'describe_parameters', 'get_parameter_types', 'enable', 'reset_fault', 'quick_stop',
     'home',
 ))
-#: what the values of a parameter's keys become
+#: what the keys of a parameter hold
 _MADE: dict[str, Callable[[Any], Any]] = {
     'type': ParameterType, 'access': AccessMode, 'storage': Storage,
     'bits': lambda bits: tuple(bits.items()), 'values': lambda given: (),
     **dict.fromkeys(('scale', 'offset', 'minimum', 'maximum', 'arming_tolerance'), float)}
-#: what reads as the name of a parameter that stands in no profile
+#: looks like the name of a parameter that is in no profile
 RAW_NAME = re.compile(r'p[0-9]+|x[0-9a-f]+', re.ASCII)
 
 
@@ -60,7 +60,7 @@ def check_control(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
             if word > largest:
                 tree.wrong(('control', 'words', key), complaints.word_too_large(
                     word=word, name=parameter.name, largest=largest, type=parameter.type.value))
-    for key, word in words.items():     # nothing but ~/enable starts a drive
+    for key, word in words.items():     # only ~/enable starts a drive
         if key != 'enable' and word == words.get('enable'):
             tree.wrong(('control', 'words', 'enable'), complaints.word_twice(word=word, entry=key))
     if isinstance(control.get('status'), dict):
@@ -104,7 +104,7 @@ def _largest_word(parameter: Parameter) -> int:
 
 
 def control_table(control: dict[str, Any]) -> ControlTable:
-    """Make the table of a section without a fault."""
+    """Return the table of a section without a fault."""
     words, status = control['words'], control.get('status', {})
 
     def pattern(key: str) -> StatusPattern | None:
@@ -141,7 +141,7 @@ def check_names(tree: Tree, path: Path, given: dict[str, Any],
     """
     Check names by integers.
 
-    :param parameter: whose raw integers they are; None: nothing is known of it.
+    :param parameter: the parameter of these raw integers; None: it is unknown.
     """
     numbers: dict[int, str] = {}
     names: dict[str, str] = {}
@@ -205,7 +205,7 @@ def _check_bit(tree: Tree, text: str, parameters: dict[str, Parameter],
 
 
 def fault_table(section: dict[str, Any], parameters: dict[str, Parameter]) -> FaultTable:
-    """Make the table of a section without a fault."""
+    """Return the table of a section without a fault."""
     name, _, bit = section.get('bit', '').partition('.')
     position = dict(parameters[name].bits).get(bit) if name in parameters else None
     return FaultTable(
@@ -256,7 +256,7 @@ def check_restore(tree: Tree, parameters: dict[str, Parameter], names: tuple[str
 
 
 def restore_table(tree: Tree, parameters: dict[str, Parameter]) -> RestoreTable:
-    """Make the table of the section; where something is wrong, nothing of it may be used."""
+    """Return the table of the section; empty where anything in it is wrong."""
     if not tree.is_sound(('restore',)) or any(
             name not in parameters for _, name, _ in _steps(tree)):
         return RestoreTable()
@@ -301,7 +301,7 @@ def _steps(tree: Tree) -> Iterator[tuple[str, str, Any]]:
 @dataclass(frozen=True, slots=True)
 class LoadedProfile:
     """
-    A profile with everything that is right in it.
+    A profile with everything in it that is right.
 
     :param tree: with what was found in it.
     :param names: all parameter names of the file, wrong ones included: a reference to one of them
@@ -324,7 +324,7 @@ class LoadedProfile:
 
 
 def profile_from_tree(tree: Tree) -> LoadedProfile:
-    """Check a profile and make what can be made of it."""
+    """Check a profile, and return what of it can be used."""
     given = tree.data.get('parameters')
     names = tuple(map(str, given)) if isinstance(given, dict) else ()
     check_schema(tree, checked_profile())
@@ -372,7 +372,7 @@ def profile_from_tree(tree: Tree) -> LoadedProfile:
 
 
 def _name_words(parameters: dict[str, Parameter], name: str, words: dict[str, int]) -> None:
-    """Let what a control word says, in a short word, stand beside it wherever it is shown."""
+    """Name the values of a control word in short words, wherever it is shown."""
     parameter = parameters.get(name)
     if parameter is not None and not parameter.values and parameter.kind is ValueKind.INTEGER:
         parameters[name] = replace(parameter, values=tuple(
@@ -381,7 +381,7 @@ def _name_words(parameters: dict[str, Parameter], name: str, words: dict[str, in
 
 
 def _name_faults(parameters: dict[str, Parameter], fault: FaultTable) -> None:
-    """Let the names of faults stand beside their number wherever it is shown."""
+    """Name the values of a fault number, wherever it is shown."""
     number = parameters[fault.parameter]
     if not number.values:
         parameters[number.name] = replace(number, values=fault.codes)
@@ -432,7 +432,7 @@ def _check_parameter(tree: Tree, path: Path, parameter: Parameter, entry: dict[s
 
 def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
                         entry: dict[str, Any]) -> None:
-    """Check what a setpoint says that stays where the axis is."""
+    """Check a setpoint that stays where the axis is."""
     if not parameter.neutral_from or not tree.is_sound((*path, 'neutral_from')):
         return
     if 'neutral' in entry:
@@ -444,7 +444,7 @@ def _check_neutral_from(tree: Tree, path: Path, parameter: Parameter,
 
 
 def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, Any]) -> None:
-    """Check what bounds and moves nothing."""
+    """Check a limit."""
     if not parameter.limit:
         return
     if 'neutral_from' in entry:
@@ -519,7 +519,7 @@ def _nearest(parameter: Parameter) -> Value:
 
 
 def _narrowed(tree: Tree, path: Path, parameter: Parameter) -> Parameter:
-    """Bring limits that the type cannot hold to its ends, and say so."""
+    """Reduce limits that the type cannot hold to its range, with a warning."""
     slack = abs(parameter.scale) * STEP_TOLERANCE
     low, high = parameter.value_range
     ends: dict[str, float] = {}

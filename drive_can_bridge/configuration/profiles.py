@@ -31,7 +31,7 @@ Setter = Callable[[str, str], FilePath | None]
 
 
 def place_profiles(tree: Tree, directory_of: Setter) -> None:
-    """Make the relative paths of profiles in a tree absolute, or note why that cannot be."""
+    """Make the relative paths of profiles in a tree absolute, or record why that is impossible."""
     drives = tree.data.get('drives')
     for name, drive in drives.items() if isinstance(drives, dict) else ():
         profile = drive.get('profile') if isinstance(drive, dict) else None
@@ -55,7 +55,7 @@ def _everybody_writes(directory: FilePath) -> bool:
     try:
         return bool(os.stat(directory).st_mode & stat.S_IWOTH)
     except OSError:
-        return False    # it has gone: nothing will be found there
+        return False    # it is gone: nothing will be found there
 
 
 class ProfileStore:
@@ -104,7 +104,7 @@ class ProfileStore:
             path = directory / f'{name}{SUFFIX}'
             if _is_file(path):
                 return path
-            if os.path.exists(path):    # a pipe, say: nobody waits for what comes out of it
+            if os.path.exists(path):    # a pipe, say: its contents are not waited for
                 return complaints.cannot_be_read(path=path, why='not a regular file')
         if name.endswith(SUFFIX):
             return complaints.name_with_suffix(name=name, suffix=SUFFIX)

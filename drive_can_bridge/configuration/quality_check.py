@@ -3,7 +3,7 @@
 Quality of service of topics, which users may override: standard parameters of ROS.
 
 Each is called ``qos_overrides.TOPIC.publisher.POLICY``, or ``subscription``, perhaps with ``_ID``.
-A topic may have dots, and a file may nest names at any of them. rclpy looks at what is given when
+A topic may have dots, and a file may nest names at any of them. rclpy checks the values when
 it makes the topic, in the middle of configuring.
 """
 
@@ -18,7 +18,7 @@ from drive_can_bridge.core.complaints import suggestion
 _KEY = 'qos_overrides'
 _ENDS = ('publisher', 'subscription')
 _BY_OTHERS = ('best_available', 'system_default')
-#: what the topics of a bridge take; the other policies of ROS are let be
+#: policies that the topics of a bridge accept; the other policies of ROS are not checked
 _POLICIES: dict[str, dict[str, Any]] = {
     'history': {'enum': ['keep_last', 'keep_all', 'system_default']},
     'depth': {'type': 'integer', 'minimum': 0, 'maximum': 2**31 - 1},
@@ -30,7 +30,7 @@ _POLICIES: dict[str, dict[str, Any]] = {
 
 
 def check_qualities(tree: Tree) -> None:
-    """Look for qualities that no topic can have."""
+    """Report qualities that no topic can have."""
     for key, value in tree.data.items():
         if key.split('.')[0] == _KEY:
             for path, given in _values((key,), value):

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a scalar of a parameter file is to rcl.
+How rcl reads a scalar of a parameter file.
 
 rcl compares a scalar with a list of words, then tries C's ``strtoll`` with base 0, then
 ``strtod``; what is left is a string. So ``y`` is a bool, ``010`` is 8, ``08`` is 8.0, ``1_000``,
@@ -50,7 +50,7 @@ _DIGITS_MAX = 64
 
 def read_scalar(text: str, *, quoted: bool = False, tag: str | None = None) -> Scalar:
     """
-    Return the value that rcl gives to a scalar.
+    Return the value as which rcl reads a scalar.
 
     :param text: the scalar after YAML's own unescaping and folding.
     :param quoted: single or double quoted; block scalars count as plain.
@@ -68,7 +68,7 @@ def read_scalar(text: str, *, quoted: bool = False, tag: str | None = None) -> S
 
 
 def _integer(text: str) -> int | None:
-    """Do what ``strtoll(text, &end, 0)`` does, when it takes the whole text without overflow."""
+    """Return ``strtoll(text, &end, 0)``, if it reads the whole text without overflow."""
     match = _INTEGER.fullmatch(text)
     if match is None or len(text.lstrip(' \t\n\v\f\r+-0')) > _DIGITS_MAX:
         return None
@@ -85,7 +85,7 @@ def _integer(text: str) -> int | None:
 
 
 def _float(text: str) -> float | None:
-    """Do what ``strtod`` does, when it takes the whole text without overflow or underflow."""
+    """Return the result of ``strtod``, if it reads the whole text without over- or underflow."""
     if text in _YAML_FLOATS:
         return _YAML_FLOATS[text]
     special = _SPECIAL.fullmatch(text)

@@ -3,11 +3,11 @@
 The JSON Schemas of the parameter file and of profiles, and the check of a tree against them.
 
 Editors use the shipped files for completion (``# yaml-language-server: $schema=…``); a test
-compares them. To write them anew: ``python3 -m drive_can_bridge.configuration.schema``. The keys
+compares them. To write them again: ``python3 -m drive_can_bridge.configuration.schema``. The keys
 of every protocol family are put into the schema of the parameter file.
 
-What is wrong is told in sentences of our own, cut out of the tree and marked as damaged, so that
-later checks find either good values or none.
+What is wrong is reported in sentences of our own, cut out of the tree and marked as damaged, so
+that later checks find either good values or none.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -60,7 +60,7 @@ _Validator = extend(
 
 def check_schema(tree: Tree, schema: Schema, *, override: Override | None = None) -> None:
     """
-    Check a tree, note what is wrong in it, and cut that out.
+    Check a tree, record what is wrong in it, and cut that out.
 
     :param schema: without references, see :func:`resolved`.
     :param override: see :data:`Override`; called with path, value and the violated keyword.
@@ -79,7 +79,7 @@ def check_schema(tree: Tree, schema: Schema, *, override: Override | None = None
 
 
 def check_value(value: Any, schema: Schema) -> Sentence | None:
-    """Say what is wrong with a single value; None: nothing."""
+    """Return what is wrong with a single value; None: nothing."""
     for error in _Validator(schema).iter_errors(value):
         return _message(error)
     return None
@@ -99,7 +99,7 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
                 theirs = complaints.called_otherwise(key, (
                     str(each) for each in error.instance
                     if each not in error.schema.get('properties', {})))
-                # where others are known, an unknown key says itself what it should be
+                # where others are known, an unknown key is reported with what it should be
                 plain = theirs is None or error.schema.get('additionalProperties') is False
                 yield here, complaints.missing(allowed=allowed(option)) if plain else (
                     complaints.missing_called(allowed=allowed(option), theirs=theirs, ours=key)
@@ -116,7 +116,7 @@ def _sentences(error: ValidationError, tree: Tree) -> Iterator[tuple[Path, Sente
         yield here, _message(error), here
     elif error.validator == 'minProperties' and any(
             place[:-1] == path for place in tree.damaged):
-        yield path, NOTHING, path   # it had some, and what is wrong with them was said
+        yield path, NOTHING, path   # it had some, and what is wrong with them was reported
     elif path and isinstance(path[-1], int):
         yield path[:-1], _message(error), path
     else:
@@ -192,7 +192,7 @@ _FACTORS = {'': 1.0, 's': 1.0, 'ms': 1e-3, 'us': 1e-6, 'bit/s': 1.0, **{
 
 
 def _number_in(text: str, schema: Any) -> float | int | None:
-    """Return the number that a text with quotes, or with a unit, stands for: ``1M``, ``20ms``."""
+    """Return the number in a text with quotes, or with a unit: ``1M``, ``20ms``."""
     found = _NUMBER.fullmatch(text.strip())
     types = schema.get('type')
     if found is None or types not in ('number', 'integer') or found[2].lower() not in _FACTORS:
@@ -205,7 +205,7 @@ def _number_in(text: str, schema: Any) -> float | int | None:
 
 
 def allowed(schema: Any) -> str:
-    """Say in words what a schema accepts."""
+    """Return in words what a schema accepts."""
     if not isinstance(schema, dict):
         return 'a value'
     if 'patternErrorMessage' in schema:
@@ -263,7 +263,7 @@ def profile_schema() -> Schema:
 
 @lru_cache(maxsize=None)
 def checked_bridge() -> Schema:
-    """Return what :func:`check_schema` takes for the parameters of a bridge."""
+    """Return the schema of a bridge's parameters for :func:`check_schema`."""
     definitions = parameter_file_schema()['$defs']
     bridge: Schema = resolved(definitions['bridge'], definitions)
     return bridge
@@ -271,14 +271,14 @@ def checked_bridge() -> Schema:
 
 @lru_cache(maxsize=None)
 def checked_profile() -> Schema:
-    """Return what :func:`check_schema` takes for a profile."""
+    """Return the schema of a profile for :func:`check_schema`."""
     schema = profile_schema()
     profile: Schema = resolved(schema, schema['$defs'])
     return profile
 
 
 def resolved(schema: Any, definitions: Schema) -> Any:
-    """Put definitions where references to them are: jsonschema looks up each one again."""
+    """Replace references by their definitions: jsonschema looks up each one again."""
     if isinstance(schema, list):
         return [resolved(part, definitions) for part in schema]
     if not isinstance(schema, dict):
@@ -293,7 +293,7 @@ def resolved(schema: Any, definitions: Schema) -> Any:
 
 def compose(base: Schema, families: list[Family]) -> Schema:
     """
-    Add the keys of the families to the base.
+    Return the base schema with the keys of the families.
 
     A key stands among the properties of a drive, so that editors know it whatever the protocol;
     where the protocol is given, keys of other families are forbidden and a key that families
@@ -329,7 +329,7 @@ def compose(base: Schema, families: list[Family]) -> Schema:
 
 
 def _forbidden(key: str, family: Family, families: list[Family]) -> Schema:
-    """Accept nothing. Not by ``false``: jsonschema forgets the path of what that refuses."""
+    """Return a schema that accepts nothing. Not ``false``: jsonschema loses its path."""
     owners = ', '.join(other.name for other in families if key in other.options_schema)
     message = complaints.key_of_others(owners=owners, family=family.name)
     return {'not': {}, 'errorMessage': message}

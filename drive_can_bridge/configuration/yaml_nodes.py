@@ -3,8 +3,8 @@
 YAML files as nodes with lines, and from those to plain data, under the rules of ROS parameters.
 
 Nodes are put together from PyYAML's event stream, as rcl does: only there can be seen what rcl
-refuses (aliases, anchors that stand twice). No recursion: no nesting of a file ends in the depths
-of the C stack. Everything wrong is noted and reading goes on.
+refuses (aliases, duplicate anchors). No recursion: no nesting of a file overflows the
+C stack. Everything wrong is recorded and reading goes on.
 """
 
 from collections.abc import Container, Iterator, Mapping
@@ -64,7 +64,7 @@ class BrokenYaml(Exception):
 
 
 class NodeKind(Enum):
-    """What a node is."""
+    """The kinds of nodes."""
 
     SCALAR = 'scalar'
     LIST = 'list'
@@ -171,12 +171,12 @@ def _broken(error: Exception, line: int, data: bytes) -> BrokenYaml:
                       complaints.not_yaml(what=what))
 
 
-#: stands for a value that could not be read
+#: in place of a value that could not be read
 _UNREADABLE = object()
 
 
 class Rules(Enum):
-    """What a mapping may contain."""
+    """The rules for the contents of a mapping."""
 
     #: below ``ros__parameters``: what rcl refuses or garbles is a problem
     PARAMETERS = 'parameters'
@@ -186,9 +186,9 @@ class Rules(Enum):
 
 class TreeReader:
     """
-    Read one mapping, with everything below it, into a :class:`Tree`.
+    Reads one mapping, with everything below it, into a :class:`Tree`.
 
-    What spoils this mapping only is noted in the tree.
+    What spoils this mapping only is recorded in the tree.
 
     :param entries: of mappings that hold entries by name, the keys that an entry may have.
     :ivar refused: what spoils the whole file.
@@ -210,7 +210,7 @@ class TreeReader:
         self._mapping(node, (), self.tree.data)
 
     def _note(self, path: Path, message: Sentence, *, at: Path | None = None) -> None:
-        """Note a problem; the value at ``path`` is not to be used."""
+        """Record a problem; the value at ``path`` is not to be used."""
         self.refused.append(self.tree.problem(path, message, at=at))
         self.tree.damaged.add(path)
 
@@ -262,7 +262,7 @@ class TreeReader:
                 yield key, value
 
     def _no_value(self, key: str, path: Path) -> Sentence:
-        """Say that a key has no value, and why, where that can be seen."""
+        """Return that a key has no value, and why, where that can be seen."""
         for separator, message in ((':', complaints.no_space), (' ', complaints.no_colon)):
             name, found, value = key.partition(separator)
             if found and value.strip():
@@ -316,7 +316,7 @@ class TreeReader:
         return _UNREADABLE if path in self.tree.damaged else items
 
 
-#: stands behind the last key of a mapping
+#: after the last key of a mapping
 _END = YamlNode(NodeKind.LIST, 0, [])
 
 
@@ -325,7 +325,7 @@ def _is_empty(node: YamlNode) -> bool:
 
 
 def _key_problem(key: YamlNode) -> Sentence:
-    """Say why a key cannot be one; NOTHING if it can."""
+    """Return why a key is invalid; NOTHING if it is valid."""
     if key.kind is not NodeKind.SCALAR:
         kind = 'an alias' if key.kind is NodeKind.ALIAS else 'a list or mapping'
         return complaints.no_key(kind=kind)

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Which profiles there are, what is in one, and whether it is right; how one is made of a file.
+Which profiles exist, what is in one, and whether it is valid; how one is made from a file.
 
 Every entry of a file that is imported goes through the very checks that a bridge runs; what does
-not pass is left out, with the sentence that a bridge would say.
+not pass is left out, with the sentence of the bridge.
 """
 
 from collections import Counter
@@ -42,7 +42,7 @@ _DESCRIBED = (
 @dataclass(frozen=True, slots=True)
 class Checked:
     """
-    A profile with everything that a bridge would say about it.
+    A profile with everything that a bridge would report about it.
 
     :param problems: in the order of the file.
     """
@@ -54,17 +54,17 @@ class Checked:
 
     @property
     def entries(self) -> dict[str, dict[str, Any]]:
-        """The entries that are all right, as the file has them."""
+        """The valid entries, as the file has them."""
         parameters = self.loaded.tree.data.get('parameters', {})
         return {name: parameters[name] for name in self.loaded.profile.parameters}
 
     @property
     def sources(self) -> dict[str, str]:
-        """Where the statements come from, by key."""
+        """The sources of the statements, by key."""
         return dict(self.loaded.tree.data.get('sources', {}))
 
     def count(self, verified: bool | None) -> int:
-        """Count the entries that say of themselves that they are verified, are not, or nothing."""
+        """Return how many entries are marked as verified, as not, or (None) as neither."""
         return sum(each.verified is verified for each in self.loaded.profile.parameters.values())
 
 
@@ -122,7 +122,7 @@ def check(path: Path) -> Checked:
 
 
 def description(name: str, parameter: Parameter, entry: dict[str, Any]) -> dict[str, Any]:
-    """Describe an entry with all its keys, given ones and defaults: one JSON document."""
+    """Return an entry with all its keys, given ones and defaults: one JSON document."""
     found = {key: getattr(parameter, key, None) for key in _DESCRIBED}
     return {'name': name,
             **{key: each.value if isinstance(each, Enum) else each for key, each in found.items()},
@@ -139,7 +139,7 @@ def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
     """
     Return what a family cannot do with a table.
 
-    :param protocol: one of the families; what the table is for beside it does not matter.
+    :param protocol: one of the families; others of the table do not matter.
     :return: keys are paths in the profile, ``parameters.speed.type``.
     """
     family = FAMILIES[protocol]
@@ -152,9 +152,9 @@ def family_complaints(profile: Profile, protocol: str) -> list[Complaint]:
 def _complaints(profile: Profile, family: Family, options: object,
                 setpoint: Parameter | None = None) -> Iterator[Complaint]:
     """
-    Yield what a family says of a profile.
+    Yield a family's complaints about a profile.
 
-    :param setpoint: sent each cycle; what is said of that counts, too.
+    :param setpoint: sent each cycle; complaints about that count, too.
     """
     if family.control_built_in:
         profile = replace(profile, control=None)
@@ -186,11 +186,11 @@ class Draft:
     """
     One entry of a file, before it is checked.
 
-    :param line: where it stands, counted from 1.
+    :param line: counted from 1.
     :param section: of an EDS file, in brackets; '' in a table.
-    :param title: what its name is made from.
+    :param title: the text that its name is made from.
     :param entry: keys and values as the schema of profiles knows them.
-    :param remarks: what was not said and had to be decided, or could not be taken over.
+    :param remarks: what was missing and had to be decided, or could not be used.
     :param name: of a standard object; '': made from the title.
     :param parent: name of the record that an element is in; it stands in front of the title where
         that alone is no name.
@@ -217,23 +217,23 @@ class LeftOut:
     reason: str
 
     def __str__(self) -> str:
-        """Write what follows the name of the file: ``345: [2004sub6]: Speed: reason``."""
+        """Return the text behind the name of the file: ``345: [2004sub6]: Speed: reason``."""
         return ': '.join(filter(None, (str(self.line), self.section, self.what, self.reason)))
 
 
 @dataclass(slots=True)
 class FileContent:
     """
-    Everything that a file offers.
+    Everything that a file has to offer.
 
     :param description: of the drive type, where the file has one.
-    :param protocols: that the drive speaks; none: the file does not say.
+    :param protocols: that the drive speaks; none: not in the file.
     :param left_out: entries that are not in the profile.
-    :param notes: about the file: what its columns were taken for, and what is odd.
+    :param notes: about the file: the meaning of its columns, and what is odd.
     :param sections: of the profile, beside its parameters; they name standard objects.
     :param foreign: indices that belong to other axes.
     :param mended: an entry does without a key that is refused, as long as type and address are
-        right; else it is taken whole or not at all.
+        right; else it is used whole or not at all.
     """
 
     description: str = ''
@@ -249,12 +249,12 @@ class FileContent:
 @dataclass(frozen=True, slots=True)
 class Built:
     """
-    A profile.
+    A profile that was made.
 
     :param text: of its file.
     :param names: of its parameters, in the order of the file.
     :param entries: how many the file has, those that cannot be used included.
-    :param remarks: how many entries have a comment that says what had to be decided.
+    :param remarks: how many entries have a comment on what had to be decided.
     :param left_out: in the order of the file.
     """
 
@@ -270,7 +270,7 @@ class Built:
 def build_profile(found: FileContent, source: str, *, description: str = '',
                   protocols: Sequence[str] = ()) -> Built:
     """
-    Make a profile of what a file offers.
+    Return a profile with what a file offers.
 
     :param source: name of the file.
     :param protocols: families that the drive speaks; none: all that can carry the table.
@@ -310,7 +310,7 @@ def build_profile(found: FileContent, source: str, *, description: str = '',
     lost.sort(key=lambda each: each.line)
     if not named:
         raise ImportFailed(command_sentences.no_entry_usable(lost[0] if lost else None))
-    if len(named) < len(found.drafts):  # names once more: of what was left out none is taken
+    if len(named) < len(found.drafts):  # names again: those of entries that were left out are free
         named = _named(list(named.values()), taken)
     sections, notes = _sections(named, found, spoken)
     text = _text(named, found, sections, source, description, spoken, guessed=not said)
@@ -322,7 +322,7 @@ def build_profile(found: FileContent, source: str, *, description: str = '',
 
 
 def _address(draft: Draft) -> tuple[int, int, int]:
-    """Sort by number, else by index; entries with neither do not come out of files."""
+    """Return the key to sort by: number, else index; files have no entries with neither."""
     entry = draft.entry
     return (entry.get('number', entry.get('index', 0)), entry.get('subindex', -1), draft.line)
 
@@ -380,7 +380,7 @@ def _loaded(named: dict[str, Draft], protocols: Sequence[str],
 
 
 def _unmended(named: dict[str, Draft], problems: Iterable[Problem]) -> list[Problem]:
-    """Take refused keys out of entries, and return the problems that this does not mend."""
+    """Remove refused keys from entries, and return the problems that this does not solve."""
     left = []
     for problem in problems:
         _, name, *rest = problem.key.split('.')
@@ -397,10 +397,10 @@ def _unmended(named: dict[str, Draft], problems: Iterable[Problem]) -> list[Prob
 def _sections(named: dict[str, Draft], found: FileContent, protocols: Sequence[str],
               ) -> tuple[dict[str, Any], list[str]]:
     """
-    Return the sections that the profile can have, and say what else there is to say of it.
+    Return the sections that the profile can have, and notes on it.
 
-    What is written has to pass ``profile check``, and a person wants to know before the evening
-    in which modes ``validate`` will take it.
+    What is written has to pass ``profile check``, and the user should learn early
+    in which modes ``validate`` accepts it.
     """
     identity = [name for name, draft in named.items()
                 if draft.entry.get('index') == _IDENTITY and draft.entry['access'] != 'wo']
@@ -419,7 +419,7 @@ def _sections(named: dict[str, Draft], found: FileContent, protocols: Sequence[s
 
 
 def _modes(profile: Profile, family: Family, key: ModeKey) -> Iterator[str]:
-    """Yield in which modes ``validate`` takes the profile, and why not in the others."""
+    """Yield in which modes ``validate`` accepts the profile, and why not in the others."""
     setpoints = [parameter for parameter in profile.parameters.values()
                  if parameter.name in key.setpoints]
     if not setpoints:
@@ -446,7 +446,7 @@ def _modes(profile: Profile, family: Family, key: ModeKey) -> Iterator[str]:
 
 
 def _narrow(named: dict[str, Draft], loaded: LoadedProfile) -> None:
-    """Leave out limits beyond what the type holds: the type is the narrower one."""
+    """Remove limits beyond the range of the type: the type is the narrower one."""
     for warning in loaded.warnings:
         _, name, key = warning.key.split('.')
         del named[name].entry[key]

@@ -2,9 +2,9 @@
 """
 From a table in a text file to the entries of a profile, row by row.
 
-A row is taken whole or not at all: a limit that cannot be read is no reason to let every value
-through. Only the type is decided where it is not told, and the entry says so. What each column was
-taken for is a note; ``--columns`` and ``--decimal`` say it better.
+A row is used whole or not at all: a limit that cannot be read is no reason to let every value
+through. Only a missing type is decided, with a remark in the entry. The meaning of each column
+is a note; ``--columns`` and ``--decimal`` correct it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ _HEAD_ROWS = 60
 _SAMPLE = 8192
 #: separators, the least likely last: decimal commas stand in every row, too
 _DELIMITERS = [';', '\t', '|', ',']
-#: stands behind the last row, where a quote is closed
+#: put behind the last row, where a quote is closed
 _END = '\0end'
 
 #: in front of a number: P102, Pr. 12, par. 7
@@ -40,12 +40,12 @@ _PREFIX = re.compile(r'(?:p|pr|par|param|parameter|pnu|reg|register|%mw|mw)[.:\s
 #: an address with an element, 102.1 and 2004h:06 counted from 0, P613[-05] from 1
 _ADDRESS = re.compile(r'([^.:/\[\]]*?)\s*(?:[.:/]\s*([^.:/]+)|\[-?\s*([0-9]{1,3})\s*\])')
 _BIT = re.compile(r'(?:bit\s*)?([0-9]{1,2})\s*[=:–-]\s*([^,;|/]+)', re.IGNORECASE)
-#: cells that say nothing
+#: cells without a meaning
 _NOTHING = frozenset('- -- – — n/a na / ?'.split()) | {''}
 
 
 class WrongColumns(DriveCanError):
-    """What ``--columns`` says does not fit the table; the text says why."""
+    """The columns of ``--columns`` do not fit the table; the text has the reason."""
 
 
 #: columns, as ``--columns`` calls them, and their headings in English, German and Italian: without
@@ -83,12 +83,12 @@ COLUMNS: dict[str, str] = {
     'bits': 'bits|bit|bitbelegung|bit assignment|bitnamen|bit names',
 }
 _BY_HEADING = {word: column for column, words in COLUMNS.items() for word in words.split('|')}
-#: words of headings that say nothing where another one is known
+#: words of headings that do not count where another one is known
 _FILLERS = frozenset(
     'parameter param par para parametro value wert valore valori val data daten dati dato of the '
     'di del dez dec dezimal hex setting adjustment limit location phys physikalische '
     'engineering'.split())
-#: headings that may stand for numbers as well as for names; the cells tell
+#: headings that may stand for numbers as well as for names; the cells decide
 _AMBIGUOUS = frozenset(('parameter', 'param', 'par', 'parametro', 'p'))
 _NUMERIC = ('scale', 'divisor', 'offset', 'minimum', 'maximum', 'range', 'unit')
 
@@ -119,7 +119,7 @@ _STORAGE = {
 
 def word_of(what: str, table: Mapping[str, str], text: str) -> str:
     """
-    Return the word of a profile for what a manual writes.
+    Return the word of a profile for a word of a manual.
 
     :param what: ``type``, ``access``, ``storage``.
     :raises Unusable: it is none of those that are known.
@@ -196,7 +196,7 @@ def _plain_heading(text: str) -> str:
 
 
 def _columns_of(heading: str) -> list[str]:
-    """Return what a column may hold; several only where the cells have to tell."""
+    """Return what a column may hold; several only where the cells decide."""
     parts = [heading, split_unit(heading)[0], *re.split(r'\s*[/|\n;]\s*', heading)]
     words = list(filter(None, map(_plain_heading, parts)))
     for word in words:
@@ -208,16 +208,16 @@ def _columns_of(heading: str) -> list[str]:
 
 
 def _recognised(row: CsvRow) -> int:
-    """Return how much a row looks like headings: how many of its cells are known ones."""
+    """Return how many cells of a row are known headings."""
     return len({tuple(_columns_of(cell)) for cell in row.cells} - {()})
 
 
 class CsvTable:
     """
-    A table with what its columns hold.
+    A table whose columns have a meaning.
 
     :param given: headings, or places counted from 1, of columns; '' for one that is not there.
-    :raises ImportFailed: it cannot be found out which parameter a row is.
+    :raises ImportFailed: it is unknown which parameter a row is.
     :raises WrongColumns: something given is not there.
     """
 
@@ -255,7 +255,7 @@ class CsvTable:
             self.hexadecimal.add('subindex')
 
     def cell(self, row: CsvRow, column: str) -> str:
-        """Return a cell of a row; '' where there is none, or it says nothing."""
+        """Return a cell of a row; '' where there is none, or it is void."""
         text = row.cell(self.columns.get(column))
         return '' if text.casefold() in _NOTHING else text
 
@@ -264,7 +264,7 @@ class CsvTable:
         return CsvRow(0, self.headings).cell(self.columns.get(column))
 
     def notes(self) -> list[str]:
-        """Say what the columns were taken for."""
+        """Return notes on the meaning of the columns."""
         notes = ['columns: ' + ', '.join(f'{column}={self.heading(column) or place + 1}'
                                          for column, place in self.columns.items())]
         unused = [heading for place, heading in enumerate(self.headings)
@@ -312,10 +312,10 @@ def _head(rows: Sequence[CsvRow], given: Sequence[str]) -> CsvRow | None:
 def read_table(text: str, given: Mapping[str, str], sign: str = '',
                protocols: Sequence[str] = ()) -> FileContent:
     """
-    Read what a table offers.
+    Return what a table offers.
 
     :param given: columns by heading or place, as for :class:`CsvTable`.
-    :param sign: the decimal sign, where somebody says it.
+    :param sign: the decimal sign, where it is given.
     :param protocols: that the drive speaks; where all have 8-bit types, those stay.
     :raises ImportFailed: it is no table of parameters.
     :raises WrongColumns: a given column is not there.
@@ -343,12 +343,12 @@ def read_table(text: str, given: Mapping[str, str], sign: str = '',
     return found
 
 
-#: what the cells of a row say, by column; '': nothing
+#: the cells of a row, by column; '': empty
 Cells = Mapping[str, str]
 
 
 class _RowReader:
-    """Makes a draft of a row."""
+    """Reads rows as drafts."""
 
     def __init__(self, table: CsvTable, sign: str, *, bytes_stay: bool) -> None:
         self._table = table
@@ -357,7 +357,7 @@ class _RowReader:
 
     def draft(self, row: CsvRow) -> Draft:
         """
-        Read a row.
+        Return the draft of a row.
 
         :raises Unusable: something in it has no meaning.
         """

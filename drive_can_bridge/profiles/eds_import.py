@@ -2,8 +2,8 @@
 """
 From an EDS or DCF file to the entries of a profile, through the library ``canopen``.
 
-The library knows types, also those of a file's own; but it takes a file as a whole or not at all,
-knows no lines, folds limits that its type cannot hold, and believes what heads of records say. So
+The library knows types, also those of a file's own; but it reads a file as a whole or not at all,
+knows no lines, folds limits that its type cannot hold, and trusts the heads of records. So
 it gets each object in the one notation that it reads well, and limits, access and what is a record
 are read here: a broken section costs that entry and no other, an odd key costs no entry at all.
 
@@ -94,7 +94,7 @@ def canopen_library() -> ModuleType:
     except ImportError:
         raise ImportFailed(
             command_sentences.canopen_missing(how=command_that_brings('eds'))) from None
-    # what it complains about is told here, with section and line
+    # its warnings are reported here, with section and line
     logging.getLogger('canopen').setLevel(logging.CRITICAL)
     module: ModuleType = eds
     return module
@@ -118,7 +118,7 @@ class EdsSection:
         return self.values.get(key.lower(), '')
 
     def lost(self, reason: str) -> LeftOut:
-        """Say why it is not in the profile."""
+        """Return it as left out of the profile."""
         return LeftOut(self.line, f'[{self.name}]', one_line(self.get('ParameterName')), reason)
 
 
@@ -164,12 +164,12 @@ def _take_apart(text: str, found: FileContent) -> dict[str, EdsSection]:
 def read_eds(text: str, protocols: Sequence[str] = (), *, axis: int | None = None,
              force: bool = False) -> FileContent:
     """
-    Read what an EDS or DCF file offers.
+    Return what an EDS or DCF file offers.
 
     :param protocols: that the drive speaks; none: the one whose objects the file has, of the first
         axis that it has.
-    :param axis: whose objects are taken, counted from 1; None: the first.
-    :param force: take a file of a device that is no drive.
+    :param axis: whose objects are used, counted from 1; None: the first.
+    :param force: read a file of a device that is no drive.
     :raises ImportFailed: it is none, or none of a drive, or the library is missing.
     """
     library = canopen_library()
@@ -234,7 +234,7 @@ def _choose_axis(sections: Mapping[str, EdsSection], found: FileContent,
 
 def _refuse_others(sections: Mapping[str, EdsSection]) -> None:
     """
-    Look what the file says that the device is.
+    Check that the device of the file is a drive.
 
     :raises ImportFailed: no drive.
     """
@@ -249,7 +249,7 @@ def _refuse_others(sections: Mapping[str, EdsSection]) -> None:
 @dataclass(slots=True)
 class _Place:
     """
-    Where an entry is, and what is said of it.
+    The place of an entry, and its section.
 
     :param title: its own name.
     :param parent: name of the record or array that it is in.
@@ -276,7 +276,7 @@ class _ObjectReader:
         self._width = f'none of the types of {"8, " if bytes_stay else ""}16 or 32 bits'
 
     def read(self) -> None:
-        """Make a draft of each entry, and say of every other one why it is left out."""
+        """Make a draft of each entry, and report why the others are left out."""
         places = [place for index, subs in sorted(self._grouped().items())
                   for place in self._places(index, subs)]
         readable = []
@@ -382,7 +382,7 @@ class _ObjectReader:
 
     def _understood(self, readable: Sequence[tuple[_Place, int]],
                     ) -> Iterator[tuple[_Place, Any]]:
-        """Let the library read them, all at once; where it cannot, object by object."""
+        """Read entries by the library, all at once; where it cannot, object by object."""
         try:
             objects = self._read(readable)
         except _ERRORS:
@@ -425,7 +425,7 @@ class _ObjectReader:
         """
         Make a draft of a variable.
 
-        :raises Unusable: it has no place in a profile.
+        :raises Unusable: a profile cannot have it.
         """
         section = place.section
         kind = self._types.get(_TYPES.get(variable.data_type, ''))
@@ -462,7 +462,7 @@ def _variable(objects: Any, place: _Place) -> Any:
 
 def _integer(text: str) -> int:
     """
-    Read a whole number: decimal, or hexadecimal with 0x; a comment behind it is passed over.
+    Return a whole number: decimal, or hexadecimal with 0x; a comment behind it is ignored.
 
     :raises Unusable: it is none, or one of two: CiA 306 has octal numbers, with a 0 in front.
     """
@@ -485,7 +485,7 @@ def _integer_or(text: str, otherwise: int) -> int:
 
 
 def _access(section: EdsSection, remarks: list[str]) -> str:
-    """Return the access; where the file does not say it, what does no harm."""
+    """Return the access; where the file lacks it, the harmless one."""
     text = _REMARK.split(section.get('AccessType'), maxsplit=1)[0].strip()
     try:
         if text:
@@ -501,7 +501,7 @@ def _limits(section: EdsSection, kind: ParameterType, remarks: list[str]) -> dic
     Return the limits as raw integers.
 
     A hexadecimal one of a signed type is two's complement where that makes low <= high, else the
-    number as written. One beyond the type is the type's own, on the side where that limits
+    number as written. One beyond the type becomes the type's own, on the side where that limits
     nothing. What cannot be read or meant is left out with a remark.
     """
     low, high = kind.raw_range
@@ -543,7 +543,7 @@ def _ordered(limits: Mapping[str, int]) -> bool:
 
 
 def _take_unit(draft: Draft, section: EdsSection, unit_text: str) -> None:
-    """Take scale and unit where keys of the file, or comments of Sevcon's, have them."""
+    """Set scale and unit where keys of the file, or comments of Sevcon's, have them."""
     remarks = draft.remarks
     keys = 'Factor', 'Unit'
     texts = section.get('Factor') if 'factor' in section.values else None, unit_text
@@ -582,7 +582,7 @@ def _scale(text: str) -> float:
 
 
 def _rescale(draft: Draft, factor: float, name: str) -> None:
-    """Count in another unit, limits included."""
+    """Convert an entry to another unit, limits included."""
     entry = draft.entry
     if name:
         entry['unit'] = name
@@ -601,7 +601,7 @@ def _scaled(limit: float, factor: float) -> float:
 
 
 def _take_step(draft: Draft) -> bool:
-    """Take scale and unit that stand at the end of the name; return whether there are any."""
+    """Set scale and unit from the end of the name; return whether there are any."""
     factor, name = draft.step
     if name:
         draft.remarks.append(f'scale {factor:g} and unit {name}: at the end of the name')
@@ -610,7 +610,7 @@ def _take_step(draft: Draft) -> bool:
 
 
 def _take_sevcon(draft: Draft, section: EdsSection, kind: ParameterType) -> None:
-    """Take names of values and the access level of Sevcon's comments."""
+    """Set names of values and the access level from Sevcon's comments."""
     if not section.comments:
         return
     low, high = kind.raw_range
@@ -635,7 +635,7 @@ def _take_sevcon(draft: Draft, section: EdsSection, kind: ParameterType) -> None
 
 
 def _value(section: EdsSection) -> int | None:
-    """Return what the file says that an object holds; None: it does not."""
+    """Return the content of an object by the file; None: it has none."""
     try:
         return _integer(section.get('ParameterValue') or section.get('DefaultValue'))
     except Unusable:
@@ -643,7 +643,7 @@ def _value(section: EdsSection) -> int | None:
 
 
 def _turning(sections: Mapping[str, EdsSection], shift: int) -> str:
-    """Say what makes the revolutions that positions are counted in: CiA 402 has a gear, 6091h."""
+    """Return the revolutions that positions are counted in: CiA 402 has a gear, 6091h."""
     motor, shaft = (_value(sections.get(f'{0x6091 + shift:04x}sub{number}', _NONE))
                     for number in (1, 2))
     if motor and shaft and motor != shaft:
@@ -654,7 +654,7 @@ def _turning(sections: Mapping[str, EdsSection], shift: int) -> str:
 
 
 def _si_unit(section: EdsSection) -> tuple[str, float] | None:
-    """Return the unit that 60A8h or 60A9h names in the file, and how many of it a step is."""
+    """Return the unit of 60A8h or 60A9h in the file, and how many of it a step is."""
     value = _value(section)
     if value is None:
         return None
@@ -666,7 +666,7 @@ def _si_unit(section: EdsSection) -> tuple[str, float] | None:
 def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: int,
                  profile: str) -> None:
     """
-    Call standard objects by their names, and say what is known of them.
+    Give standard objects their names, and what is known of them.
 
     :param shift: how far the objects of the axis are from those of the first one.
     :param profile: that knows them; entries of it that are not verified have units of every
@@ -700,7 +700,7 @@ def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: 
 
 def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float] | None],
               names: set[str], turning: str) -> bool:
-    """Add to an entry what the standard says of it; return whether its unit is known."""
+    """Complete an entry from the standard; return whether its unit is known."""
     entry, known = draft.entry, shipped.entries.get(draft.name, {})
     if entry['access'] != 'ro':
         entry['storage'] = 'ram'    # until 1010h stores it
@@ -740,7 +740,7 @@ def _complete(draft: Draft, shipped: Checked, units: dict[str, tuple[str, float]
 
 
 def _free_of_limits(draft: Draft, reason: str) -> None:
-    """Leave the limits out, and say why."""
+    """Leave the limits out, with a remark."""
     given = [key for key in _ENDS if draft.entry.pop(key, None) is not None]
     if given:
         draft.remarks.append(f'{" and ".join(given)} left out: {reason}')

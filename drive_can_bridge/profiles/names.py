@@ -27,7 +27,7 @@ def name_of(text: str, address: str = '', taken: frozenset[str] = frozenset()) -
     """
     Return the name for a text.
 
-    :param address: digits and ``_``, for texts of which nothing is left.
+    :param address: digits and ``_``, for texts that leave no name.
     :param taken: further names that cannot be used.
 
     >>> name_of('Beschleunigungszeit (Rampe 1) [s]')
@@ -63,7 +63,7 @@ def _in_ascii(part: str) -> str:
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:
     """
-    Make names unique.
+    Return the names, made unique.
 
     :param names: (name, address), lowest address first; addresses are digits and ``_``.
     """

@@ -2,7 +2,7 @@
 """
 Numbers as manuals write them: decimal commas, grouped thousands, hexadecimal.
 
-``1.000`` is one or a thousand. The rest of the same table settles that: a single ``0,5`` makes the
+``1.000`` is one or a thousand. The rest of the same table decides that: a single ``0,5`` makes the
 comma the decimal sign (:func:`decimal_sign`). Else such a number is refused rather than guessed.
 """
 
@@ -15,7 +15,7 @@ from drive_can_bridge.profiles.units import known_unit
 
 
 class Unusable(ValueError):
-    """A cell or key has no usable value; the text says why."""
+    """A cell or key has no usable value; the text has the reason."""
 
 
 _HEXADECIMAL = re.compile(
@@ -36,7 +36,7 @@ _OTHER_WORDS = ('min', 'rev', 'inc', 'sec')
 
 
 class Measure(NamedTuple):
-    """A number with the unit that stands behind it, '' for none."""
+    """A number with the unit behind it, '' for none."""
 
     number: float
     unit: str
@@ -49,7 +49,7 @@ def _tidy(text: str) -> str:
 
 def rounded(value: float) -> float:
     """
-    Take the binary noise from a product: 0.1, not 0.1000000000000002.
+    Return a product without binary noise: 0.1, not 0.1000000000000002.
 
     :raises Unusable: no profile can hold it.
     """
@@ -59,7 +59,7 @@ def rounded(value: float) -> float:
 
 
 def decimal_sign(texts: Iterable[str]) -> str:
-    """Return what separates the fraction, by all cells that may hold numbers; '': unknown."""
+    """Return the decimal sign by all cells that may hold numbers; '': unknown."""
     found = {_sign_of(token) for text in texts
              for token in re.findall(r'[0-9]+(?:[.,][0-9]+)+', _tidy(text))} - {''}
     return found.pop() if len(found) == 1 else ''
@@ -166,10 +166,10 @@ def factor(text: str, sign: str) -> Measure:
 
 def split_step(text: str) -> tuple[str, float, str]:
     """
-    Separate a text from what a step is worth in brackets at its end: ``[0.1 Hz]``, ``(ms)``.
+    Separate a text from the step in brackets at its end: ``[0.1 Hz]``, ``(ms)``.
 
     Round brackets hold other things, too (``Phase (W)``, ``Speed (min)``, ``Overload (60 s)``):
-    what may be one of them is none.
+    what may be one of them is no step.
 
     :return: the text, scale, unit; 1 and '' where there is none.
 

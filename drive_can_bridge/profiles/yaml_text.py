@@ -19,7 +19,7 @@ _ROOM = WIDTH - 6
 #: keeps name and value of a bit on one line
 _TIED = ':\N{NO-BREAK SPACE}'
 _UNQUOTED = re.compile(r'[A-Za-z](?:[A-Za-z0-9_./() %-]*[A-Za-z0-9_/)%])?', re.ASCII)
-#: plain words that some YAML parser takes for something else than text
+#: plain words that some YAML parser reads as something else than text
 YAML_WORDS = frozenset('null true false yes no on off y n nan inf infinity'.split())
 
 
@@ -31,7 +31,7 @@ def one_line(text: str) -> str:
 
 
 def scalar(value: Any) -> str:
-    """Write a scalar as YAML."""
+    """Return a scalar as YAML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
@@ -50,7 +50,7 @@ def scalar(value: Any) -> str:
 
 def entry_lines(name: str, entry: Mapping[str, Any], remarks: Iterable[str] = ()) -> list[str]:
     """
-    Write an entry of the table: facts, description, bits, trust, a line or more each.
+    Return the lines of an entry: facts, description, bits, trust, a line or more each.
 
     :param remarks: written above it as comments.
     """
@@ -69,7 +69,7 @@ def entry_lines(name: str, entry: Mapping[str, Any], remarks: Iterable[str] = ()
 
 
 def _packed(parts: list[str]) -> list[str]:
-    """Fill lines with parts; a part that is longer than a line is broken at a space."""
+    """Return parts in as few lines as possible; a part longer than a line is broken at a space."""
     lines: list[str] = []
     for part in parts:
         if lines and len(lines[-1]) + 1 + len(part) <= _ROOM:
@@ -85,14 +85,14 @@ def _packed(parts: list[str]) -> list[str]:
 
 
 def comment(text: str, indent: str = '') -> list[str]:
-    """Write a text as comment lines."""
+    """Return a text as comment lines."""
     return textwrap.wrap(one_line(text), WIDTH, initial_indent=f'{indent}# ',
                          subsequent_indent=f'{indent}# ', break_long_words=False,
                          break_on_hyphens=False) or [f'{indent}#']
 
 
 def block(key: object, value: Any, indent: str = '') -> list[str]:
-    """Write nested mappings as YAML, a line a value."""
+    """Return nested mappings as YAML, a line a value."""
     if not isinstance(value, Mapping):
         return [f'{indent}{key}: {scalar(value)}']
     lines = [line for name, each in value.items() for line in block(name, each, f'{indent}  ')]
