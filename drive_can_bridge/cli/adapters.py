@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The subcommand ``drive_can adapters``: what this host has, and how to write it.
+The subcommand ``drive_can adapters``: the adapters of this host, and how to configure them.
 
-Looks in the kernel, at serial ports, and asks python-can's interfaces that can be asked without
+Reads from the kernel and serial ports, and asks python-can's interfaces that can be asked without
 opening a device. The page ``docs/adapters.md`` is made of the same table:
 ``python -m drive_can_bridge.cli.adapters`` writes it in a checkout; a test compares it.
 """
@@ -82,7 +82,7 @@ def define(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """List them."""
+    """List the adapters."""
     found = list(of_host())
     more, silent = ask_libraries(args.clock)
     known = {(each.interface, str(each.channel)) for each in found}

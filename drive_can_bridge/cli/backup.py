@@ -50,7 +50,7 @@ def run(args: Namespace) -> int:
     Write the backups.
 
     :return: exit code.
-    :raises WrongUsage: which drives, where to, or nobody can be asked.
+    :raises WrongUsage: which drives, where to, or a question cannot be answered.
     :raises DriveCanError: the drives cannot be reached.
     :raises OSError: a file cannot be written.
     """
@@ -78,7 +78,7 @@ def run(args: Namespace) -> int:
 
 def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
     """
-    Return where the backup of each drive goes.
+    Return the backup file of each drive.
 
     :raises WrongUsage: one file for several drives.
     :raises OSError: nothing can be written there.
@@ -101,9 +101,9 @@ def _files(wanted: str, names: Sequence[str]) -> dict[str, Path]:
 
 def _made(args: Namespace, drive: Drive, file: Path) -> tuple[str, dict[str, Any]] | None:
     """
-    Read a drive; None: there is to be no file, and it was said why.
+    Read a drive; None: no file is to be written, and the reason was printed.
 
-    :return: the text of its file, and what programs are told.
+    :return: the text of its file, and the document for programs.
     """
     names = settings_of(drive)
     outcomes = read_all(drive, names, args.clock)

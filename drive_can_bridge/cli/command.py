@@ -3,7 +3,7 @@
 What all subcommands have in common: exit codes, wrong usage, lines for people and programs.
 
 A subcommand is a module of its name with ``define(parser)`` and ``run(args) -> exit code``.
-Whatever it raises, :mod:`.main` says in one line.
+Whatever it raises, :mod:`.main` prints in one line.
 """
 
 import argparse
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 WRONG_USAGE = 2
 #: characters of a line of complaint: some name all that there is
 LINE_MAX = 4000
-#: stands for ``--params-file`` in commands that have no way through a bridge
+#: environment variable in place of ``--params-file`` for commands that need a file
 PARAMS_FILE = 'DRIVE_CAN_PARAMS_FILE'
 Parsed = TypeVar('Parsed')
 #: what an argument that begins with the name of a drive looks like
@@ -41,15 +41,15 @@ _EXAMPLES = {'--fault': 'DRIVE:FAULT, for example conveyor:late=0.15',
 
 
 class WrongUsage(DriveCanError):
-    """The command line cannot be obeyed, nothing was sent or written: exit code 2."""
+    """The command line cannot be used, nothing was sent or written: exit code 2."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong with a command line as everything is said: in one line."""
+    """Reports the errors of a command line in one line, like all others."""
 
     def error(self, message: str) -> NoReturn:
         """
-        End the process.
+        Print an error and end the process.
 
         :raises SystemExit: always.
         """
@@ -65,7 +65,7 @@ def complain(text: str) -> None:
 
 def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:
     """
-    Make sure, before anything is sent, that a question can be asked later.
+    Check, before anything is sent, that a question can be answered later.
 
     :param otherwise: what was not done.
     :param yes_means: what ``--yes`` does.
@@ -78,9 +78,9 @@ def must_be_answerable(*, yes: bool, otherwise: str, yes_means: str) -> None:
 
 def agreed(question: str, *, yes: bool, otherwise: str, yes_means: str) -> bool:
     """
-    Ask.
+    Ask a question; return whether the answer is yes.
 
-    :raises WrongUsage: nobody is there.
+    :raises WrongUsage: there is no terminal to ask.
     """
     must_be_answerable(yes=yes, otherwise=f'{question} {otherwise}', yes_means=yes_means)
     if yes or answered(question):
@@ -91,10 +91,10 @@ def agreed(question: str, *, yes: bool, otherwise: str, yes_means: str) -> bool:
 
 def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
     """
-    Say what may happen, and have it confirmed that it shall be done all the same.
+    Print what may happen, and have it confirmed.
 
-    :param who: needs ``--yes`` where nobody can be asked.
-    :raises WrongUsage: nobody can be asked, or somebody says no.
+    :param who: what needs ``--yes`` without a terminal.
+    :raises WrongUsage: there is no terminal to ask, or the answer is no.
     """
     complain(hazard)
     if yes:
@@ -106,7 +106,7 @@ def agree_to_hazard(hazard: str, question: str, *, yes: bool, who: str) -> None:
 
 
 def answered(question: str) -> bool:
-    """Return whether the answer to a question is yes; what was typed before it is none."""
+    """Return whether the answer to a question is yes; what was typed before it does not count."""
     if sys.stdin.isatty():
         with suppress(OSError, termios.error):
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
@@ -135,7 +135,7 @@ def bitrate(text: str) -> int:
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
-    """Return what reads an integer within limits."""
+    """Return a function that reads an integer within limits."""
     def read(text: str) -> int:
         if not (text.isdecimal() and low <= int(text) <= high):
             raise ArgumentTypeError(command_sentences.number_between(
@@ -145,7 +145,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 
 
 def output(text: str) -> str:
-    """Read the name of a file, or directory, that is written; its last slash matters to some."""
+    """Read the name of a file, or directory, to be written; some commands need its last slash."""
     if text in ('', '-'):
         raise ArgumentTypeError(command_sentences.names_no_file(text=repr(text)))
     if text == '/dev/stdout':   # descriptor 1 is not ours where libraries write to it
@@ -167,7 +167,7 @@ def namespace(text: str) -> str:
 
 
 def add_params_file(parser: ArgumentParser, help_text: str) -> None:
-    """Add the option that names the parameter file; the environment stands for it."""
+    """Add the option for the parameter file; the environment variable is its default."""
     default = os.environ.get(PARAMS_FILE)
     parser.add_argument('-p', '--params-file', metavar='FILE', type=Path, required=not default,
                         default=Path(default) if default else None,
@@ -222,8 +222,8 @@ def of_drive(option: str, text: str, configuration: 'BridgeConfiguration',
     Read an argument that begins with the name of a drive.
 
     :param option: ``--fault``, ``--axis`` …
-    :param parse: reads what stands behind the sign; may raise ValueRefused.
-    :raises WrongUsage: it makes no sense; says what is allowed.
+    :param parse: reads the text behind the sign; may raise ValueRefused.
+    :raises WrongUsage: it is invalid; with what is allowed.
     """
     name, found, rest = text.partition(sign)
     if not found:

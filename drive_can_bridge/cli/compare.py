@@ -25,7 +25,7 @@ from drive_can_bridge.core.parameters import Parameter, Value
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.text import printable, value_text
 
-#: of values of which no profile says how fine they are
+#: of values without a profile that gives their resolution
 _RELATIVE_TOLERANCE = 1e-9
 SAME, DIFFERENT = 0, 1
 #: a drive by its name, or by its full one
@@ -33,7 +33,7 @@ _DRIVE = re.compile(r'(?P<place>/?(?:[A-Za-z_][A-Za-z0-9_]*/)*)[a-z][a-z0-9_]*')
 _NONE = '-'
 #: settings that may all be misspelt
 _FEW = 3
-#: name, unit ('' where nobody knows it), the values of both sides; None: it has no such setting
+#: name, unit ('' where it is unknown), the values of both sides; None: it has no such setting
 Difference = tuple[str, str, Value | None, Value | None]
 #: names of what is left out that are told
 _NAMED_MAX = 5
@@ -45,7 +45,7 @@ class ComparedSetting:
     A setting on one side of a comparison.
 
     :param value: in the parameter's unit.
-    :param raw: None where nobody knows the parameter.
+    :param raw: None where the parameter is unknown.
     """
 
     value: Value
@@ -68,7 +68,7 @@ class Side:
 
 
 def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
-    """Take the settings of a drive that were read, and a mode that it was left in."""
+    """Return the settings of a drive that were read, and a mode that it was left in."""
     bits = mode_bits(drive.facts.restore)
     found = {name: outcome for name, outcome in outcomes.items() if outcome.ok and (
         is_setting(drive, name) or not bits[name].is_over(outcome.raw or 0))}
@@ -81,10 +81,10 @@ def side_of_drive(drive: Drive, outcomes: Mapping[str, ReadOutcome]) -> Side:
 def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
                  counts: Callable[[str], bool]) -> Side:
     """
-    Take the settings of a file.
+    Return the settings of a file.
 
-    :param find: gives what is known of a parameter.
-    :param counts: tells whether a parameter that is known is a setting.
+    :param find: returns a parameter, if it is known.
+    :param counts: returns whether a known parameter is a setting.
     :raises ConfigurationError: a value of the wrong type.
     """
     settings: dict[str, ComparedSetting] = {}
@@ -109,7 +109,7 @@ def side_of_file(backup: Backup, *, find: Callable[[str], Parameter | None],
 
 
 def names_to_read(drive: Drive, *others: Backup) -> tuple[str, ...]:
-    """Return what to read of a drive: settings, its mode, and what else a file has of them."""
+    """Return what to read of a drive: settings, its mode, and other names in a file."""
     names = [*settings_of(drive), *modes_of(drive)]
     names += [name for backup in others for name in backup.values
               if name not in names and is_setting(drive, name)]
@@ -151,7 +151,7 @@ def define(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """
-    Compare.
+    Compare two sides, and print the differences.
 
     :return: 0 the same, 1 different.
     :raises WrongUsage: not two of them, or it is not clear which drives.
@@ -225,9 +225,9 @@ def _sides(words: Sequence[str], files: dict[str, Backup], drives: Drives,
 
 def _drive(drive: Drive, files: Sequence[Backup], clock: Clock) -> Side:
     """
-    Read a drive; what it does not have is on its side not there.
+    Read a drive; what it does not have is missing on its side.
 
-    :raises DriveCanError: something cannot be read: nobody knows whether it differs.
+    :raises DriveCanError: something cannot be read, so it may differ.
     """
     names = names_to_read(drive, *files)
     outcomes = read_all(drive, names, clock)

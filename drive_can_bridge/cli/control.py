@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-``drive_can stop``, ``enable``, ``disable``, ``reset``: drives told by hand, through their bridges.
+``drive_can stop``, ``enable``, ``disable``, ``reset``: commands by hand, through the bridges.
 
-``stop`` is what a hand types in a fright, so nothing is imported here that it can do without.
+``stop`` is typed in an emergency, so imports are kept minimal.
 """
 
 from argparse import ArgumentParser, Namespace
@@ -33,7 +33,7 @@ _WORDS = {
 }
 #: s between two looks at what has arrived
 LOOK_PERIOD = 0.002
-#: s that a node may take to become part of the graph where it is no longer wanted there
+#: s that a node may take to join the graph where it is no longer wanted there
 JOIN_TIMEOUT = 2.0
 
 
@@ -55,8 +55,8 @@ def run(args: Namespace) -> int:
     """
     Command drives, and show their answers.
 
-    :return: 0 all did it, 1 not all.
-    :raises WrongUsage: what was typed cannot be obeyed.
+    :return: 0 all succeeded, 1 not all.
+    :raises WrongUsage: the words are wrong.
     :raises DriveCanError: no bridge, no ROS.
     """
     _check(args)
@@ -74,7 +74,7 @@ def run(args: Namespace) -> int:
 
 
 def _given_locally(args: Namespace) -> list[Answer] | None:
-    """Command drives by the local way; None: it does not lead to all of them."""
+    """Command drives by the local way; None: it does not reach all of them."""
     from drive_can_bridge.client.local import local_ways, NoWay
     with local_ways(args.clock) as ways:
         try:
@@ -99,9 +99,9 @@ def _given(args: Namespace) -> list[Answer]:
 def _ros(args: Namespace, join: Callable[[Callable[[], Any]], Any] = lambda make: make(),
          ) -> tuple[Any, Any]:
     """
-    Become part of the ROS graph; return that, and what tells drives there.
+    Join the ROS graph; return it, and the module that commands drives there.
 
-    :param join: has the node made that is part of it.
+    :param join: makes the client node.
     :raises DriveCanError: no ROS.
     """
     try:
@@ -117,9 +117,9 @@ def _ros(args: Namespace, join: Callable[[Callable[[], Any]], Any] = lambda make
 
 def _check(args: Namespace) -> None:
     """
-    See whether the command line alone shows that something is wrong.
+    Check the words without asking a bridge.
 
-    :raises WrongUsage: it does.
+    :raises WrongUsage: they are wrong.
     """
     only_through_a_bridge(args)
     if args.subcommand in ('enable', 'reset'):
@@ -141,7 +141,7 @@ def _stop(args: Namespace) -> int:
         complain('interrupted; this is known:')
         show(ros.answers(), STOP, json=args.json)
         raise
-    except Exception:   # no ROS, for whatever reason: what is known without is told all the same
+    except Exception:   # no ROS, for whatever reason: what is known without it is printed
         if local.answers() or local.unheard:
             show(answers(local, None, args.namespace, args.words), STOP, json=args.json)
         raise
@@ -154,9 +154,9 @@ def _stop(args: Namespace) -> int:
 
 class _Joining:
     """
-    Becomes part of the ROS graph in a thread of its own, because all of that takes a while.
+    Joins the ROS graph in a thread of its own, because that takes a while.
 
-    :ivar done: the graph, and what tells drives there; None: not yet.
+    :ivar done: the graph, and the module that commands drives there; None: not yet.
     :ivar failure: why there is none.
     """
 
@@ -172,7 +172,7 @@ class _Joining:
     def _run(self) -> None:
         try:
             self.done = _ros(self._args, self._join)
-        except Exception as error:  # noqa: BLE001  raised again by who waits for it
+        except Exception as error:  # noqa: BLE001  raised again in the waiting thread
             self.failure = error
 
     def _join(self, make: Callable[[], Any]) -> Any:
@@ -183,7 +183,7 @@ class _Joining:
         return self._node
 
     def close(self) -> None:
-        """Leave the graph, of which nothing is left half made; what is imported does not count."""
+        """Leave the graph completely; imports may go on."""
         made = self._making.acquire(JOIN_TIMEOUT)
         self._given_up = True
         if self._node is not None:
@@ -193,7 +193,7 @@ class _Joining:
 
 
 class _RosStop:
-    """The part of a stop that goes through ROS, begun where there is need of it."""
+    """The part of a stop that goes through ROS, started where it is needed."""
 
     def __init__(self, args: Namespace, local: LocalStop) -> None:
         self._args = args
@@ -203,7 +203,7 @@ class _RosStop:
 
     def look(self, now: float) -> bool:
         """
-        Go on; return whether all is done, of the local part, too.
+        Continue; return whether all is done, of the local part, too.
 
         :raises DriveCanError: no ROS, and nothing is to be expected without it.
         """
@@ -218,7 +218,7 @@ class _RosStop:
         return self._stop.look(now) and local.over(now)
 
     def _begin(self, now: float) -> None:
-        """Become part of the graph, and have drives told there."""
+        """Join the graph, and start to stop drives there."""
         args, local = self._args, self._local
         if self._joining is None:
             self._joining = _Joining(args)
@@ -231,7 +231,7 @@ class _RosStop:
                 if each.domain == local.domain and each.has_place])
 
     def answers(self) -> list[Answer]:
-        """Return what became of all."""
+        """Return all results."""
         return answers(self._local, self._stop, self._args.namespace, self._args.words)
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ from drive_can_bridge.trace.files import (
 from drive_can_bridge.trace.sinks import LineWriter, Only, Plotter, Selection, TableWriter
 from drive_can_bridge.trace.tracer import Sink, summary_documents, summary_lines, Tracer
 
-#: where in a file something is that is complained about
+#: the place in a file of a complaint
 _PLACE = re.compile(r'(?:line|entry) \d+: ')
 #: different complaints about a file that are shown
 _COMPLAINTS_MAX = 5
@@ -76,7 +76,7 @@ def run(args: Namespace) -> int:
     :return: 0; 1 where nothing could be read, or a bus was lost meanwhile.
     :raises WrongUsage: no trace, no such drive, or a file that would be written over.
     :raises DriveCanError: a parameter file with problems, a bus that cannot be opened, channels of
-        which nobody knows which is the bus.
+        which the bus is unknown.
     :raises OSError: a file cannot be read or written.
     """
     if args.file is None and args.plot and not args.live:   # options may stand before FILE
@@ -161,7 +161,7 @@ def _meant(args: Namespace, configuration: BridgeConfiguration) -> dict[str, str
 
 
 def _ignore(_: str) -> None:
-    """Complaints are for who reads the file the second time."""
+    """Ignore a complaint: the second pass over the file reports it."""
 
 
 def _prints(args: Namespace) -> bool:
@@ -185,7 +185,7 @@ def _written_over(args: Namespace) -> Path | None:
 
 def _sinks(args: Namespace, configuration: BridgeConfiguration, selection: Selection,
            stack: ExitStack) -> tuple[list[Sink], list[Callable[[], None]]]:
-    """Return who takes telegrams, and what is to be done at the end."""
+    """Return the sinks for telegrams, and what is to be done at the end."""
     sinks: list[Sink] = []
     endings: list[Callable[[], None]] = []
     drives = [drive for drive in configuration.drives.values() if selection.names(drive.name)]

@@ -34,7 +34,7 @@ from drive_can_bridge.simulation.simulation import Simulation
 
 PARAMETER_FILE = 'demo.yaml'
 TITLE = 'drive_can demo'
-#: with which the view ends when the user has enough, and not somebody else of the view
+#: with which the view ends when the user quits it, and not by a signal
 ENOUGH = 64
 #: s between two looks at the processes
 _LOOK_PERIOD = 0.1
@@ -43,13 +43,13 @@ _DRIVES_TIMEOUT = 60.0
 #: s that each process gets for its end. A bridge that has lost its drives tries for a while.
 _BRIDGE_PATIENCE = 10.0
 _PATIENCE = 5.0
-#: s that the view gets to end of its own accord, when all others have ended
+#: s that the view gets to end by itself, when all others have ended
 _VIEW_PATIENCE = 2.0
 #: leaves the view's screen, shows the cursor
 _RESTORE = '\x1b[?1049l\x1b[?25h'
 #: bit/s that SLCAN adapters know; any other is replaced by the next one above
 _BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 750_000, 1_000_000)
-#: s; who looks at the demo wants to see something soon
+#: s; users want to see something soon
 _DIAGNOSTICS_PERIOD_MAX = 1.0
 
 
@@ -133,9 +133,9 @@ def _run(args: argparse.Namespace, configuration: BridgeConfiguration, watcher: 
 
 def on_terminals(configuration: BridgeConfiguration, directory: Path) -> BridgeConfiguration:
     """
-    Replace every bus by the pseudo-terminal at ``directory/BUS``, and waiting by a start.
+    Replace every bus by the pseudo-terminal at ``directory/BUS``, and start by itself.
 
-    Nothing of a bus that is replaced is kept but its bit rate.
+    Only the bit rate of a replaced bus is kept.
     """
     buses = {name: replace(bus, interface='slcan', channel=str(directory / name), options={},
                            bitrate=next((rate for rate in _BITRATES if rate >= bus.bitrate),
@@ -151,8 +151,8 @@ class Demo:
 
     :param configuration: its buses are replaced by pseudo-terminals.
     :param directory: a place of its own.
-    :param suspension: set when somebody wants to suspend the demo.
-    :param live: there is a terminal that the view takes.
+    :param suspension: called to refuse a suspension of the demo.
+    :param live: there is a terminal for the view.
     """
 
     def __init__(self, args: argparse.Namespace, configuration: BridgeConfiguration,
@@ -162,7 +162,7 @@ class Demo:
         self._configuration = on_terminals(configuration, directory)
         self._directory = directory
         self._suspension = suspension
-        # the view has the terminal: others tell what they have to tell afterwards
+        # the view has the terminal: others print afterwards
         self._quiet = live and os.isatty(2)
         self._live = live
         self._children: list[Child] = []
@@ -226,7 +226,7 @@ class Demo:
                     continue
                 if watcher.signalled or child is self._view and child.code == ENOUGH:
                     return 0
-                if child.code > 0:  # of its own accord: it has said why, or will
+                if child.code > 0:  # by itself: it has printed why, or will
                     return 1
                 child.told = True
                 self._tell(child)
@@ -235,7 +235,7 @@ class Demo:
 
     def stop(self, *, view_knows: bool) -> None:
         """
-        End everything, the drives after the bridge.
+        End all processes, the drives after the bridge.
 
         :param view_knows: it has got Ctrl-C itself: another signal would end it before it has
             given the terminal back.
@@ -257,7 +257,7 @@ class Demo:
             child.wait(_PATIENCE)
 
     def conclude(self, code: int) -> None:
-        """Say what is left to say, now that the terminal is free."""
+        """Print what is left to report, now that the terminal is free."""
         for child in self._children:
             if code and child.errors():
                 sys.stderr.write(child.errors())
@@ -277,14 +277,14 @@ class Demo:
         return child
 
     def _refuse_to_suspend(self) -> None:
-        """Say why, or have it said by the view, which has the terminal."""
+        """Print why a suspension is refused, by the view where that has the terminal."""
         if self._live and self._view is not None and self._view.code is None:
             self._view.process.send_signal(signal.SIGTSTP)
         else:
             self._say(NOT_SUSPENDED)
 
     def _tell(self, child: Child) -> None:
-        """Say that a process has ended, and that the others go on."""
+        """Print that a process has ended, and that the others go on."""
         if child is self._view:
             if self._live:
                 sys.stdout.write(_RESTORE)
@@ -299,7 +299,7 @@ class Demo:
 
 @contextmanager
 def _terminal_restored() -> Iterator[None]:
-    """Leave the keyboard as it was, whatever the view died of."""
+    """Restore the settings of the terminal, however the view has ended."""
     try:
         settings = termios.tcgetattr(0)
     except termios.error:
@@ -308,5 +308,5 @@ def _terminal_restored() -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(termios.error):   # the terminal has gone
+        with suppress(termios.error):   # the terminal is gone
             termios.tcsetattr(0, termios.TCSANOW, settings)

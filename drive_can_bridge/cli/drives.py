@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What the commands that talk to drives have in common: the way to them, and which are meant.
+What the commands that talk to drives have in common: their options, and which drives are meant.
 
 Positional arguments of such a command are called ``words``; options may stand between them.
 """
@@ -25,7 +25,7 @@ from drive_can_bridge.resources import what_is_missing
 def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metavar: str,
               nargs: str, help_text: str) -> None:
     """
-    Add the positional arguments, and the options that say how to get to the drives.
+    Add the positional arguments, and the options for the way to the drives.
 
     :param completer: proposes words to the shell.
     :param metavar: how the words are written, as usage lines have it.
@@ -49,7 +49,7 @@ def add_words(parser: ArgumentParser, completer: Callable[..., list[str]], metav
 @contextmanager
 def source_of(args: Namespace) -> Iterator[DriveSource]:
     """
-    Find the drives that the options point to.
+    Return the source of the drives that the options select.
 
     :raises WrongUsage: options that exclude each other, or several bridges.
     :raises DriveCanError: the file is wrong, no bridge, no ROS.
@@ -79,7 +79,7 @@ def source_of(args: Namespace) -> Iterator[DriveSource]:
 
 def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
     """
-    Return words with drives by their short names: a full one is where its bridge is, too.
+    Return words with drives by their short names: a full one gives the namespace, too.
 
     :raises WrongUsage: they are in several namespaces.
     """
@@ -87,7 +87,7 @@ def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
     for word in words:
         place, slash, name = word.rpartition('/')
         if slash and args.params_file is None:  # nobody knows where the drives of a file will be
-            with suppress(ArgumentTypeError):   # else it is none, which is said with all there are
+            with suppress(ArgumentTypeError):   # else it is none, which is reported
                 where = namespace(place)
                 if args.namespace not in (None, where):
                     raise WrongUsage(command_sentences.other_namespace(
@@ -98,13 +98,13 @@ def by_short_names(args: Namespace, words: Sequence[str]) -> list[str]:
 
 
 def matching(names: Sequence[str], word: str) -> list[str]:
-    """Return the drives that a name or shell pattern means, in their order; maybe none."""
+    """Return the drives that a name or shell pattern matches, in their order; maybe none."""
     return [name for name in names if fnmatchcase(name, word)]
 
 
 def split_words(names: Sequence[str], words: Sequence[str]) -> tuple[list[str], list[str]]:
     """
-    Separate the drives from the rest of the words: the first one is a drive if it matches one.
+    Separate the drive from the rest of the words: the first one, if it matches a drive.
 
     :raises WrongUsage: there are several drives, and no word names one.
     """
@@ -148,7 +148,7 @@ def chosen_one(names: Sequence[str], word: str) -> str:
 
 @contextmanager
 def opened(source: DriveSource, names: Sequence[str]) -> Iterator[Drives]:
-    """Open drives, and say what the user should know."""
+    """Open drives, and print their warnings."""
     with (waiting('listening for another master, and greeting the drives')
           if source.listens else nullcontext()):
         drives = source.open(names)
@@ -159,7 +159,7 @@ def opened(source: DriveSource, names: Sequence[str]) -> Iterator[Drives]:
 
 
 def unread(drive: Drive, outcomes: Iterable[ReadOutcome]) -> list[str]:
-    """Say what could not be read: a line each, or one where nothing could be for one reason."""
+    """Return what could not be read: a line each, or one where nothing could be for one reason."""
     found = list(outcomes)
     wrong = [outcome for outcome in found if not outcome.ok]
     if 1 < len(wrong) == len(found) and len({outcome.reason for outcome in wrong}) == 1:
@@ -175,7 +175,7 @@ def read_all(drive: Drive, names: Sequence[str], clock: Clock) -> dict[str, Read
 
 
 def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
-    """Propose drives for the first word, and names of their parameters after it."""
+    """Return the drives for the first word, and the names of their parameters after it."""
     words = [word for word in parsed_args.words or () if word != prefix]
     place, slash, own = (words[0] if words else prefix).rpartition('/')
 
@@ -190,7 +190,7 @@ def complete_words(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
 
 
 def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
-    """Propose drives; where none begins so, the shell proposes files."""
+    """Return drives; where none begins so, the shell proposes files."""
     place, slash, _own = prefix.rpartition('/')
     return _completed(parsed_args, place if slash else None, lambda source: [
         f'{place}{slash}{name}' for name in source.names])
@@ -199,7 +199,7 @@ def complete_drives(prefix: str, parsed_args: Namespace, **_: Any) -> list[str]:
 def _completed(args: Namespace, place: str | None,
                proposed: Callable[[DriveSource], Iterable[str]]) -> list[str]:
     """
-    Return what a source proposes.
+    Return a source's completions.
 
     :param place: the namespace in a full name that is typed.
     """

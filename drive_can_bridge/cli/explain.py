@@ -26,7 +26,7 @@ PAGE = Path('docs', 'messages.md')
 _NEAREST = 5
 #: letters that are enough to look for
 _ENOUGH = 6
-#: what stands before the codes of files in the anchors of the page, where a code is of both
+#: put before the codes of files in the anchors of the page, where a code is of both
 _OF_FILES = 'file-'
 #: what the codes of a part of the catalogue stand for, behind the code
 _WHERE = {'drives and buses': 'said about a drive or a bus', 'commands': 'said by a command',
@@ -169,7 +169,7 @@ def _is_faint(row: Text) -> bool:
 
 
 def forms(row: Text) -> list[str]:
-    """Write the texts of a row for people: what changes in brackets, ``<names>``."""
+    """Return the texts of a row for people: what changes in brackets, ``<names>``."""
     return [''.join(_pieces(text)) for text in row.texts]
 
 
@@ -203,7 +203,7 @@ def page() -> str:
 
 
 def _sections(module: ModuleType, prefix: str) -> list[tuple[str, list[Text]]]:
-    """Return what stands below each heading of a catalogue."""
+    """Return the rows below each heading of a catalogue."""
     sections: list[tuple[str, list[Text]]] = []
     for line in inspect.getsource(module).splitlines():
         heading, row = _HEADING.fullmatch(line), _ROW.match(line)
@@ -216,7 +216,7 @@ def _sections(module: ModuleType, prefix: str) -> list[tuple[str, list[Text]]]:
 
 
 def _slug(title: str) -> str:
-    """Return what a heading is called in a link, as GitHub does."""
+    """Return the anchor of a heading, as GitHub makes it."""
     return re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
 
 

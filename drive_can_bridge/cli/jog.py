@@ -56,7 +56,7 @@ def run(args: Namespace) -> int:
     Hold a setpoint.
 
     :return: 0 the drive got the value and neutral, 1 not so, 128 + n after a signal.
-    :raises WrongUsage: what was typed cannot be obeyed.
+    :raises WrongUsage: the words are wrong.
     :raises DriveCanError: refused, no bridge, no ROS.
     """
     drive, name, value = _understood(args)
@@ -87,7 +87,7 @@ def run(args: Namespace) -> int:
 
 def _understood(args: Namespace) -> tuple[str, str | None, str]:
     """
-    Take the words apart: drive, setpoint or None, value.
+    Return drive, setpoint or None, and value from the words.
 
     :raises WrongUsage: something is missing, or too much.
     """
@@ -109,7 +109,7 @@ def _move(args: Namespace, graph: Any, target: Any, label: str) -> int:
     from drive_can_bridge.client.jog import Jog, with_unit
     shown = {parameter.name: parameter for parameter in target.shown}
     due = 0.0
-    unseen: list[OSError] = []  # nobody reads what is shown: nobody may be looking at the drive
+    unseen: list[OSError] = []  # the output is not read: nobody may be watching the drive
 
     def show(elapsed: float) -> None:
         nonlocal due
@@ -152,7 +152,7 @@ def _move(args: Namespace, graph: Any, target: Any, label: str) -> int:
 
 @contextmanager
 def _kept_running() -> Iterator[Interruption]:
-    """Only note what ends the process; refuse what would suspend it."""
+    """Record what ends the process; refuse what would suspend it."""
     def refuse(*_: object) -> None:
         complain(NOT_SUSPENDED)
     before: Callable[..., object] | int | None = signal.signal(signal.SIGTSTP, refuse)

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The command ``drive_can``: everything that a person runs by hand.
+The command ``drive_can``: everything that a user runs by hand.
 
-Of the subcommands (see :mod:`.command`) only the one that was asked for is imported, so that
+Of the subcommands (see :mod:`.command`) only the requested one is imported, so that
 ``validate`` needs neither python-can nor ROS.
 
 Exit codes: 0 success, 1 the request failed, 2 wrong usage.
@@ -103,7 +103,7 @@ _INDENT = '  '
 
 
 class Formatter(HelpFormatter):
-    """Wraps paragraphs, and leaves lines alone that are indented."""
+    """Wraps paragraphs, and keeps indented lines as they are."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return '\n'.join(
@@ -140,17 +140,17 @@ ENDLESS = ('simulate', 'demo', 'record', 'monitor', 'panel')
 ENDLESS_OPTIONS = ('--live', '--watch')
 #: what ends these like Ctrl-C; SIGHUP comes when a terminal is closed, or its ssh session breaks
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
-#: subcommands that open no bus, whatever they are given
+#: subcommands that open no bus, whatever their options
 WITHOUT_BUS = (*GROUPS['By hand'], 'monitor', 'panel')
-#: want something of drives, and end
+#: act on drives, and end
 OF_DRIVES = (*GROUPS['By hand'], *GROUPS['Parameters of drives'])
-#: talk to ROS, whose libraries write to standard output, too; the view of the demo does so itself
+#: use ROS, whose libraries write to standard output, too; the view of the demo does so itself
 WITH_ROS = (*OF_DRIVES, 'monitor', 'panel')
 #: only shows things: a reader who stops has seen enough
 SHOWING = ('adapters', 'validate', 'decode', 'explain', 'profile')
-#: exit codes of what could not be done, where 1 says something else
+#: exit codes of what could not be done, where 1 means something else
 TROUBLE = {'compare': 2}
-#: what says itself where something is wrong: ``FILE:LINE:``, ``bus main:``, ``conveyor:``
+#: messages that begin with a place already: ``FILE:LINE:``, ``bus main:``, ``conveyor:``
 _PLACED = re.compile(r'(bus )?\w+: |.*?:\d+: |drives\.|buses\.')
 #: exit code of what is interrupted before it is done
 INTERRUPTED = 130
@@ -161,7 +161,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
     Run the command.
 
     :param argv: arguments without the program's name; None: those of the process.
-    :param clock: what everything waits by; None: that of this machine.
+    :param clock: the clock of all waiting; None: that of this machine.
     :return: exit code.
     """
     arguments = _in_order(sys.argv[1:] if argv is None else argv)
@@ -186,7 +186,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # The reader of our output has gone. Python flushes once more on its way out: into nothing.
+        # The reader of our output is gone. Python flushes once more on its way out: into nothing.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if code is None:    # it was not done yet
             code = 0 if wanted in SHOWING else failed
@@ -219,7 +219,7 @@ def main(argv: Sequence[str] | None = None, clock: Clock | None = None) -> int:
 
 
 def _in_order(arguments: Sequence[str]) -> list[str]:
-    """Have the subcommand first: its options may stand anywhere, before it too."""
+    """Return the arguments with the subcommand first: its options may stand before it, too."""
     words = list(arguments)
     if words and words[0].startswith('-') and words[0] not in _OF_ALL:
         place = next((place for place, word in enumerate(words) if word in SUBCOMMANDS), 0)
@@ -228,15 +228,15 @@ def _in_order(arguments: Sequence[str]) -> list[str]:
 
 
 def subcommand_in(arguments: Sequence[str]) -> str:
-    """Return what is wanted; '' where nothing is."""
+    """Return the requested subcommand; '' where there is none."""
     return next((word for word in arguments if not word.startswith('-')), '')
 
 
 def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     """
-    Return the module of the subcommand, and what its arguments mean.
+    Return the module of the subcommand, and its parsed arguments.
 
-    :raises SystemExit: they mean nothing, or help is all that is wanted.
+    :raises SystemExit: they are wrong, or ask for help.
     """
     completing = typed()
     wanted = subcommand_in(arguments if completing is None else completing)
@@ -274,7 +274,7 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
 
 
 def _is_option(word: str) -> bool:
-    """Distinguish an option from a word; argparse takes ``-1e3`` and ``-inf`` for one."""
+    """Return whether a word is an option; for argparse ``-1e3`` and ``-inf`` are."""
     try:
         float(word)
     except ValueError:
@@ -298,7 +298,7 @@ def _run(arguments: list[str], clock: Clock, *, alone: bool) -> int:
         complain(f'{PROGRAM} {args.subcommand}{action}: {error}')
         return WRONG_USAGE
     finally:
-        if libraries is not None and not alone:     # else they may have more to say
+        if libraries is not None and not alone:     # else there may be more of them
             libraries.take_away()
     return code
 

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-``drive_can monitor``: the live view of whatever bridges run.
+``drive_can monitor``: the live view of all running bridges.
 
-A ROS client that sees what any node could see; no bridge notices when it comes and goes.
+A ROS client that sees what any node could see; bridges are not affected by it.
 """
 
 import argparse
@@ -49,7 +49,7 @@ def define(parser: argparse.ArgumentParser) -> None:
 
 
 class _Refusal:
-    """Why a view is not suspended, said for a while after somebody wanted it to be."""
+    """Why a view is not suspended, shown for a while after an attempt."""
 
     def __init__(self, text: str, now: Callable[[], float]) -> None:
         self._text = text
@@ -57,17 +57,17 @@ class _Refusal:
         self._until = 0.0
 
     def begin(self) -> None:
-        """Say it from now on. From any thread."""
+        """Show it from now on. From any thread."""
         self._until = self._now() + _REFUSAL_TIME
 
     def __call__(self) -> str:
-        """Return what is to be said now; '' for nothing."""
+        """Return the text to be shown now; '' for none."""
         return self._text if self._now() < self._until else ''
 
 
 def run(args: argparse.Namespace) -> int:
     """
-    Show what there is.
+    Show the drives.
 
     :return: 0 after SIGINT or SIGTERM, 131 after SIGQUIT.
     :raises DriveCanError: no ROS.

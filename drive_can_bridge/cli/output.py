@@ -5,7 +5,7 @@ Tables and progress bars for people, and files.
 In a terminal a table fits its width and has a little colour (not with ``NO_COLOR``). What goes to
 a pipe or a file is neither cut nor wrapped. Bars are on standard error, in a terminal only.
 
-What draws there takes as long to be imported as a bridge of this host to be asked: so that is done
+What draws there takes as long to import as asking a bridge of this host: so that is done
 only where something is drawn.
 """
 
@@ -40,7 +40,7 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
 
 def fitting_table(headings: Sequence[str], rows: Iterable[Sequence[str]],
                   numbers: Sequence[str] = ()) -> 'Table':
-    """Make a table that fits a terminal, for those that show it again and again."""
+    """Return a table that fits a terminal, for views that show it again and again."""
     from rich.table import Table
     from rich.text import Text
     headings, written = _used(headings, rows)
@@ -69,7 +69,7 @@ PATIENCE = 1.0
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Say in a terminal what is waited for, as long as that takes."""
+    """Show in a terminal what is waited for, as long as that takes."""
     if not sys.stderr.isatty():
         yield
         return
@@ -81,7 +81,7 @@ def waiting(what: str) -> Iterator[None]:
 @contextmanager
 def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callable[..., None]]:
     """
-    Show in a terminal how far something is, if it takes long; yield what counts a step.
+    Show the progress of something in a terminal, if it takes long; yield what counts a step.
 
     :param what: the steps are for, ``reading conveyor``.
     :param total: how many there are.
@@ -102,7 +102,7 @@ def counting(what: str, total: int, now: Callable[[], float]) -> Iterator[Callab
         yield step
     finally:
         if progress is not None:
-            with suppress(OSError):     # the terminal may have gone meanwhile
+            with suppress(OSError):     # the terminal may be gone meanwhile
                 progress.stop()
 
 
@@ -127,10 +127,10 @@ def differs(path: Path, data: bytes | None = None) -> bool:
 
 def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
     """
-    Ask about files that would be lost.
+    Ask about files that would be lost; return whether they may be overwritten.
 
     :param otherwise: what was not done.
-    :raises WrongUsage: nobody is there to be asked.
+    :raises WrongUsage: there is no terminal to ask.
     """
     there = [str(file) for file in files if differs(file)]
     return not there or agreed(
@@ -140,7 +140,7 @@ def may_overwrite(files: Iterable[Path], *, yes: bool, otherwise: str) -> bool:
 
 def write_atomically(path: Path, data: bytes) -> None:
     """
-    Write a file. Whatever goes wrong: there is either the whole of it, or what was there before.
+    Write a file completely, or leave what was there before.
 
     :raises OSError: the disk is full, the directory cannot be written, ….
     """

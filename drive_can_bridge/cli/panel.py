@@ -20,7 +20,7 @@ from drive_can_bridge.process.signals import SignalWatcher
 from drive_can_bridge.resources import command_that_brings, what_is_missing
 
 COMMAND = 'drive_can panel'
-#: messages per second to be sampled for all drives that nobody looks at closely
+#: messages per second to be sampled for all drives that are not in focus
 BUDGET = 300.0
 
 
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, ended: Callable[[], bool]) -> bool:
-    """Serve until the end; return whether the addresses were told before it came."""
+    """Serve until the end; return whether the addresses were printed before it came."""
     try:
         from drive_can_bridge.ros.monitor.client import MonitorClient
         from drive_can_bridge.ros.monitor.client import ServiceOperations

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can probe``: harmless reads that settle what the manuals leave open."""
+"""``drive_can probe``: harmless reads that answer what the manuals leave open."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Sequence
@@ -61,15 +61,15 @@ class Asker:
             self._receive(min(_PATIENCE, seconds))
 
     def tell(self, frame: Frame) -> None:
-        """Send what is not answered."""
+        """Send a frame that is not answered."""
         self._port.send(frame, _SEND_TIMEOUT)
 
     def probe(self, prober: Prober) -> list[Finding]:
         """
-        Ask all questions of a prober.
+        Ask all questions of a prober; return its findings.
 
-        :raises AnotherMaster: somebody else asks, too.
-        :raises TransportError: the bus takes nothing.
+        :raises AnotherMaster: another master asks, too.
+        :raises TransportError: the bus refuses frames.
         :raises BusUnavailable: it is lost.
         """
         conversation = prober.converse()
@@ -86,7 +86,7 @@ class Asker:
 
     def ask(self, question: Question, *, timeout: float, retries: int) -> Frame | None:
         """
-        Ask until there is an answer, or no patience any more.
+        Ask until there is an answer, or all attempts have failed.
 
         :param timeout: s for each time.
         """
@@ -111,7 +111,7 @@ class Asker:
         return None
 
     def _drain(self) -> None:
-        """Throw away what came before the question: it answers nothing."""
+        """Discard what came before the question: it answers nothing."""
         while self._receive(0.0) is not None:
             pass
 
@@ -157,7 +157,7 @@ def run(args: Namespace) -> int:
     Probe.
 
     :return: 0 the drives answered, 1 one of them did not.
-    :raises WrongUsage: it is not clear which drive is meant, or nobody agrees.
+    :raises WrongUsage: it is not clear which drive is meant, or consent is missing.
     :raises DriveCanError: the file is wrong, there is another master, the bus cannot be used.
     """
     configuration = configuration_from_file(args.params_file)
@@ -232,7 +232,7 @@ def _configured(drive: DriveConfiguration, key: str) -> Any:
 
 
 def _written(value: Any) -> str:
-    """Write a value as it stands in a parameter file."""
+    """Return a value as it stands in a parameter file."""
     if isinstance(value, list):
         return f'[{", ".join(value)}]'
     return value if isinstance(value, str) else json.dumps(value)

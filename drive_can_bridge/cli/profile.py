@@ -135,7 +135,7 @@ def _add_options(parser: ArgumentParser, action: str = '') -> None:
 
 def run(args: Namespace) -> int:
     """
-    Do what was asked for.
+    Run the requested action.
 
     :raises DriveCanError: it could not be done, in words.
     :raises OSError: a file cannot be read or written.
@@ -258,7 +258,7 @@ def _import(args: Namespace) -> int:
     """
     Import a file.
 
-    :raises WrongUsage: an option means nothing, or nobody can be asked.
+    :raises WrongUsage: an option does not apply, or a question cannot be answered.
     :raises ImportFailed: nothing of it can be used.
     :raises OSError: a file cannot be read or written.
     """
@@ -319,11 +319,11 @@ def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
                 protocols: Sequence[str] = (), description: str = '',
                 file_format: str = '', axis: int | None = None, force: bool = False) -> Built:
     """
-    Make a profile of a file.
+    Return the profile that a file is imported as.
 
     :param columns: of a CSV table, by heading or place; the others are guessed.
-    :param sign: what separates the fraction in its numbers; '': they tell.
-    :param file_format: ``eds`` or ``csv``; '': what its name and contents say.
+    :param sign: the decimal sign of its numbers; '': as they show.
+    :param file_format: ``eds`` or ``csv``; '': as its name and contents show.
     :param axis: of an EDS file, counted from 1; None: the first.
     :param force: import an EDS file of a device that is no drive.
     :raises WrongUsage: an option of EDS files, and it is none.
@@ -348,9 +348,9 @@ def import_file(path: Path, *, columns: Mapping[str, str], sign: str = '',
 
 def columns_from_option(text: str) -> dict[str, str]:
     """
-    Read ``number=Nr,name=Bezeichnung``; a heading with a comma stands in double quotes.
+    Return the columns in ``number=Nr,name=Bezeichnung``; quotes protect a comma.
 
-    :raises WrongUsage: a column is unknown or stands twice.
+    :raises WrongUsage: a column is unknown or given twice.
     """
     found: dict[str, str] = {}
     try:

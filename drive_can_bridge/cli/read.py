@@ -37,7 +37,7 @@ def define(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """
-    Read.
+    Read parameters, and print them.
 
     :return: 0 everything, 1 not everything.
     :raises WrongUsage: it is not clear which drive is meant.
@@ -115,7 +115,7 @@ def document(drive: Drive, outcome: ReadOutcome) -> dict[str, Any]:
 
 
 def _shown(outcome: ReadOutcome) -> str:
-    """Write a value, and its name beside it."""
+    """Return a value, and its name beside it."""
     if outcome.value is None:
         return '–'
     parameter = outcome.parameter

@@ -28,7 +28,7 @@ _PATIENCE = 0.05
 
 class Taps:
     """
-    All buses of a file, listened to until closed; entries come out in the order they arrived.
+    All buses of a file, recorded until closed; entries come out in the order they arrived.
 
     :raises DriveCanError: a bus that cannot be opened.
     """
@@ -50,10 +50,10 @@ class Taps:
             raise
 
     def records(self, seconds: float) -> Iterator[Record | float]:
-        """Yield entries for so long; now and then, while there are none, until when there are."""
+        """Yield entries for so long; now and then, without any, the time up to which none came."""
         end = self._now() + seconds
         while self._now() < end:
-            # asked before the queue: what was heard until then is in it, or was taken out of it
+            # read before the queue: what was received until then is in it, or was taken out of it
             heard_until = min(tap.heard_until for tap in self.taps)
             try:
                 yield self._queue.get(self._now() + _PATIENCE)
@@ -71,7 +71,7 @@ class Taps:
         return FAILED if any(tap.was_down for tap in self.taps) else 0
 
     def close(self) -> None:
-        """Stop listening; say what could not be taken."""
+        """Stop listening; print what could not be taken."""
         for tap in self.taps:
             tap.close()
             if tap.lost:
@@ -167,7 +167,7 @@ def _record(records: Iterator[Record | float], clock: Clock, output: '_Rotating'
 
 
 class _Counter:
-    """What was recorded of one bus."""
+    """Counts what was recorded of one bus."""
 
     def __init__(self, name: str, bitrate: int, now: Callable[[], float]) -> None:
         self._now = now
@@ -180,7 +180,7 @@ class _Counter:
         self._shown_at = self._began
 
     def take(self, record: Record) -> None:
-        """Take an entry."""
+        """Count an entry."""
         if record.kind is RecordKind.ERROR:
             self._error_frames += 1
             return
@@ -189,7 +189,7 @@ class _Counter:
         self._bits += bits_on_bus(len(record.data), record.extended)
 
     def status(self) -> str:
-        """Say how much there is so far, and how busy the bus is now."""
+        """Return what was recorded so far, and the load of the bus now."""
         now = self._now()
         load = self._load(self._bits - self._bits_shown, now - self._shown_at)
         self._bits_shown, self._shown_at = self._bits, now
@@ -197,17 +197,17 @@ class _Counter:
                 f'load {load:.1f} %')
 
     def end(self) -> None:
-        """Take the time; what is written still may take its own."""
+        """Stop the time; writing may still take a while."""
         self._seconds = self._now() - self._began
 
     def line(self, output: '_Rotating') -> str:
-        """Sum up."""
+        """Return the sums for people."""
         return (f'{self._name}: {self._frames} frames ({self._sent} sent by this machine), '
                 f'{self._error_frames} error frames, {self._seconds:.1f} s, '
                 f'load {self._load(self._bits, self._seconds):.1f} %: {output.names}')
 
     def document(self, output: '_Rotating') -> dict[str, Any]:
-        """Sum up for programs."""
+        """Return the sums for programs."""
         return {
             'bus': self._name, 'file': str(output.last), 'files': output.count,
             'frames': self._frames, 'sent': self._sent, 'error_frames': self._error_frames,
@@ -245,7 +245,7 @@ class _Rotating:
         return self._path.with_name(f'{self._path.stem}_{number:03d}{self._path.suffix}')
 
     def _remove_last_recording(self) -> None:
-        """Remove all parts of it: those that are not replaced would look like ours."""
+        """Remove all parts of the last recording: leftovers would look like ours."""
         number = 0
         while (part := self._part(number)).is_file():
             part.unlink()
@@ -274,7 +274,7 @@ class _Rotating:
         self._writer.write(record)
 
     def look(self) -> None:
-        """End this file when it is large enough; else make it readable so far."""
+        """End this file when it is large enough; else flush it."""
         if self._full:
             return
         if self._limit is not None and self._writer.size >= self._limit:
@@ -290,7 +290,7 @@ class _Rotating:
 
 
 class _Status:
-    """A line that is written over again and again; in a terminal only."""
+    """A line that is overwritten again and again; in a terminal only."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream if stream.isatty() else None
@@ -302,12 +302,12 @@ class _Status:
         self._width = len(text)
 
     def clear(self) -> None:
-        """Take the line away."""
+        """Erase the line."""
         if self._width:
             self._write(f'\r{" " * self._width}\r')
 
     def _write(self, text: str) -> None:
         if self._stream is not None:
-            with suppress(OSError):     # the terminal has gone; the trace is to be whole
+            with suppress(OSError):     # the terminal is gone; the trace is to be complete
                 self._stream.write(text)
                 self._stream.flush()

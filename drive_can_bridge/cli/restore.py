@@ -56,10 +56,10 @@ def define(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """
-    Restore.
+    Restore a backup.
 
     :return: exit code.
-    :raises WrongUsage: it is not clear which drive is meant, or nobody can be asked.
+    :raises WrongUsage: it is not clear which drive is meant, or a question cannot be answered.
     :raises DriveCanError: the file is wrong, or the drive cannot be reached.
     :raises OSError: the file cannot be read.
     """
@@ -122,7 +122,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
                               clock=args.clock.now,
                               wait=lambda s: args.clock.wait(args.clock.now() + s),
                               told=step, hint=complain).run()
-        # a second signal does not keep from anybody what was written
+        # a second signal does not suppress what was written
         try:
             return _report(args, drive, plan, result, interrupted)
         except OSError:     # the terminal whose end it is
@@ -132,7 +132,7 @@ def _restore(args: Namespace, backup: Backup, drive: Drive) -> int:
 
 
 def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
-    """Return whether the file may be restored into the drive; say why not."""
+    """Return whether the file may be restored into the drive; print why not."""
     problems = problems_in(backup, drive)
     if problems:
         other = other_type(backup, drive)
@@ -141,7 +141,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
         return False
     identity = _identity(backup, drive, args.clock)
     if backup.head.identity and not identity:
-        # maybe it says nothing at all: then nobody knows whether it is another one
+        # maybe it is silent: then its identity is unknown
         for asked in read_all(drive, names_to_read(backup, drive)[:1],
                               args.clock).values():
             if asked.unheard:
@@ -168,7 +168,7 @@ def _may_be(args: Namespace, backup: Backup, drive: Drive) -> bool:
 
 
 def _identity(backup: Backup, drive: Drive, clock: Clock) -> str:
-    """Return who a drive is; a bridge that has just started is about to find out."""
+    """Return the identity of a drive; a bridge that has just started is about to read it."""
     end = clock.now() + _PATIENCE
     while True:
         found = drive.identity()
@@ -182,7 +182,7 @@ def _is_enabled(drive: Drive) -> int:
     return FAILED
 
 
-# -- what is said ---------------------------------------------------------------------------------
+# -- what is printed ------------------------------------------------------------------------------
 
 
 def _show(args: Namespace, backup: Backup, drive: Drive, plan: RestorePlan) -> None:
@@ -223,7 +223,7 @@ def _report(args: Namespace, drive: Drive, plan: RestorePlan, result: RestoreRes
     wrong = {each.name: each for each in result.wrong}
     why = sentences.enabled_meanwhile() if result.enabled else sentences.interrupted()
     if args.json:
-        # what nothing was compared after is told by what was written
+        # without a comparison, the writes show the differences
         early = '' if result.stopped is None else why
         if result.trouble is not None:
             early = result.trouble.sentence

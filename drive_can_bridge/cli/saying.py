@@ -2,7 +2,7 @@
 """
 Lines on standard output, for people and for programs.
 
-``drive_can stop`` imports this to say what has become of drives, so nothing is imported here that
+``drive_can stop`` imports this to print results, so nothing is imported here that
 takes time where nothing needs it.
 """
 

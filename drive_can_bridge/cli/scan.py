@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-``drive_can scan``: looking for drives on a bus that nobody has described.
+``drive_can scan``: looking for drives on an unknown bus.
 
-Listening first, then asking what nobody can misunderstand. On 11-bit identifiers a read of one
+Listening first, then requests that no device can misread. On 11-bit identifiers a read of one
 family is a command of another: such a family is asked only when it is named, and never once a
 CANopen node was heard or answered.
 """
@@ -48,7 +48,7 @@ LAST_ANSWER = 0.3
 #: s that a receive may block
 _PATIENCE = 0.005
 _SEND_TIMEOUT = 0.05
-#: frames in a row that the bus does not take, until nothing more is sent
+#: frames in a row that the bus refuses, until nothing more is sent
 _REFUSED_MAX = 5
 
 
@@ -57,7 +57,7 @@ class Survey:
     What is found on one bus.
 
     :ivar frames: frames heard.
-    :ivar unknown: those that no family recognises an identifier of.
+    :ivar unknown: frames whose identifier belongs to no family.
     :ivar trouble: why nothing can be sent; '': it can.
     """
 
@@ -73,12 +73,12 @@ class Survey:
 
     @property
     def master(self) -> str:
-        """What somebody else asks; '': nobody does."""
+        """What another master asks; '': there is none."""
         return next((scanner.master for scanner in self.scanners.values() if scanner.master), '')
 
     @property
     def nodes(self) -> dict[int, str]:
-        """CANopen nodes, whatever they are."""
+        """The CANopen nodes, of any kind."""
         return {node: text for scanner in self.scanners.values()
                 for node, text in scanner.nodes.items()}
 
@@ -89,12 +89,12 @@ class Survey:
                 for station in sorted(scanner.sightings)]
 
     def forbidden(self, scanner: Scanner) -> bool:
-        """Return whether somebody is there who might obey what a scanner asks."""
+        """Return whether there is a node that might obey what a scanner asks."""
         return not scanner.unmistakable and bool(self.nodes)
 
     def listen(self, seconds: float) -> None:
         """
-        Hear what is said.
+        Listen for frames.
 
         :raises BusUnavailable: the bus is lost.
         """
@@ -106,8 +106,8 @@ class Survey:
         """
         Ask all stations of a family, and what their answers make worth asking.
 
-        Ends at once when a master is heard, or the bus takes nothing, or when a CANopen node turns
-        up that might take the questions for process data.
+        Ends at once when a master is heard, or the bus refuses frames, or when a CANopen node
+        turns up that might read the questions as process data.
 
         :raises BusUnavailable: the bus is lost.
         """
@@ -141,7 +141,7 @@ class Survey:
                     self.trouble = command_sentences.scan_unacknowledged(error=error)
 
     def _pause(self, frame: Frame) -> float:
-        """Return s from a question to the next: both it and its answer count."""
+        """Return the s from one question to the next: both it and its answer count."""
         both = 2 * STUFFING * bits_on_bus(8, frame.extended)
         return both / (LOAD_MAX * self._bus.bitrate)
 
@@ -177,7 +177,7 @@ def write_parameter_file(path: Path, bus: BusConfiguration, sightings: Sequence[
     """
     Write a parameter file that ``validate`` accepts, after the tables that it names.
 
-    What cannot be there beside a surer one, as both would use the same identifiers, is a comment.
+    A sighting that would share identifiers with a surer one is a comment.
 
     :param sightings: at least one.
     :param settings: for each sighting, what its scanner knows.
@@ -228,7 +228,7 @@ def _collisions(path: Path) -> dict[str, str]:
     try:
         configuration_from_file(path)
     except ConfigurationError as error:
-        # of what was found on a bus, nothing else is wrong with a station
+        # stations of what was found on a bus have no other fault
         keys = {problem: problem.fields['key'] for problem in error.problems
                 if isinstance(problem, Sentence)}
         return {key.split('.')[1]: problem.partition(f'{key}: ')[2]
@@ -305,7 +305,7 @@ def run(args: Namespace) -> int:
     Scan.
 
     :return: 0 found something, 1 nothing.
-    :raises WrongUsage: an adapter that cannot be used so, or nobody agrees.
+    :raises WrongUsage: an adapter that cannot be used so, or consent is missing.
     :raises DriveCanError: the bus cannot be used.
     :raises OSError: the output cannot be written.
     """
@@ -337,7 +337,7 @@ def run(args: Namespace) -> int:
 
 def _bus(args: Namespace) -> BusConfiguration:
     """
-    Return the bus, looked at as one of a parameter file.
+    Return the bus, checked as one of a parameter file.
 
     :raises WrongUsage: an option that the bridge sets, or one that is missing.
     """
@@ -392,7 +392,7 @@ def _scan(args: Namespace, bus: BusConfiguration) -> int:
 
 
 def _ask(args: Namespace, survey: Survey) -> list[str]:
-    """Ask; return the families that were asked."""
+    """Ask the stations of the families; return the families that were asked."""
     asked = []
     for name in [*(each for each in FAMILIES if survey.scanners[each].unmistakable),
                  *args.protocols]:
@@ -406,7 +406,7 @@ def _ask(args: Namespace, survey: Survey) -> list[str]:
 
 
 def _tell_left_out(args: Namespace, survey: Survey, asked: Sequence[str]) -> None:
-    """Say at which bit rate this was, what was not asked, and how to."""
+    """Print the bit rate, and what was not asked, and how to ask it."""
     left = [name for name in FAMILIES if name not in asked]
     told = f'{args.bitrate} bit/s, {survey.frames} frames heard'
     if args.passive:
@@ -420,7 +420,7 @@ def _tell_left_out(args: Namespace, survey: Survey, asked: Sequence[str]) -> Non
 
 
 def _command(args: Namespace) -> str:
-    """Return the command line that does the same again."""
+    """Return the command line for the same scan again."""
     words = ['drive_can', 'scan', '--interface', args.interface, '--channel', args.channel,
              '--bitrate', str(args.bitrate)]
     for key, value in args.option:
@@ -449,7 +449,7 @@ def _show(args: Namespace, survey: Survey) -> None:
 
 
 def _tell_trouble(survey: Survey, port: EndPoint, *, asked: bool) -> None:
-    """Say in words what is wrong with a bus, as far as it can be seen from here."""
+    """Print what is wrong with a bus, as far as it can be seen from here."""
     if port.error_frames:
         error = port.last_error
         told = f': {error.text}; {error.advice}' if error is not None else ''

@@ -2,17 +2,17 @@
 """
 ``drive_can security``: who may talk to the bridge of a parameter file.
 
-Writes files only; docs/security.md says what they protect against, and what enforces them. The
-policy has three enclaves, and says what each may do. Everything else is denied.
+Writes files only; docs/security.md has what they protect against, and what enforces them. The
+policy has three enclaves, and what each may do. Everything else is denied.
 
 ``/bridge``
     the process of the bridge: its own topics and services.
 ``/operator``
-    who moves drives: commands, ``~/enable``, parameters; and all that a viewer may.
+    moves drives: commands, ``~/enable``, parameters; and all that a viewer may.
 ``/viewer``
-    who looks: topics of drives, diagnostics, the log, reading parameters.
+    only reads: topics of drives, diagnostics, the log, reading parameters.
 
-Access control of DDS knows topics, not contents: who may call ``~/enable`` may call it with true.
+Access control of DDS knows topics, not contents: whatever may call ``~/enable`` may enable.
 """
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
@@ -39,7 +39,7 @@ WRITING = ('set_parameters', 'set_parameters_atomically')
 CONTROL = ('enable', 'reset_fault')
 #: what a bridge asks those of other hosts for, and their drives, when it passes a stop on
 PASSED_ON = ('quick_stop', 'get_parameter_types', 'get_parameters', 'list_parameters')
-#: a managed node says how it is, and is told
+#: the lifecycle topics and services of a managed node
 STATES = ('get_available_states', 'get_available_transitions', 'get_state',
           'get_transition_graph')
 TRANSITIONS = ('change_state',)
@@ -57,7 +57,7 @@ _OPTIONS = ('NO_SSLV2', 'NO_SSLV3', 'NO_TLSV1', 'NO_TLSV1_1')
 @dataclass(frozen=True, slots=True)
 class NodeNames:
     """
-    What one node has, relative to it (``~/`` is left out).
+    The names of one node, relative to it (``~/`` is left out).
 
     :param shown: topics that it publishes.
     :param taken: topics that it obeys.
@@ -73,7 +73,7 @@ class NodeNames:
 
 
 def bridge_names(configuration: BridgeConfiguration) -> NodeNames:
-    """Return what the bridge itself has."""
+    """Return the names of the bridge itself."""
     joints = [drive.joint for drive in configuration.drives.values() if drive.joint is not None]
     return NodeNames(
         _NODE, shown=('transition_event', *(('joint_states',) if joints else ())),
@@ -83,7 +83,7 @@ def bridge_names(configuration: BridgeConfiguration) -> NodeNames:
 
 
 def drive_names(drive: DriveConfiguration) -> NodeNames:
-    """Return what the node of a drive has."""
+    """Return the names of a drive's node."""
     session = FAMILIES[drive.protocol].make_session(drive)
     shown = ['online', 'response', 'request']
     for parameter in session.sample_parameters:
@@ -110,7 +110,7 @@ _LOG, _EVENTS, _DIAGNOSTICS, _CLOCK = '/rosout', '/parameter_events', '/diagnost
 
 def policy(configuration: BridgeConfiguration, namespace: str) -> str:
     """
-    Write the policy as XML.
+    Return the policy as XML.
 
     :param namespace: in which the bridge runs, ``/`` or ``/cell``.
     """
@@ -183,7 +183,7 @@ def _own(names: Iterable[str]) -> list[str]:
 
 
 def _anywhere(name: str) -> tuple[str, str]:
-    """Return what any drive, or bridge, may call something, in a namespace or not."""
+    """Return the names for any drive, or bridge, in a namespace or not."""
     return f'/*/{name}', f'/*/*/{name}'
 
 
@@ -193,9 +193,9 @@ def _absolute(place: str, node: NodeNames, names: Iterable[str]) -> list[str]:
 
 def transport_profile(args: Namespace, *, listens: bool) -> str:
     """
-    Write a profile of Fast DDS: TCP only, both sides show a certificate.
+    Return a profile of Fast DDS: TCP only, both sides show a certificate.
 
-    The bridge listens, everybody else connects to it. There is no element for a password: an
+    The bridge listens, all others connect to it. There is no element for a password: an
     empty one is not the same as none, and keeps a key without a password from being read.
     """
     root = ElementTree.Element('dds', xmlns=_NAMESPACE)

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-``drive_can simulate``: play every drive of a bridge parameter file on its buses.
+``drive_can simulate``: simulate every drive of a bridge parameter file on its buses.
 
 Standard output has first the end points, one line per bus, then what the drives do. Standard input
 takes faults while the drives run (:class:`Console`).
@@ -45,12 +45,12 @@ _SERVOS = [name for name, kind in SIMULATED_DRIVES.items()
 
 class Console:
     """
-    Obeys lines.
+    Runs lines of standard input.
 
-    ``conveyor late=0.15 drop=2`` plays faults, ``conveyor`` tells what the drive is doing.
+    ``conveyor late=0.15 drop=2`` plays faults, ``conveyor`` shows what the drive is doing.
 
-    :param say: takes what was asked for.
-    :param complain: takes one line per line that makes no sense.
+    :param say: prints an answer.
+    :param complain: prints one line per invalid line.
     """
 
     def __init__(self, simulation: Simulation, *, say: Say, complain: Say) -> None:
@@ -59,7 +59,7 @@ class Console:
         self._complain = complain
 
     def obey(self, line: str) -> None:
-        """Obey one line. An empty one does nothing."""
+        """Run one line. An empty one does nothing."""
         words = line.split()
         if not words:
             return
@@ -89,18 +89,18 @@ class Console:
 
 
 class LineReader:
-    """Standard input, without ever blocking or stopping a process in the background."""
+    """Standard input, read without ever blocking or stopping a process in the background."""
 
     def __init__(self) -> None:
         self._descriptor: int | None = None
         self._rest = b''
-        # the stream may be closed (None), or replaced by something that has no descriptor
+        # the stream may be closed (None), or replaced by something without a descriptor
         with suppress(AttributeError, OSError, ValueError):
             self._descriptor = sys.stdin.fileno()
 
     @property
     def fileno(self) -> int | None:
-        """What may be read now; None: nothing comes, or a terminal would stop who reads it."""
+        """The descriptor to read now; None: nothing comes, or a terminal would stop the reader."""
         found = self._descriptor
         try:
             foreground = found is None or not os.isatty(found) or (
@@ -138,7 +138,7 @@ def describe(drive: PlayedDrive) -> list[str]:
 
 
 def help_lines() -> list[str]:
-    """Return what can be typed."""
+    """Return the help on lines."""
     return ['DRIVE FAULT …  DRIVE  status  list  help; faults:', *usage_lines()]
 
 
@@ -183,7 +183,7 @@ def run(args: argparse.Namespace) -> int:
     Simulate until a signal.
 
     :return: 0 after SIGINT or SIGTERM, 1 failure; one line on standard error each.
-    :raises WrongUsage: options that exclude each other, or mean nothing.
+    :raises WrongUsage: options that exclude each other, or do not apply.
     :raises ConfigurationError: the file has problems.
     :raises InUse: another process has a serial port.
     :raises OSError: a file cannot be read, or written.
@@ -214,9 +214,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _keep_links(stack: ExitStack, directory: Path, configuration: BridgeConfiguration) -> None:
     """
-    Keep others from the links of all buses: bridges would turn to another simulation unawares.
+    Lock the links of all buses: bridges would turn to another simulation unnoticed.
 
-    :raises InUse: a simulation that runs has one. What a dead one has left is nobody's.
+    :raises InUse: a running simulation has one. What an ended one has left is free.
     """
     place = directory.resolve()
     for name in configuration.buses:
@@ -280,13 +280,13 @@ def _simulate(stack: ExitStack, clock: Clock, configuration: BridgeConfiguration
 
 @dataclass(frozen=True)
 class Servos:
-    """What the command line says of drives of CiA 402."""
+    """The options on drives of CiA 402."""
 
     without: dict[str, frozenset[tuple[int, int | None]]]
     habits: dict[str, Habits]
 
     def prepare(self, simulation: Simulation) -> None:
-        """Make the drives like that. What one does not have anyway is told."""
+        """Apply the options to the drives; print objects that are missing anyway."""
         for name, habits in self.habits.items():
             _servo(simulation, name).habits = habits
         for name, places in self.without.items():
@@ -301,7 +301,7 @@ def _servos(configuration: BridgeConfiguration, without: list[str], habit: list[
     """
     Read ``--without`` and ``--habit``.
 
-    :raises WrongUsage: they make no sense, or are said of a drive of another family.
+    :raises WrongUsage: they are invalid, or for a drive of another family.
     """
     taken: dict[str, frozenset[tuple[int, int | None]]] = {}
     for text in without:
@@ -327,7 +327,7 @@ def _servo(simulation: Simulation, name: str) -> SimulatedServoDrive:
 def _frame_log(stack: ExitStack, clock: Clock, output: '_Output',
                path: Path | None) -> ShowFrame | None:
     """
-    Return what takes the frames: standard output (``-``), a file as candump -L writes it, or None.
+    Return the log of frames: standard output (``-``), a file as candump -L writes it, or None.
 
     :raises OSError: the file cannot be written.
     """
@@ -341,7 +341,7 @@ def _frame_log(stack: ExitStack, clock: Clock, output: '_Output',
 
 
 def _wait(simulation: Simulation, wake: int, console: Console) -> int:
-    """Obey standard input until a signal comes, or a thread has ended by itself."""
+    """Run standard input until a signal comes, or a thread has ended by itself."""
     reader = LineReader()
     while not simulation.failure:
         typed = reader.fileno
@@ -368,7 +368,7 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel
                           channel=bus.channel if channel is None else channel,
                           bitrate=bitrate or bus.bitrate)
         if changed.interface != bus.interface:
-            # options of one adapter mean nothing to another
+            # options of one adapter do not apply to another
             changed = replace(changed, options={})
         buses[bus.name] = changed
     apart = {bus.wire for bus in configuration.buses.values()}
@@ -380,7 +380,7 @@ def _on_buses(configuration: BridgeConfiguration, interface: str | None, channel
 
 
 class _Output:
-    """Standard output, or a file, for several threads; that it ends is no reason to end."""
+    """Standard output, or a file, for several threads; its end does not end them."""
 
     def __init__(self, stream: TextIO | None, path: Path | None = None) -> None:
         self._stream = stream
@@ -396,7 +396,7 @@ class _Output:
             except OSError as error:
                 stream, self._stream = self._stream, None
                 if self._path is not None:
-                    with suppress(OSError):     # what it did not take it would be given again
+                    with suppress(OSError):     # it would be given again what it did not write
                         stream.close()
                     _complain(f'{self._path}: incomplete: {error.strerror}')
                 else:
@@ -413,7 +413,7 @@ def _complain(line: str) -> None:
 
 @contextmanager
 def _signals_as_descriptor() -> Iterator[int]:
-    """Turn SIGINT and SIGTERM into something that can be waited for."""
+    """Yield a descriptor that becomes readable with SIGINT or SIGTERM."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     woken = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 # PYTHON_ARGCOMPLETE_OK
 """
-The executable ``drive_can``: signals wait until :mod:`.main` is there to take them.
+The executable ``drive_can``: signals are blocked until :mod:`.main` handles them.
 
-A stop does not: what it needs to be sent by the local way is all that is imported before.
+A stop is sent before that: only what the local way needs is imported earlier.
 """
 
 import sys

@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What became of drives that were told something by hand, and a stop that is over at once.
+The results of commands by hand, and a stop that is over at once.
 
 Where all bridges are of this host, ``drive_can stop`` ends here, with nothing imported but what
-sends a stop and says what became of it.
+sends a stop and prints its results.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -16,13 +16,13 @@ from drive_can_bridge.process.local_stop import Answer, Early, LocalStop
 from drive_can_bridge.process.local_way import matches
 from drive_can_bridge.process.presence import Present, short
 
-#: s without a word after which the rest is imported, and how many words are taken in before it
+#: s without a message after which the rest is imported, and how many are read before
 _QUIET, _WORDS = 0.03, 1000
 
 
 class WithoutRos:
     """
-    What has become of a stop through ROS, where none has gone there.
+    In place of the results of a stop through ROS, where none was sent there.
 
     :ivar seen: the bridges that are known there.
     :ivar heard: those that have answered.
@@ -34,20 +34,20 @@ class WithoutRos:
     drives: Collection[str] = ()
 
     def answers(self, present: Iterable[Present] = ()) -> list[Answer]:
-        """Return what became of drives, and of bridges that do not answer."""
+        """Return the results of drives, and of bridges that do not answer."""
         return []
 
 
 def finished(early: Early) -> int | None:
     """
-    Wait for the answers to a stop that was sent by the local way, and show them.
+    Wait for the answers to a stop that was sent by the local way, and print them.
 
     :return: the exit code; None: they take longer, or there may be bridges elsewhere.
     """
     stop: LocalStop = early.stop
     try:
         is_over = _answered(stop)
-    except Exception:  # noqa: BLE001  whatever bridges say: the way through ROS is there
+    except Exception:  # noqa: BLE001  whatever bridges answer: the way through ROS is there
         is_over = False
     if not is_over:
         stop.go_on(_QUIET)
@@ -57,7 +57,7 @@ def finished(early: Early) -> int | None:
     try:
         code = show(answers(stop, None, early.namespace, early.words), 'stop', json=early.json)
         sys.stdout.flush()
-    except BrokenPipeError:     # its reader has gone
+    except BrokenPipeError:     # its reader is gone
         pass
     except OSError as error:
         from drive_can_bridge.cli.command import complain   # takes its time
@@ -67,7 +67,7 @@ def finished(early: Early) -> int | None:
 
 
 def _answered(stop: LocalStop) -> bool:
-    """Take answers as long as they come at once; return whether these were all."""
+    """Handle answers as long as they come at once; return whether these were all."""
     for _ in range(_WORDS):
         if stop.look(0.0):
             return True
@@ -79,9 +79,9 @@ def _answered(stop: LocalStop) -> bool:
 def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
             words: Sequence[str]) -> list[Answer]:
     """
-    Return what became of a stop.
+    Return the results of a stop.
 
-    :param ros: the part of it that has gone through ROS; None: none has.
+    :param ros: the part of it through ROS; None: none.
     :param words: names, patterns or full names of the drives that are meant; none: all.
     """
     through = ros or WithoutRos()
@@ -111,10 +111,10 @@ def answers(local: LocalStop, ros: WithoutRos | None, namespace: str | None,
 
 def show(told: Sequence[Answer], order: str, *, json: bool) -> int:
     """
-    Print what became of it, failures first; return the exit code.
+    Print the results, failures first; return the exit code.
 
-    :param order: what drives were told.
-    :param json: for a program.
+    :param order: the command.
+    :param json: print for a program.
     """
     for answer in sorted(told, key=lambda each: each.ok):
         name, elsewhere = answer.name.lstrip('/'), answer.domain is not None

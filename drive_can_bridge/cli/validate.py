@@ -63,7 +63,7 @@ def run(args: Namespace) -> int:
 
 def summary(drive: DriveConfiguration, bus: BusConfiguration, share: float) -> str:
     """
-    Write everything that matters about a drive in one line.
+    Return a line with everything that matters about a drive.
 
     :param share: of the bus that its exchange takes at worst.
     """

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""``drive_can write``: set parameters of drives, and see that they have arrived."""
+"""``drive_can write``: set parameters of drives, and check that they have arrived."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ def define(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """
-    Write.
+    Write parameters.
 
     :return: 0 everything, 1 not everything.
     :raises WrongUsage: it is not clear which drive is meant, or a word is no NAME=VALUE.
@@ -64,7 +64,7 @@ def run(args: Namespace) -> int:
 
 def _assignments(words: Sequence[str]) -> dict[str, str]:
     """
-    Take ``NAME=VALUE`` apart.
+    Return the names and values in ``NAME=VALUE`` words.
 
     :raises WrongUsage: a word is none, or there is none at all.
     """
@@ -84,7 +84,7 @@ def _assignments(words: Sequence[str]) -> dict[str, str]:
 def _write(args: Namespace, drives: Drives, wanted: dict[str, str]) -> int:
     checked = {(drive, name): each for drive in drives.values()
                for name, each in _all_checked(drive, wanted).items()}
-    if any(reason for _, reason in checked.values()):   # nobody wants half of a command
+    if any(reason for _, reason in checked.values()):   # half a command is not to be carried out
         _show(args, drives, wanted, [
             (drive, WriteOutcome(name, False, drive.find(name), reason or _OTHER_REFUSED,
                                  kind=FailureKind.INVALID))
@@ -118,7 +118,7 @@ def _all_checked(drive: Drive, wanted: dict[str, str]) -> dict[str, tuple[Value,
 
 
 def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:
-    """Return the value, and what is wrong with it as far as nobody has to ask the drive."""
+    """Return the value, and what is wrong with it as far as that shows without the drive."""
     parameter = drive.find(name)
     if parameter is None:
         return 0, drive.check(name, 0)
@@ -130,7 +130,7 @@ def _checked(drive: Drive, name: str, text: str) -> tuple[Value, str]:
 
 def _value(parameter: Parameter, text: str) -> Value | None:
     """
-    Read a value as a parameter file would, or by its name.
+    Return a value written as in a parameter file, or by its name.
 
     :return: None: it is none of the parameter's kind.
     """
@@ -184,7 +184,7 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
         return
     for name, drive in {drive.name: drive for drive in losers}.items():
         storing = None
-        with suppress(NoAnswer):    # what was written is told; its bridge has gone since
+        with suppress(NoAnswer):    # the result was printed; its bridge is gone since
             storing = STORING.get(drive.facts.protocol)
         if storing is not None:
             words = ['drive_can', 'write', name, storing.word]

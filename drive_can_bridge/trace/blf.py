@@ -2,9 +2,9 @@
 """
 Vector's binary logging format, ``.blf``.
 
-python-can's reader hands out frames only, and takes every entry of type 73 for SocketCAN's error
+python-can's reader returns frames only, and reads every entry of type 73 as SocketCAN's error
 classes, which only its own writer puts there. A file is a header and objects; most of them stand
-packed in containers, on whose borders they take no notice:
+packed in containers, and may span several of them:
 
 ====== ======== ======================================================
 offset size     of an object (little-endian)
@@ -127,7 +127,7 @@ def _objects(file: BinaryIO, complain: Complain, passed: Counter[str]) -> Iterat
 
 
 def _unpack(container: bytes) -> tuple[bytes, bool]:
-    """Return what a container holds, and whether that is all."""
+    """Return the content of a container, and whether it is complete."""
     if len(container) < _CONTAINER.size:
         return b'', False
     method, size = _CONTAINER.unpack_from(container)
@@ -142,7 +142,7 @@ def _unpack(container: bytes) -> tuple[bytes, bool]:
 
 def _contained(data: bytes, complain: Complain, passed: Counter[str],
                ) -> Generator[_Object, None, bytes]:
-    """Yield the objects that are whole; return what goes on in the next container."""
+    """Yield the complete objects; return what continues in the next container."""
     place, end = 0, len(data)
     while True:
         found = data.find(_SIGNATURE, place)
@@ -161,7 +161,7 @@ def _contained(data: bytes, complain: Complain, passed: Counter[str],
 
 def _parse(data: bytes, header_size: int, version: int, kind: int, passed: Counter[str],
            ) -> Iterator[_Object]:
-    """Yield an object, unless its header is of a version that nobody knows."""
+    """Yield an object, unless its header is of an unknown version."""
     if version not in (1, 2) or len(data) < max(_OBJECT.size + _STAMP.size, header_size):
         passed[f'objects with a header of version {version}'] += 1
         return
@@ -172,7 +172,7 @@ def _parse(data: bytes, header_size: int, version: int, kind: int, passed: Count
 
 def _entry(found: _Object, time: float, passed: Counter[str]) -> Record | None:
     """
-    Return what an object tells; None: it is counted.
+    Return the entry of an object; None: it has none, and is counted.
 
     :raises struct.error: it is too short.
     """

@@ -10,7 +10,7 @@ type
 ==== ===================================================================================
 227  alone, identifier big-endian: one interface was captured
 113  behind the head of a "cooked" capture (16 bytes), identifier in the byte order of the
-     file: "any" was, and an old libpcap gives what is sent twice, once going out
+     file: "any" was, and an old libpcap gives sent frames twice, once going out
 276  likewise (20 bytes), with the number of the interface
 252  behind the name of what it is, as Wireshark writes what it has read of other makers
 ==== ===================================================================================
@@ -54,10 +54,10 @@ Complain = Callable[[str], None]
 
 class _PacketContent(NamedTuple):
     """
-    What a packet holds.
+    The content of a packet.
 
     :param order: of its identifier, ``>`` or ``<``.
-    :param interface: where the packet itself says it; '' where it does not.
+    :param interface: where the packet itself has it; '' where it does not.
     """
 
     data: bytes
@@ -113,11 +113,11 @@ def read_capture(path: Path, complain: Complain, passed: Counter[str]) -> Iterat
 
 class _Watched:
     """
-    A file for scapy, which ends without a word where one is cut.
+    A file for scapy, which ends silently where one is cut.
 
     :ivar place: bytes that were read.
     :ivar short: some were missing.
-    :ivar on_section: is called where a part of a .pcapng begins, with interfaces of its own.
+    :ivar on_section: called where a part of a .pcapng begins, with interfaces of its own.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -141,7 +141,7 @@ class _Watched:
 
 class _Interfaces:
     """
-    Which interface a packet is of: scapy 2.5 reads it, and tells nobody.
+    Which interface a packet is of: scapy 2.5 reads it, and does not return it.
 
     :ivar current: number of that of the last packet.
     """
@@ -162,7 +162,7 @@ class _Interfaces:
 
     @property
     def name(self) -> str:
-        """Return what the interface of the last packet is called."""
+        """Return the name of the interface of the last packet."""
         if not self.is_new:
             return ''
         return self._names[self.current] or (
@@ -174,7 +174,7 @@ class _Interfaces:
         return self._offsets[self.current] if self.is_new else 0
 
     def ends_well(self, file: BinaryIO) -> bool:
-        """Return whether the last block is whole: its length stands at both of its ends."""
+        """Return whether the last block is complete: its length stands at both of its ends."""
         if not self.is_new:
             return True
         try:
@@ -224,9 +224,9 @@ def _noting(note: Callable[[bytes], None], read: Callable[[bytes, int], Any],
 
 class _Echoes:
     """
-    Finds frames that a capture has twice: going out, and coming back when they were sent.
+    Finds frames that a capture has twice: outgoing, and received back when they were sent.
 
-    :ivar dropped: how many were.
+    :ivar dropped: their number.
     """
 
     def __init__(self) -> None:

@@ -3,7 +3,7 @@
 Trace files: which formats there are, what each of them loses, reading and writing them.
 
 Formats are python-can's, by suffix; ``.blf``, ``.mf4`` and ``.trc`` have readers of ours. One
-damaged line does not cost a trace. Errors of files say which one it was. The two texts that
+damaged line does not cost a trace. Errors of files name the file. The two texts that
 candump writes, log file (``-l``, ``-L``) and screen, have a reader and writer of their own:
 
 .. code-block:: text
@@ -51,9 +51,9 @@ from drive_can_bridge.transport.tap import message_of, record_of
 
 def labels(buses: Iterable[BusConfiguration]) -> dict[str, str]:
     """
-    Return what buses, by name, are called in a trace: as candump calls them, or by their names.
+    Return the names of buses in a trace, by name: as candump has them, or their own.
 
-    By its name also a bus whose channel would be taken for another one.
+    Its own name also for a bus whose channel could mean another one.
     """
     known = list(buses)
     found = {}
@@ -69,13 +69,13 @@ class Channels:
     """
     Finds buses by the channels of a trace.
 
-    What the user says comes first. Else a word is the name of a bus; if none has it, its channel.
+    The user's choice comes first. Else a word is the name of a bus; if none has it, its channel.
     Of several buses a number is the place, from 1. The one bus of a file that has only one is
     meant by a trace without channels, too, and by a channel of another name, if there is no other
     in the trace.
 
     :param meant: by their names, the channels of buses as the user gives them.
-    :param tell: takes a line where a number was taken for a place, or is of no bus.
+    :param tell: called with a line where a number was read as a place, or is of no bus.
     """
 
     def __init__(self, buses: Sequence[BusConfiguration],
@@ -91,9 +91,9 @@ class Channels:
 
     def look_ahead(self, channels: Iterable[str | int]) -> None:
         """
-        See which channels a trace has, as far as it matters, before the first is looked for.
+        Note which channels a trace has, as far as it matters, before the first is looked up.
 
-        :raises DriveCanError: nobody knows which of them is the bus.
+        :raises DriveCanError: it is unknown which of them is the bus.
         """
         foreign: dict[str | int, None] = {}
         for channel in () if self._known else channels:
@@ -110,7 +110,7 @@ class Channels:
         """
         Return the bus; None: it is not in the file.
 
-        :raises DriveCanError: nobody knows, and another channel was taken for the bus.
+        :raises DriveCanError: it is unknown, and another channel was used for the bus.
         """
         if channel not in self._found:
             self._found[channel] = self._look(channel)
@@ -129,7 +129,7 @@ class Channels:
 
     def left_over(self) -> list[str]:
         """
-        Return what is to be said of channels with names that are those of no bus.
+        Return lines on channels whose names are those of no bus.
 
         At the end: a bus whose channel comes later is none that could be meant.
         """
@@ -145,13 +145,13 @@ class Channels:
             shown, [f'--bus {name}={shown}' for name in names])
 
     def missing(self) -> list[str]:
-        """Return what the user meant that is not in the trace, as it was given."""
+        """Return the user's choices that are not in the trace, as they were given."""
         found = {str(channel) for channel in self._found}
         return [f'{name}={channel}' for name, channel in self._meant.items()
                 if channel not in found]
 
     def _named(self, channel: str | int) -> BusConfiguration | None:
-        """Return the bus that the user or the file itself calls so."""
+        """Return the bus that has this name by the user or the file."""
         word = str(channel)
         for bus in self._buses:
             if self._meant.get(bus.name) == word:
@@ -190,10 +190,10 @@ _LOOK_PERIOD = 0.02
 
 
 class _NamedFile(io.FileIO):
-    """Errors of a write have no name, and a write may come late, out of a buffer."""
+    """A file whose errors have its name: those of late writes have none otherwise."""
 
     def write(self, data: Any) -> int:
-        """Write, or raise an error that says where to."""
+        """Write, or raise an error with the name of the file."""
         try:
             return super().write(data)
         except OSError as error:
@@ -212,7 +212,7 @@ def open_text(path: Path, newline: str | None = None) -> io.TextIOWrapper:
 
 
 class Database(can.SqliteWriter):
-    """A database as python-can writes it, whose failure is known outside of its thread."""
+    """A database as python-can writes it, whose failures are seen outside of its thread."""
 
     _failure: Exception | None = None
 
@@ -225,13 +225,13 @@ class Database(can.SqliteWriter):
         super().__init__(str(path))
 
     def on_message_received(self, msg: can.Message) -> None:
-        """Take a frame, to be written later."""
+        """Queue a frame, to be written later."""
         self._taken += 1
         super().on_message_received(msg)
 
     def check(self) -> None:
         """
-        Look whether frames can be written.
+        Check that frames can be written.
 
         :raises OSError: not any more.
         """
@@ -244,7 +244,7 @@ class Database(can.SqliteWriter):
 
         :raises OSError: not all is written.
         """
-        # told to stop, the thread writes 500 more frames at most, whatever waits
+        # when it is to end, the thread writes 500 more frames at most, whatever waits
         while self.num_frames < self._taken and self._writer_thread.is_alive():
             self._writer_thread.join(_LOOK_PERIOD)
         super().stop()
@@ -291,7 +291,7 @@ READABLE = tuple(sorted((*_TEXTS, *_BINARY_READERS)))
 
 
 class _Head(NamedTuple):
-    """How a format begins, and what a file is called that begins otherwise."""
+    """The beginning of a format, and the name of a file that begins otherwise."""
 
     pattern: re.Pattern[bytes]
     otherwise: str
@@ -347,7 +347,7 @@ def read_records(path: Path, complain: Complain) -> Iterator[Record]:
     Read a trace, entry by entry.
 
     :param path: ``-``: candump's text on standard input. A further suffix ``.gz`` is understood.
-    :param complain: takes a line for everything that cannot be read.
+    :param complain: called with a line for everything that cannot be read.
     :raises UnknownFormat: no format has this suffix.
     :raises OSError: the file cannot be read.
     """
@@ -400,9 +400,9 @@ def _begins_as(head: _Head, path: Path, complain: Complain) -> bool:
 
 def check_readable(path: Path) -> tuple[str, bool]:
     """
-    Look whether there is a trace that can be read, before anything else is begun.
+    Check that there is a trace that can be read, before anything else is started.
 
-    :return: the suffix that says the format, and whether the file is packed.
+    :return: the suffix of the format, and whether the file is packed.
     :raises UnknownFormat: no format has this suffix.
     :raises OSError: the file cannot be read.
     """
@@ -441,14 +441,14 @@ def _candump_records(stream: Iterable[str], complain: Complain) -> Iterator[Reco
 
 #: the time of a line of ``candump -t d`` or ``-t z``
 _SHORT_TIME = re.compile(r' \((\d{3}\.\d{6})\) ')
-#: lines by which times since the start (they rise) are told from those since the line before
+#: lines by which times since the start (they rise) are told from those since the last line
 _LOOKED_AT = 32
 #: of so many steps one falls or stays, at least, where times are differences
 _FALLS = 8
 
 
 def _from_differences(lines: Iterator[str], complain: Complain) -> Iterator[str]:
-    """Give times from the beginning, where ``candump -t d`` wrote those since the last line."""
+    """Return lines with times from the beginning, where ``candump -t d`` wrote differences."""
     head = list(itertools.islice(lines, 1))
     if not head or _SHORT_TIME.match(head[0]) is None:
         return itertools.chain(head, lines)
@@ -473,7 +473,7 @@ def _added_up(lines: Iterator[str]) -> Iterator[str]:
 
 
 class _Lines:
-    """Lines of a file for a reader of python-can, which takes only what looks like a file."""
+    """Lines of a file for a reader of python-can, which accepts only what looks like a file."""
 
     def __init__(self, lines: Iterator[str]) -> None:
         self._lines = lines
@@ -507,9 +507,9 @@ class _Lines:
 
 class _Numbered:
     """
-    Lines whose number is known.
+    Lines that are counted.
 
-    :ivar lines: them; to count costs no step of Python for a line.
+    :ivar lines: the lines; counting costs no step of Python for a line.
     """
 
     def __init__(self, lines: Iterable[str]) -> None:
@@ -518,16 +518,16 @@ class _Numbered:
         self.lines = itertools.compress(lines, self._count)
 
     def number(self) -> int:
-        """Return how many were taken."""
+        """Return how many lines were read."""
         self._asked += 1
         return next(self._count) - self._asked
 
 
 class _Heard(logging.Handler):
     """
-    Hears what the readers of python-can only log.
+    Handles what the readers of python-can only log.
 
-    :param complain: takes it, without the name of the reader.
+    :param complain: called with it, without the name of the reader.
     """
 
     def __init__(self, complain: Complain) -> None:
@@ -540,7 +540,7 @@ class _Heard(logging.Handler):
 
 
 def _tell_passed(passed: Counter[str], complain: Complain) -> None:
-    """Tell, once, what has no entry."""
+    """Report, once, what has no entry."""
     if passed:
         complain('passed over: ' + ', '.join(
             f'{kind} ({count})' for kind, count in passed.most_common(_PASSED_MAX))
@@ -561,7 +561,7 @@ def _capture_records(path: Path, complain: Complain) -> Iterator[Record]:
 
 
 def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]:
-    """Yield the entries that are possible; tell of the others."""
+    """Yield the entries that are possible; report the others."""
     for number, record in enumerate(records, 1):
         try:
             record = checked(record)
@@ -572,7 +572,7 @@ def _possible(records: Iterator[Record], complain: Complain) -> Iterator[Record]
 
 
 def _tell_wrong(suffix: str, lines: _Numbered, complain: Complain, text: str) -> None:
-    """Return what is wrong with the last line; '': it is no entry."""
+    """Report what is wrong with the last line; '': it is no entry."""
     complain(f'line {lines.number()}: {text or f"no entry of a {suffix} trace"}')
 
 
@@ -594,7 +594,7 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     """
     Read by a reader of python-can, which ends at the first line that it does not understand.
 
-    Then a new one is given the head of the file again, and goes on behind that line.
+    Then a new one gets the head of the file again, and continues behind that line.
     """
     header: list[str] = []
     known = False
@@ -607,7 +607,7 @@ def _text_records(suffix: str, stream: Iterable[str], complain: Complain) -> Ite
     logger = logging.getLogger('can')
     heard = _Heard(wrong)
     logger.addHandler(heard)
-    logger.propagate = False    # told once
+    logger.propagate = False    # reported once
     try:
         for line in stream:     # readers complain of a file without a frame
             lines = _Lines(itertools.chain(header, (line,), stream))
@@ -644,7 +644,7 @@ def _measured_records(path: Path, complain: Complain) -> Iterator[Record]:
 
 
 def _database_records(path: Path, complain: Complain) -> Iterator[Record]:
-    """Read what python-can's writer has put into a database."""
+    """Read a database of python-can's writer."""
     with closing(sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro', uri=True)) as database:
         try:
             rows = database.execute('SELECT ts, arbitration_id, extended, remote, error, data '
@@ -671,12 +671,12 @@ _BINARY_RECORDS: dict[str, Callable[[Path, Complain], Iterator[Record]]] = {
 
 
 def _kind_by_length(data: bytes) -> RecordKind:
-    """Return what must have been written by a format that does not keep it."""
+    """Return the kind of an entry in a format that does not keep it."""
     return RecordKind.FD if len(data) in _FD_LENGTHS else DATA
 
 
 def _record(message: can.Message, first: int) -> Record:
-    """Return an entry; the tool of this format calls ``first`` what python-can calls 0."""
+    """Return an entry; this format counts channels from ``first``, python-can from 0."""
     channel = message.channel
     record = record_of(message, channel + first if isinstance(channel, int)
                        else channel if isinstance(channel, str) else '')
@@ -726,7 +726,7 @@ class TraceWriter:
 
     @property
     def size(self) -> int:
-        """Bytes written so far; formats that buffer or pack tell late."""
+        """The bytes written so far; with buffers or packing, this grows late."""
         if self._file is not None:
             return self._file.tell()
         try:
@@ -736,7 +736,7 @@ class TraceWriter:
 
     def flush(self) -> None:
         """
-        Hand what was written to the system, where the format lets it.
+        Pass what was written to the system, where the format allows it.
 
         :raises OSError: it cannot be written.
         """
@@ -759,7 +759,7 @@ class TraceWriter:
 
 def check_writable(path: Path, buses: int) -> None:
     """
-    Look whether a trace of so many buses can be written in the format of this suffix.
+    Check that a trace of so many buses can be written in the format of this suffix.
 
     :raises UnknownFormat: it cannot.
     """
@@ -786,7 +786,7 @@ _LONG_DLC = '9ABCDEF'
 _LONG_LENGTHS = tuple(f'{{{digit}}}' for digit in _LONG_DLC)
 #: the highest identifiers as they are written; lower ones come before them in the alphabet, too
 _EXTENDED_DIGITS, _STANDARD_DIGITS = '1FFFFFFF', '7FF'
-#: s since 1970: the end of the year 9999. Beyond, a float soon tells no two frames apart
+#: s since 1970: the end of the year 9999. Beyond, a float soon makes two frames one
 _TIME_MAX = 253_402_300_800.0
 _DATE = re.compile(r'\([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{6}\)')
 _DIRECTIONS = {'R': False, 'T': True, 'RX': False, 'TX': True}
@@ -795,7 +795,7 @@ LINE_MAX = 400
 
 
 def format_record(record: Record) -> str:
-    """Write an entry as ``candump -L`` does, with its direction where that is known."""
+    """Return an entry as a line of ``candump -L``, with its direction where that is known."""
     time, channel, identifier, data, extended, kind, sent = record
     direction = '' if sent is None else ' T' if sent else ' R'
     if kind is DATA:
@@ -911,7 +911,7 @@ def _time(word: str) -> float:
 
 
 def _date(words: str) -> float:
-    """Read what ``candump -t A`` writes: date and time where it was written."""
+    """Read the date and time of ``candump -t A``, in the time zone where it was written."""
     try:
         if _DATE.fullmatch(words):
             return datetime.fromisoformat(words[1:-1]).timestamp()
@@ -936,7 +936,7 @@ def _checked(record: Record, digits: int) -> Record:
 
 def checked(record: Record) -> Record:
     """
-    Look whether an entry is possible at all.
+    Return an entry, after checking that it is possible at all.
 
     :raises ValueError: it is not.
     """

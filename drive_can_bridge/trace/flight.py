@@ -1,14 +1,14 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The flight recorder of a bridge: what came before a failure, on disk before anybody asks.
+The flight recorder of a bridge: traces of the time before a failure, written by themselves.
 
 A frame becomes 24 bytes in a block that exists already: nothing is allocated for it, nothing is
 left for the garbage collector, whose work would grow with what is kept. Blocks that are full are
 never touched again, so that writing them to a file needs no copy and no lock.
 
 A thread waits for a second after the event, so that what followed is in the trace, too, and writes
-in small steps between which it gives way. A trace that somebody asks for takes nothing from those
-of failures: one that comes soon behind it is written when a trace of this bus may be again.
+in small steps between which it gives way. A requested trace takes nothing from those
+of failures: one that comes soon after it is written when a trace of this bus may be again.
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ _pack_into = _ENTRY.pack_into
 
 class Ring:
     """
-    Keeps what was seen in the last seconds, and a little more.
+    Keeps the frames of the last seconds, and a little more.
 
     :param seconds: how long at least, as far as the memory goes.
     """
@@ -60,12 +60,12 @@ class Ring:
         self._block = bytearray(_BLOCK_SIZE)
         self._place = 0
         self._began = 0.0
-        # few, and told by another thread
+        # few, and reported by another thread
         self._errors: deque[tuple[float, int, bytes]] = deque(maxlen=BLOCK)
 
     def note(self, frame: Frame, at: float, sent: bool) -> None:
         """
-        Keep a frame. One caller at a time.
+        Record a frame. One caller at a time.
 
         :param at: steady clock, s.
         """
@@ -81,11 +81,11 @@ class Ring:
         self._place = place + 24
 
     def note_error(self, classes: int, data: bytes, at: float) -> None:
-        """Keep an error frame. From any thread."""
+        """Record an error frame. From any thread."""
         self._errors.append((at, classes, data))
 
     def _turn(self, now: float) -> None:
-        """Begin a new block, and forget those that are too old."""
+        """Start a new block, and forget those that are too old."""
         with self._lock:
             full = self._full
             full.append((self._began, self._block))
@@ -105,7 +105,7 @@ class Ring:
         Return what is kept now, from a time on, as entries of a trace.
 
         :param since: steady clock, s.
-        :param offset: what makes the steady clock the time of day.
+        :param offset: from the steady clock to the time of day.
         """
         with self._lock:
             blocks = [memoryview(block) for _, block in self._full]
@@ -133,9 +133,9 @@ _PAUSE = 0.0005
 #: s that the end of the bridge waits for a trace that is being written
 _END_TIMEOUT = 3.0
 
-#: rank of what is no failure: somebody asks
+#: rank of a requested trace, without a failure
 _ASKED = -1
-#: takes the path of a trace, or '' and why there is none
+#: called with the path of a trace, or '' and why there is none
 Done = Callable[[str, str], None]
 
 
@@ -165,7 +165,7 @@ class _RecordedBus:
     folder: Path
     wanted: _Wanted | None = None
     last: float = -SPACING
-    failed: float = -SPACING    # the last that nobody asked for
+    failed: float = -SPACING    # the last that was not requested
     last_path: str = ''
 
 
@@ -173,9 +173,9 @@ class FlightRecorder:
     """
     Records all buses that ask for it (there may be none), and writes traces.
 
-    :param default_folder: where traces go whose bus names no directory.
-    :param say: takes a line for the log.
-    :param complain: takes a line when a trace cannot be written.
+    :param default_folder: for traces of buses without a directory.
+    :param say: logs a line.
+    :param complain: logs a line when a trace cannot be written.
     """
 
     def __init__(self, buses: Iterable[BusConfiguration], default_folder: Path,
@@ -207,17 +207,17 @@ class FlightRecorder:
 
     @property
     def memory(self) -> int:
-        """Bytes that all of it may take."""
+        """The bytes that all of it may use."""
         return len(self._buses) * MEMORY_MAX
 
     def ring(self, bus: str) -> Ring | None:
-        """Return what keeps the frames of a bus; None: it is not recorded."""
+        """Return the ring of a bus; None: it is not recorded."""
         found = self._buses.get(bus)
         return None if found is None else found.ring
 
     def trigger(self, bus: str, reason: str, *, rank: int = 0) -> None:
         """
-        Something went wrong: a trace of this bus is to be written. From any thread, at once.
+        Request a trace of a bus after a failure. From any thread, at once.
 
         :param reason: becomes part of the file's name.
         :param rank: of several reasons within the aftermath, the highest names the file.
@@ -238,7 +238,7 @@ class FlightRecorder:
                 wanted.reason, wanted.rank = reason, rank
 
     def save(self, bus: str, reason: str, done: Done) -> None:
-        """Write a trace because somebody asks for it; ``done`` is told the path, or why not."""
+        """Write a requested trace; ``done`` is called with its path, or with why there is none."""
         found = self._buses[bus]
         with self._lock:
             now = self._clock.now()
@@ -291,7 +291,7 @@ class FlightRecorder:
         """
         Return the bus whose trace is to be written now, failures first. The lock must be held.
 
-        :param asked: what somebody asked for is among it.
+        :param asked: requested traces are included.
         """
         latest = math.inf if self._closing else self._clock.now() - AFTERMATH
         due = [(bus, bus.wanted) for bus in self._buses.values()
@@ -318,7 +318,7 @@ class FlightRecorder:
                 self._remove_old(bus, path)
         except OSError as error:
             text += f'{error.strerror or error}: {path}'
-        except Exception as error:  # noqa: BLE001  no failure is silent: who asked waits
+        except Exception as error:  # noqa: BLE001  no failure is silent: the caller waits
             text += f'{type(error).__name__} {error}: {path}'
         else:
             if count:
@@ -366,7 +366,7 @@ class FlightRecorder:
         return count
 
     def _write_failures(self) -> None:
-        """Write what is due of failures; what somebody asked for, and is being written, waits."""
+        """Write what is due of failures; a requested trace that is being written waits."""
         while True:
             with self._lock:
                 due = self._due(asked=False)

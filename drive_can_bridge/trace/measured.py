@@ -2,7 +2,7 @@
 """
 ASAM's measurement data with bus logging, ``.mf4``, unpacked by asammdf.
 
-python-can's reader takes the members of every error for SocketCAN's classes, which only its own
+python-can's reader reads the members of every error as SocketCAN's classes, which only its own
 writer puts there, knows none of ``ErrorType``, and ends at an error whose bytes are one number.
 What loggers write (ASAM MDF bus logging; members that are not there are not known):
 
@@ -36,14 +36,14 @@ BEGINNINGS = b'MDF |UnFinMF '
 #: of a group, of its source, of the bus of that
 _BUS_EVENT, _OF_BUS, _CAN = 0x2, 2, 2
 _KINDS = 'CAN_DataFrame', 'CAN_ErrorFrame', 'CAN_RemoteFrame'
-#: what python-can's writer gives an error
+#: python-can's writer's content of an error
 _OF_PYTHON_CAN = frozenset((
     'BusChannel', 'ID', 'IDE', 'DLC', 'DataLength', 'DataBytes', 'Dir', 'EDL', 'BRS', 'ESI'))
 _EXTENDED = 0x80000000
 _CLASSICAL_MAX = 8
 #: entries that are unpacked at a time
 _CHUNK = 4096
-#: ``ErrorType`` as SocketCAN tells the same; place 8 in the frame is its check sum
+#: ``ErrorType`` as SocketCAN has the same; place 8 in the frame is its check sum
 _ERROR_TYPES = {
     1: (PROTOCOL | BUS_ERROR, b'\0\0\1\0\0\0\0\0'),
     2: (PROTOCOL | BUS_ERROR, b'\0\0\2\0\0\0\0\0'),
@@ -78,7 +78,7 @@ def read_measured(path: Path, complain: Complain, passed: Counter[str]) -> Itera
 
 
 def _opened(opener: Callable[[Path], Any], path: Path) -> Any:
-    """Open a file; None: it is damaged. What has failed to begin fails once more at its end."""
+    """Open a file; None: it is damaged. A failure at its beginning is repeated at its end."""
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         try:
@@ -147,7 +147,7 @@ class _Members:
         return otherwise if column is None else int(column[place])
 
     def channel(self, place: int) -> int | str:
-        """Return the bus; '': nobody says."""
+        """Return the bus; '': unknown."""
         return self.number('BusChannel', place) if 'BusChannel' in self.names else ''
 
     def identifier(self, place: int) -> tuple[int, bool]:
@@ -166,7 +166,7 @@ class _Members:
         return content[:self.number('DataLength', place, len(content))]
 
     def sent(self, place: int) -> bool | None:
-        """Return whether it was sent by who recorded it; None: nobody says."""
+        """Return whether the recorder itself sent it; None: unknown."""
         column = self._members.get('Dir')
         if column is None:
             return None

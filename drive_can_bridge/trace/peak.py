@@ -2,7 +2,7 @@
 """
 PEAK's text format, ``.trc``.
 
-python-can's reader hands out frames only, takes the versions 1.2 and 3.0 for 1.0, and what it
+python-can's reader returns frames only, reads the versions 1.2 and 3.0 as 1.0, and what it
 reads at all differs from release to release. Lines are a number, a time in ms behind the start of
 the trace (days since 1899-12-30), and further columns, by version:
 
@@ -11,7 +11,7 @@ none (1.0)      identifier, length, data (or ``ERROR`` and data, or ``RTR``); no
 1.1             type or direction, identifier, length, data
 1.2             bus, then as 1.1
 1.3             bus, type or direction, identifier, one of J1939, length, data
-2.0, 2.1, 3.0   as ``;$COLUMNS=`` says; what is of no frame has fewer in 2.0
+2.0, 2.1, 3.0   as in ``;$COLUMNS=``; other lines than frames have fewer in 2.0
 =============== ============================================================================
 """
 
@@ -66,7 +66,7 @@ Complain = Callable[[str], None]
 
 
 class _Layout(NamedTuple):
-    """What lines of a version look like."""
+    """The patterns of the lines of a version."""
 
     frame: re.Pattern[str]
     other: re.Pattern[str]
@@ -77,7 +77,7 @@ def read_peak(lines: Iterable[str], wrong: Complain, passed: Counter[str]) -> It
     """
     Read the entries of a file.
 
-    :param wrong: takes what is wrong with the line that was taken last; '': it is no entry.
+    :param wrong: called with what is wrong with the last line; '': it is no entry.
     :param passed: counts lines that have no entry.
     """
     read = _Reader(wrong, passed).read
@@ -88,7 +88,7 @@ def read_peak(lines: Iterable[str], wrong: Complain, passed: Counter[str]) -> It
 
 
 class _Reader:
-    """Knows what the head has said."""
+    """Reads lines by the columns in their head."""
 
     def __init__(self, wrong: Complain, passed: Counter[str]) -> None:
         self._wrong = wrong
@@ -99,7 +99,7 @@ class _Reader:
         self._told = False      # that there is no layout
 
     def read(self, line: str) -> Record | None:
-        """Return the entry of a line; None: it has none, which is told if it should."""
+        """Return the entry of a line; None: it has none, which is reported where it should."""
         if line.lstrip()[:1] in (';', ''):
             self._take_head(line)
             return None
@@ -169,7 +169,7 @@ class _Reader:
 
 
 def _layout(columns: Sequence[str]) -> _Layout | None:
-    """Return what lines with these columns look like; None: one is missing, or stands twice."""
+    """Return the layout of lines with these columns; None: one is missing, or given twice."""
     names = set(columns)
     has_type = not names.isdisjoint('Tt')
     if (len(names) < len(columns) or not names >= {'O', 'I'} or names.isdisjoint('Ll')
@@ -198,9 +198,9 @@ def _pattern(columns: Iterable[str], known: Mapping[str, str]) -> str:
 
 def _state_or_error(kind: str, start: float, found: re.Match[str], line: str) -> Record | None:
     """
-    Return the entry of a line that is of no frame; None: it tells neither.
+    Return the entry of a line that is of no frame; None: it is of another kind.
 
-    The bytes of an error are those that PEAK's PCAN-Basic hands out, by its manual ("Error
+    The bytes of an error are those that PEAK's PCAN-Basic returns, by its manual ("Error
     Frames"): 0 when sending, place in the frame, counters receive and transmit; in front of them
     its type, 0 if only the counters have changed. In a change of counters (EC) the same order is
     taken for granted: the examples of the format's own document have equal ones.

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What becomes of the telegrams of a trace: lines of text, JSON, columns of a table, curves.
+Sinks for the telegrams of a trace: lines of text, JSON, columns of a table, curves.
 
 .. code-block:: text
 
@@ -9,7 +9,7 @@ What becomes of the telegrams of a trace: lines of text, JSON, columns of a tabl
     12.380512 +0.040 main conveyor < cyclic response: LOST: no answer in 20 ms
 
 First the time since the trace began, then that since the last telegram of the same kind; at the
-end, in brackets, what an answer took.
+end, in brackets, the time that an answer took.
 """
 
 from array import array
@@ -38,7 +38,7 @@ Format = Callable[[int], str]
 
 
 def _format_of(parameter: Parameter) -> Format:
-    """Return what turns raw integers of a parameter into its name, value and unit."""
+    """Return the function that formats raw integers of a parameter with name, value and unit."""
     name, names = parameter.name, dict(parameter.values)
     if parameter.scaled:
         digits = max(_digits(parameter.scale), _digits(parameter.offset))
@@ -62,11 +62,11 @@ def _named(names: Mapping[int, str], raw: int) -> str:
 
 
 def _digits(step: float) -> int:
-    """Return the digits behind the point that tell one step from the next."""
+    """Return the digits behind the point that distinguish one step from the next."""
     if step == 0.0 or float(step).is_integer():
         return 0
     digits = max(0, math.ceil(-math.log10(abs(step)) - 1e-9))
-    most = min(digits + 1, _DIGITS_MAX)     # of a step like 50/16384 nobody wants them all
+    most = min(digits + 1, _DIGITS_MAX)     # of a step like 50/16384 all of them are too many
     while digits < most and not math.isclose(round(step, digits), step, rel_tol=1e-2):
         digits += 1
     return min(digits, most)
@@ -86,7 +86,7 @@ _KINDS_MAX = 20_000
 
 
 class Only(Enum):
-    """What ``--only`` can ask for."""
+    """The choices of ``--only``."""
 
     PARAMETERS = 'parameters'
     ERRORS = 'errors'
@@ -97,7 +97,7 @@ class Selection:
     """
     Chooses telegrams.
 
-    :param drives: shell patterns; none: all, and what is of no drive, too.
+    :param drives: shell patterns; none: all, and telegrams of no drive, too.
     :param only: nothing: everything.
     """
 
@@ -109,11 +109,11 @@ class Selection:
 
     @property
     def takes_all(self) -> bool:
-        """Nothing is left out."""
+        """Whether nothing is left out."""
         return not (self._patterns or self._only)
 
     def names(self, drive: str) -> bool:
-        """Return whether somebody wants to see a drive."""
+        """Return whether the drive passes the filter."""
         wanted = self._wanted.get(drive)
         if wanted is None:
             wanted = self._wanted[drive] = not self._patterns or any(
@@ -121,7 +121,7 @@ class Selection:
         return wanted
 
     def takes(self, bus: str, telegram: Telegram) -> bool:
-        """Return whether somebody wants to see it."""
+        """Return whether a telegram passes the filter."""
         if self._patterns and not self.names(telegram.drive):
             return False
         only = self._only
@@ -132,7 +132,7 @@ class Selection:
                 or Only.CHANGES in only and self._changed(bus, telegram))
 
     def _changed(self, bus: str, telegram: Telegram) -> bool:
-        """Return whether it says anything else than the last of its kind."""
+        """Return whether a telegram differs from the last of its kind."""
         key = bus, telegram.drive, telegram.direction, telegram.title
         if telegram.kind is TelegramKind.OTHER:
             identifier, _, _ = telegram.remark.partition('#')
@@ -167,9 +167,9 @@ class _TitleRow:
 
 class LineWriter:
     """
-    Writes a line for each telegram that somebody wants to see.
+    Writes a line for each telegram that passes the filter.
 
-    :param write: takes the line with its end.
+    :param write: writes the line with its end.
     :param as_json: a JSON document a line.
     """
 
@@ -184,7 +184,7 @@ class LineWriter:
         self._line = self._document if as_json else self._text
 
     def __call__(self, bus: str, telegram: Telegram) -> None:
-        """Write it, if it is wanted."""
+        """Write a telegram, if it passes the filter."""
         if self._start != self._start:      # NaN
             self._start = telegram.time
         if self._takes is None or self._takes(bus, telegram):
@@ -219,7 +219,7 @@ class LineWriter:
         return f'{begin}{content}\n'
 
     def _format(self, parameter: Parameter) -> Format:
-        """Find out once what is the same for all values of a parameter."""
+        """Return what is the same for all values of a parameter, computed once."""
         known = self._formats.get(id(parameter))
         if known is not None:
             return known[1]
@@ -261,7 +261,7 @@ _STRETCH = 0.001
 _STRETCHES_MAX = 4096
 #: the words of a family that has its control built in
 _BUILT_IN = (('control_word', Direction.REQUEST), ('status_word', Direction.RESPONSE))
-#: the bit of a status word that says that there is a fault
+#: the bit of a status word that reports a fault
 FAULT = 'fault'
 #: height of a lane of bits, of 1
 LANE = 0.8
@@ -274,7 +274,7 @@ Column = tuple[str, str, Direction]
 
 def columns(drive: DriveConfiguration) -> dict[Column, str]:
     """
-    Return the values of a drive that a table has, and what the columns are called.
+    Return the values of a drive that a table has, and the names of the columns.
 
     Those of the exchange: setpoints as sent, control word, actual values, status word.
     """
@@ -298,7 +298,7 @@ class TableWriter:
     """
     Writes values as comma separated columns: PlotJuggler, pandas and spreadsheets open that.
 
-    A line for each telegram that carries values; cells of values that it does not carry are empty.
+    A line for each telegram with values; cells of values that it lacks are empty.
     """
 
     def __init__(self, stream: TextIO, drives: Iterable[DriveConfiguration]) -> None:
@@ -314,7 +314,7 @@ class TableWriter:
         self._writer.writerow(heading)
 
     def __call__(self, bus: str, telegram: Telegram) -> None:
-        """Take a telegram."""
+        """Write a telegram's values."""
         if self._start != self._start:      # NaN
             self._start = telegram.time
         if not telegram.raws or telegram.verdict not in _VALID:
@@ -352,7 +352,7 @@ class Curve:
         self._points = (array('d'), array('d'), array('d'), array('d'))
 
     def add(self, time: float, value: float) -> None:
-        """Take a point."""
+        """Add a point."""
         self._add(time, value, time, value)
         while len(self._places) > _STRETCHES_MAX:
             self._width *= 2.0
@@ -396,13 +396,13 @@ class Lanes(NamedTuple):
     curves: tuple[Curve, ...]
 
     def add(self, time: float, raw: int) -> None:
-        """Take a word."""
+        """Add a word."""
         for lane, ((_, bit), curve) in enumerate(zip(self.bits, self.curves)):
             curve.add(time, lane + LANE * (raw >> bit & 1))
 
 
 class Marks:
-    """What went wrong with a drive: when answers were missing, from when to when a fault was."""
+    """The faults of a drive: times of missing answers, and periods of faults."""
 
     def __init__(self) -> None:
         self.lost: list[float] = []
@@ -410,7 +410,7 @@ class Marks:
         self._since = self._last = math.nan
 
     def add(self, time: float, telegram: Telegram) -> None:
-        """Take a telegram."""
+        """Add a telegram."""
         if telegram.verdict is Verdict.LOST and len(self.lost) < _MARKS_MAX:
             self.lost.append(time)
         for parameter, raw in zip(telegram.parameters, telegram.raws):
@@ -430,11 +430,11 @@ class Marks:
 
 
 class Turning:
-    """The position of a ``continuous`` joint: goes on where its counter begins again."""
+    """The position of a ``continuous`` joint: without the wraps of its counter."""
 
     def __init__(self, drive: DriveConfiguration, joint: JointConfiguration) -> None:
         self._position = ContinuousPosition(joint, drive.cyclic_response)
-        #: s without a sample after which nobody knows how far it has turned: as for the bridge
+        #: s without a sample after which its turns are unknown: as for the bridge
         self._lost_after = (drive.missed_limit + 1) * drive.period
         self._last = math.nan
 
@@ -487,7 +487,7 @@ class Plotter:
             self._turning[drive.name, name] = Turning(drive, joint)
 
     def __call__(self, bus: str, telegram: Telegram) -> None:
-        """Take a telegram."""
+        """Add a telegram."""
         if self._start != self._start:      # NaN
             self._start = telegram.time
         marks = self._marks.get(telegram.drive)
@@ -518,7 +518,7 @@ class Plotter:
         """
         Write the picture: a panel for each unit, and one with lanes for each word of named bits.
 
-        :param notes: what happened, and when, as the records of the trace have the time.
+        :param notes: what happened, and when, by the times of the trace's records.
         :raises DriveCanError: nothing to draw.
         :raises ImportError: matplotlib is not installed.
         """
@@ -568,7 +568,7 @@ class Plotter:
         pyplot.close(figure)
 
     def _explain(self, axis: Any) -> None:
-        """Say in the legend what the marks are, where there are any."""
+        """Explain the marks in the legend, where there are any."""
         if any(marks.lost for marks in self._marks.values()):
             axis.plot([], [], '|', color='tab:red', markersize=9, label='no answer')
         if any(marks.faults for marks in self._marks.values()):
@@ -577,7 +577,7 @@ class Plotter:
             axis.legend(loc='upper right', fontsize='small')
 
     def _mark(self, axis: Any) -> None:
-        """Show what went wrong: a red tick for each missing answer, red ground for a fault."""
+        """Draw the faults: a red tick for each missing answer, a red background for a fault."""
         lost = [time for marks in self._marks.values() for time in marks.lost]
         axis.plot(lost, [0.02] * len(lost), '|', color='tab:red', markersize=9,
                   transform=axis.get_xaxis_transform())

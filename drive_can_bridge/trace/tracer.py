@@ -2,7 +2,7 @@
 """
 From entries of a trace to telegrams, with the observers of all drives.
 
-Written for a hundred million frames: a frame costs a look into two dictionaries and its handler,
+Written for a hundred million frames: a frame costs a look-up in two dictionaries and its handler,
 and nothing is kept of it.
 """
 
@@ -30,7 +30,7 @@ _EXTENDED = 1 << 29
 _DATA = RecordKind.DATA
 _REQUEST = Direction.REQUEST
 
-#: takes the name of the bus and the telegram
+#: called with the name of the bus and the telegram
 Sink = Callable[[str, Telegram], None]
 
 
@@ -39,8 +39,8 @@ class BusTrace:
     One bus of a trace.
 
     :ivar frames: entries that were frames.
-    :ivar error_frames: those that were not.
-    :ivar strays: frames of nobody in the parameter file.
+    :ivar error_frames: entries that were not.
+    :ivar strays: frames of no drive in the parameter file.
     :ivar shift: s to add to stamps, so that time goes on where a clock was set back.
     :ivar newest: time of the last entry.
     """
@@ -65,7 +65,7 @@ class BusTrace:
         self._second_bits = 0
 
     def find(self, identifier: int, extended: bool) -> tuple[Handler, DriveObserver] | None:
-        """Return what takes frames of this identifier, and whose it is."""
+        """Return the handler of frames with this identifier, and its observer."""
         if len(self.handlers) >= _KNOWN_MAX:
             self.handlers.clear()
         found = None
@@ -91,27 +91,27 @@ class BusTrace:
         self.last = time
 
     def close_second(self) -> None:
-        """See whether the second that ends was the busiest."""
+        """Check whether the second that ends was the busiest."""
         if self.bitrate:
             self._peak = max(self._peak, STUFFING * self._second_bits / self.bitrate)
 
     @property
     def peak_load(self) -> float:
-        """Highest load within one second, 0 to 1 and more; NaN: nobody knows."""
+        """The highest load within one second, 0 to 1 and more; NaN: unknown."""
         return self._peak if self.bitrate and self.last > self.first else math.nan
 
     @property
     def load(self) -> float:
-        """Mean load from the first frame to the last, 0 to 1 and more; NaN: nobody knows."""
+        """The mean load from the first frame to the last, 0 to 1 and more; NaN: unknown."""
         most = (self.last - self.first) * self.bitrate
         return STUFFING * self.bits / most if most > 0.0 else math.nan
 
 
 class Tracer:
     """
-    Says what the entries of a trace mean.
+    Decodes the entries of a trace.
 
-    :param sink: takes every telegram, in the order of time.
+    :param sink: called with every telegram, in the order of time.
     :param channels: finds buses; may have looked ahead.
     """
 
@@ -142,7 +142,7 @@ class Tracer:
         return made
 
     def _look_for_masters(self, bus: BusTrace, telegram: Telegram) -> Telegram:
-        """Name a second master, where the trace says who sent what."""
+        """Mark a telegram of a second master, where the trace shows who sent what."""
         if self._sent:
             bus.somebody_sent = True
         elif self._sent is False and bus.somebody_sent:
@@ -154,9 +154,9 @@ class Tracer:
 
     def take(self, record: Record) -> None:
         """
-        Take an entry. The fast path.
+        Handle an entry. The fast path.
 
-        :raises DriveCanError: nobody knows of which bus it is.
+        :raises DriveCanError: its bus is unknown.
         """
         time, channel, identifier, data, extended, kind, sent = record
         bus = self._by_channel.get(channel)
@@ -193,7 +193,7 @@ class Tracer:
             bus.deadline = observer.deadline
 
     def advance(self, now: float) -> None:
-        """Let time pass without a frame: give up what is overdue."""
+        """Advance the time without a frame: give up what is overdue."""
         for bus in self.buses.values():
             if now >= bus.deadline:
                 self._expire(bus, now)
@@ -208,7 +208,7 @@ class Tracer:
             bus.close_second()
 
     def observed(self) -> dict[str, Observed]:
-        """Return what was counted of each drive."""
+        """Return the counts of each drive."""
         return {observer.name: observer.observed for bus in self.buses.values()
                 for observer in bus.observers if observer.name}
 
@@ -226,7 +226,7 @@ class Tracer:
 
     def _go_on(self, bus: BusTrace, time: float) -> float:
         """
-        Let time go on from the last entry, although the clock of the trace was set back.
+        Continue the time from the last entry, although the clock of the trace was set back.
 
         No answer comes before its question, and nothing would be missed until the old time.
         """
@@ -276,7 +276,7 @@ class Tracer:
 
     def _tell(self, bus: BusTrace, time: float, title: str, remark: str,
               verdict: Verdict = Verdict.SUSPICIOUS) -> None:
-        """Handle what is of no drive."""
+        """Handle a telegram of no drive."""
         self._sink(bus.name, Telegram(time, '', Direction.NEITHER, TelegramKind.OTHER, title,
                                       verdict=verdict, remark=remark))
 
@@ -293,7 +293,7 @@ _BUS_COLUMNS = ('bus', 'seconds', 'frames', 'load % (mean, busiest second)', 'er
 
 
 def summary_lines(tracer: Tracer, wanted: Callable[[str], bool]) -> Iterator[str]:
-    """Yield the summary as text: a table of the drives that are wanted, a table of buses."""
+    """Yield the summary as text: a table of the selected drives, a table of buses."""
     drives = [(name, *_drive_cells(observed)) for name, observed in tracer.observed().items()
               if wanted(name)]
     buses = [(bus.name, *_bus_cells(bus)) for bus in tracer.buses.values()]

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Vector's text format, ``.asc``: what python-can's reader needs, and what it passes over.
+Vector's text format, ``.asc``: what python-can's reader needs, and what it ignores.
 
 .. code-block:: text
 
@@ -17,11 +17,11 @@ import re
 
 from drive_can_bridge.core.frame import Record, state_record
 
-#: of a header: each time is told from the line before; and a line with its time
+#: of a header: each time is counted from the line before; and a line with its time
 _FROM_THE_LAST = re.compile(r'\s*base\s+(?:hex|dec)\s+timestamps\s+relative', re.IGNORECASE)
 _DECIMAL = re.compile(r'\s*base\s+dec', re.IGNORECASE)
 _TIMED = re.compile(r'\s*([0-9]+\.[0-9]+)(?=\s)')
-#: what python-can's reader takes for a frame, and what is one without its direction
+#: what python-can's reader reads as a frame, and what is one without its direction
 _FRAME = re.compile(r'\s*\d+\.\d+\s+(?:\d+\s+(?:\w+\s+(?:Tx|Rx)\b|ErrorFrame)|CANFD\s)',
                     re.ASCII | re.IGNORECASE)
 #: a state of a controller
@@ -40,11 +40,11 @@ _REMOTE_FLAG, _EDL = 0x10, 0x1000
 
 def of_vector(stream: Iterable[str], aside: deque[Record], passed: Counter[str]) -> Iterator[str]:
     """
-    Give python-can's reader what it needs: times from the beginning, an end of the header.
+    Yield lines as python-can's reader needs them: times from the beginning, an end of the header.
 
-    It takes all ``CANFD`` lines for CAN FD, and requests to send (``TxRq``) for frames.
+    It reads all ``CANFD`` lines as CAN FD, and requests to send (``TxRq``) as frames.
 
-    :param aside: takes the entries that it does not know.
+    :param aside: gets the entries that it does not know.
     :param passed: counts lines of other kinds.
     """
     lines = iter(stream)
@@ -73,7 +73,7 @@ def of_vector(stream: Iterable[str], aside: deque[Record], passed: Counter[str])
 
 
 def _is_state(line: str, aside: deque[Record]) -> bool:
-    """Return whether a line tells the state of a controller, which is put aside."""
+    """Return whether a line is a state of a controller, which is put aside."""
     status = _STATUS.match(line)
     if status is None:
         return False
