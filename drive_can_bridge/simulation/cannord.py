@@ -2,7 +2,7 @@
 """
 A simulated NORD inverter that speaks CANnord.
 
-It does what the manuals say and nothing more: it answers process data sent to itself, and
+It does what the manuals define and nothing more: it answers process data sent to itself, and
 parameter tasks; never a broadcast, and never anything that the manuals do not define. The answer
 to process data shows the inverter as it was before them, as the manuals warn. When a fault occurs
 it sends its process data unasked.
@@ -41,7 +41,7 @@ _NEGATIVE = 0xFFFF
 WARNING, SETPOINT_REACHED, BUS_CONTROL, ROTATING_RIGHT, ROTATING_LEFT = (
     1 << STATUS_BITS[name] for name in (
         'warning', 'setpoint_reached', 'bus_control', 'rotating_right', 'rotating_left'))
-#: what an SK 5xxE says of itself, by parameter number: version of the data base
+#: the identity of an SK 5xxE, by parameter number: version of the data base
 IDENTITY = {742: 1}
 
 #: status bits of a state: those of OFF2 and OFF3 come from the control word in two states
@@ -92,12 +92,12 @@ class ParameterArray:
 
     @property
     def array(self) -> bool:
-        """Array tasks are possible."""
+        """Whether array tasks are possible."""
         return not self.plain or len(self.members) > 1
 
     @property
     def sets(self) -> bool:
-        """Each parameter set has a value of its own."""
+        """Whether each parameter set has a value of its own."""
         return self.plain and len(self.members) > 1
 
 
@@ -171,7 +171,7 @@ class CannordTable:
         return response, self._registers.raw(parameter.name)
 
     def select_set(self, parameter_set: int) -> None:
-        """Make a parameter set, 1 to 4, the active one."""
+        """Select the active parameter set, 1 to 4."""
         if parameter_set == self._active:
             return
         self._active = parameter_set
@@ -196,7 +196,7 @@ class CannordTable:
         high, low = value >> 16, value & 0xFFFF
         if not double and high not in (0, _NEGATIVE):
             raise AccessRefused(LIMIT_EXCEEDED)
-        # a negative word says so in the upper half, or comes without anything there
+        # the upper half shows a negative word, or is empty
         raw = low - 0x10000 if high and not double else parameter.raw_from_word(value)
         refusal = self._registers.refusal({parameter.name: raw})
         if refusal is not None:
@@ -213,20 +213,20 @@ class InverterPlant(MotorPlant):
     3 = 0 leads to, page 38 counts. A word with bit 10 = 0 is ignored as a whole.
 
     In process data 4000h is 100 % of the maximum frequency, whatever the profile calls it: so
-    every frequency or speed among the actual values tells the same share of 100 % as the motor
+    every frequency or speed among the actual values shows the same share of 100 % as the motor
     has, in hertz as in percent.
     """
 
     def __init__(self, registers: Registers, configuration: DriveConfiguration,
                  mechanics: Mechanics) -> None:
-        # the motor knows set 1 and what stands in for it
+        # the motor knows set 1 and its stand-ins
         plain = {name: each for name, each in registers.parameters.items() if not each.subindex}
         super().__init__(registers, configuration, mechanics, operation=OperatingState(_MACHINE),
                          movable=plain)
         self._first = {each.number: each for each in plain.values() if each.number is not None}
 
     def command(self, value: float) -> float:
-        """Return what the last control word makes of the frequency setpoint."""
+        """Return the frequency setpoint under the last control word."""
         operation, word = self.operation, self.operation.word
         if operation.state is MachineState.SHUTDOWN:
             return 0.0
@@ -256,7 +256,7 @@ class InverterPlant(MotorPlant):
         return word | (ROTATING_LEFT if motor.shaft.speed < 0.0 else ROTATING_RIGHT)
 
     def initial(self, parameter: Parameter) -> int:
-        """Return what a new inverter has in a register: the same in all parameter sets."""
+        """Return the initial content of a register: the same in all parameter sets."""
         first = self._first.get(parameter.number or 0, parameter)
         return IDENTITY.get(parameter.number or 0) or super().initial(first)
 
@@ -334,7 +334,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         if self._timed_out:
             self._timed_out = False
             self.plant.operation.end_cause()
-        # before the values are taken: it tells how the inverter was when they came
+        # before the values are taken: it shows the inverter as it was when they came
         answer = self._status(len(data))
         requested = self.configuration.cyclic_request
         if len(data) == EXTRA_LENGTH:
@@ -359,7 +359,7 @@ class SimulatedCannordInverter(SimulatedDrive):
                     parameter.name, parameter.raw_from_word(word)))
 
     def _status(self, length: int) -> Frame:
-        """Return the process data as they are now; the length is that of the request."""
+        """Return the process data as they are now, as long as the request."""
         words = [self.registers.raw(p.name) & 0xFFFF for p in self.configuration.cyclic_response]
         if length == EXTRA_LENGTH:
             data = process_data.encode_extra(words[MAIN_VALUES:])
@@ -403,7 +403,7 @@ class SimulatedCannordInverter(SimulatedDrive):
         self._look_at_clock(now)
 
     def _look_at_clock(self, now: float) -> None:
-        """Trip when no telegram came for too long. The first one starts the watch."""
+        """Trip after the time-out for telegrams. The first one starts the watch."""
         if now >= self._silent_since + self._timeout:
             self._silent_since = math.inf
             self.trip(now, math.inf, TIMEOUT_FAULT)
@@ -411,7 +411,7 @@ class SimulatedCannordInverter(SimulatedDrive):
 
     @property
     def _timeout(self) -> float:
-        """Seconds between telegrams that are allowed."""
+        """The time-out for telegrams, in s; infinity: none."""
         parameter = self.table.numbered(TELEGRAM_TIMEOUT)
         value = 0.0 if parameter is None else float(self.registers.value(parameter.name))
         return value if value > 0.0 else math.inf
@@ -419,14 +419,14 @@ class SimulatedCannordInverter(SimulatedDrive):
     # -- faults -----------------------------------------------------------------------------------
 
     def trip(self, now: float, duration: float, code: float | None = None) -> None:
-        """Fail by itself, and tell at once, unasked."""
+        """Trip by itself, and report it at once, unasked."""
         # a telegram ends the cause of this fault alone
         self._timed_out = code == TIMEOUT_FAULT
         super().trip(now, duration, code)
         self.answer(self._status(self._length), now)
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
-        """Return the answer of an absent address, its twin of the other form, an answer."""
+        """Return the answer of an absent address, its other frame format, an answer."""
         station, shift = self.configuration.station, identifiers.EXTENDED_SHIFT
         last, junk = identifiers.ADDRESS_MAX + 1, bytes([0x5A]) * len(answer.data)
         others = ((station + step) % last for step in range(1, last))
@@ -436,5 +436,5 @@ class SimulatedCannordInverter(SimulatedDrive):
                                           extended=answer.extended), junk, answer.extended)
              for other in others),
             (Frame(twin, junk, not answer.extended),),
-            # nobody asked for P2047 = 5A5Ah
+            # P2047 = 5A5Ah was never requested
             (self._parameter_response(ResponseId.WORD, 0x7FF, 0, 0x5A5A),))

@@ -2,9 +2,9 @@
 """
 A simulated motor controller with the PKW mailbox (Schneider TeSys T LTMR, CANopen).
 
-It takes PDOs in operational only. A request begins when the function byte changes, and at nothing
-else. What the manual page leaves open is done as docs/protocol_canopen_pkw.md says, which the
-configuration of the drive can change: one file describes both ends.
+It accepts PDOs in operational only. A request begins when the function byte changes, and at
+nothing else. What the manual page leaves open is done as in docs/protocol_canopen_pkw.md, which
+the configuration of the drive can change: one file describes both ends.
 """
 
 from collections import Counter
@@ -39,7 +39,7 @@ from drive_can_bridge.simulation.registers import (
 RUN_FORWARD, RUN_REVERSE, RESET = 1 << 0, 1 << 1, 1 << 3
 RUN = RUN_FORWARD | RUN_REVERSE
 
-#: A; the largest full load current of the controller, and what the motor takes
+#: A; the largest full load current of the controller, and that of the motor
 CONTROLLER_CURRENT = 27.0
 LOAD_CURRENT = 6.3
 INRUSH_CURRENT = 45.0
@@ -82,13 +82,13 @@ SETTINGS = {*range(540, 700)} - {GENERAL_CONFIGURATION}
 #: what settings are in a new controller, by register: in configuration mode, as from the factory
 DEFAULTS = {GENERAL_CONFIGURATION: CONFIGURATION_MODE, TRIP_CLASS: 5, FULL_LOAD_RATIO: 33, 653: 33,
             682: 0, 695: 0, CONTROL_REGISTER_1: 0, 705: 0}
-#: what it says of itself: port and controller firmware, serial number, ranges in 0.1 A; its
+#: its identity: port and controller firmware, serial number, ranges in 0.1 A; its
 #: commercial reference, two characters a register
 IDENTITY = {62: 10205, 76: 25003, 70: 2612, 71: 301, 72: 1, 74: int.from_bytes(b'SH', 'big'),
             81: 270, 96: 270, **dict(enumerate(struct.unpack('>6H', b'LTMR27CFM   '), 64))}
 #: rank in the serial number: the node-ID, so that two controllers differ
 SERIAL_RANK = 73
-#: settings that take only multiples of something, by register
+#: settings that accept only multiples of something, by register
 STEPS = {TRIP_CLASS: 5}
 
 Figure = Callable[[], float]
@@ -115,7 +115,7 @@ class Starter:
 
     @property
     def current(self) -> float:
-        """Mean current of the phases, in A."""
+        """The mean current of the phases, in A."""
         if self.on_for == math.inf:
             return 0.0
         return INRUSH_CURRENT if self.on_for < INRUSH_TIME else LOAD_CURRENT
@@ -126,22 +126,22 @@ class Starter:
 
     @property
     def alarm(self) -> bool:
-        """The motor is close to a trip."""
+        """Whether the motor is close to a trip."""
         return self.thermal >= ALARM_LEVEL
 
     @property
     def time_to_reset(self) -> float:
-        """Time in s until a motor that is off has cooled down enough."""
+        """The time in s until a motor that is off has cooled down enough."""
         return self.time_constant * math.log(max(self.thermal / RESET_LEVEL, 1.0))
 
     def settings(self, full_load_percent: float, trip_class: float) -> None:
-        """Take over the full load current, in % of the largest one, and the trip class."""
+        """Set the full load current, in % of the largest one, and the trip class."""
         self.full_load_current = max(full_load_percent, 1.0) / 100.0 * CONTROLLER_CURRENT
         self.time_constant = CLASS_FACTOR * max(trip_class, 1.0)
 
     def advance(self, duration: float, *, on: bool) -> bool:
         """
-        Let time pass.
+        Advance by some seconds.
 
         :param on: the contactor is closed.
         :return: the thermal capacity is used up, which has opened it.
@@ -157,7 +157,7 @@ class Starter:
 
     @property
     def _final_level(self) -> float:
-        """Thermal level that the present current leads to."""
+        """The thermal level that the present current leads to."""
         return TRIP_LEVEL * (self.ratio / SERVICE_FACTOR) ** 2
 
 
@@ -172,7 +172,7 @@ class RegisterTable:
     """
     Everything that can be addressed.
 
-    A value of 32 bits takes two registers, the order of its words is that of the configuration. A
+    A value of 32 bits has two registers, the order of its words is that of the configuration. A
     refused access changes nothing and carries an SDO abort code.
     """
 
@@ -181,7 +181,7 @@ class RegisterTable:
         self._word_order = configuration.options.word_order
         self._cells: dict[Address, Cell] = {}
         parameters = list(registers.parameters.values())
-        # what the profile says goes before what follows from the table of the vendor
+        # the profile overrides the table of the vendor
         for parameter in parameters:
             if parameter.number is not None:
                 self._enter(parameter, Address(parameter.number))
@@ -219,7 +219,7 @@ class RegisterTable:
         """
         Write one register or two adjacent ones, or none of them.
 
-        :raises AccessRefused: there is none, it is read-only, or it does not take the value.
+        :raises AccessRefused: there is none, it is read-only, or the value is refused.
         """
         values: dict[str, int] = {}
         wear: Counter[str] = Counter()
@@ -291,10 +291,10 @@ def is_starter(profile: Profile) -> bool:
 
 class StarterPlant(Plant):
     """
-    A :class:`.Starter` behind registers. Its thermal image outlives a loss of power.
+    A :class:`.Starter` behind registers. Its thermal image survives a loss of power.
 
-    It is there so that the registers look alive, belong together and react to what is commanded.
-    Which register means what is partly recollection; docs/protocol_canopen_pkw.md says how far it
+    It makes the registers look alive, belong together and react to commands.
+    The meaning of some registers is unverified; docs/protocol_canopen_pkw.md has how far it
     can be trusted.
     """
 
@@ -315,7 +315,7 @@ class StarterPlant(Plant):
         return known.get(register_number(parameter) or 0, plausible(parameter))
 
     def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
-        """Take settings with the motor off and in configuration mode only; no word otherwise."""
+        """Refuse settings unless the motor is off and in configuration mode, without an answer."""
         register = register_number(parameter) or 0
         if raw % STEPS.get(register, 1):
             return WriteRefusal.OUT_OF_RANGE
@@ -351,7 +351,7 @@ class StarterPlant(Plant):
         return lambda: clamp(math.floor(content() + 0.5), ends)
 
     def _all_figures(self) -> dict[int | None, Figure]:
-        """Return what gives the contents of registers."""
+        """Return the functions for the contents of registers."""
         starter, code = self.starter, partial(self.operation.fault_code, TEST_TRIP)
         return {
             450: lambda: math.ceil(starter.time_to_reset) if self.operation.faulted else 0,
@@ -410,7 +410,7 @@ class SimulatedPkwDrive(SimulatedDrive):
         return StarterPlant if is_starter(self.configuration.profile) else MotorPlant
 
     def power_lost(self, *, forget: bool) -> None:
-        """Forget the function byte of the last request, and what the mailbox holds."""
+        """Forget the function byte of the last request, and the content of the mailbox."""
         self._request = self._response = pkw.idle_request()
 
     def receive(self, frame: Frame, now: float) -> bool:

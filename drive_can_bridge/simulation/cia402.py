@@ -2,11 +2,11 @@
 """
 A simulated servo drive of CiA 402 on CANopen.
 
-Its objects, state machine and axis are in :mod:`~.cia402_plant`; what it has because it is a
-node, in :mod:`~.canopen`. It begins as it leaves the factory, with the control word in RPDO1 and
-the status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since somebody must
+Its objects, state machine and axis are in :mod:`~.cia402_plant`; what it has as a
+node, in :mod:`~.canopen`. It starts as from the factory, with the control word in RPDO1 and
+the status word in TPDO1; with ``mapping: verify`` or ``assume`` as configured, since a user must
 have set it up. It watches a master's heartbeat (1016h) from the first one on, and where that is
-missing does what 6007h says.
+missing does as 6007h defines.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -70,7 +70,7 @@ class HeartbeatConsumer:
         self.begin()
 
     def begin(self) -> None:
-        """Have what was stored, and have heard nobody."""
+        """Restore the stored list; no heartbeat was received yet."""
         self.watched = list(self.stored)
         self._heard = [math.inf] * CONSUMERS
 
@@ -89,7 +89,7 @@ class HeartbeatConsumer:
         self._heard[subindex - 1] = math.inf
 
     def hear(self, node: int, now: float) -> None:
-        """Take a heartbeat."""
+        """Record a heartbeat."""
         for place, watched in enumerate(self.watched):
             if watched >> 16 & network.NODE_MAX == node and watched & 0xFFFF:
                 self._heard[place] = now
@@ -113,7 +113,7 @@ class SimulatedServoDrive(SimulatedDrive):
     """
     One drive. See the base class.
 
-    :ivar habits: what differs between makers; may be replaced while nobody has set it up.
+    :ivar habits: what differs between makers; may be replaced before it is set up.
     """
 
     plant: ServoPlant
@@ -145,10 +145,10 @@ class SimulatedServoDrive(SimulatedDrive):
 
     def take_away(self, places: Iterable[tuple[int, int | None]]) -> None:
         """
-        Have objects no more: SDO and mappings find none.
+        Remove objects: SDO and mappings find none.
 
-        What follows from their content stays as delivered; without 6007h a lost master is told by
-        an emergency (8130h, register 11h), and the axis moves on, as Lely core 2.4 has it.
+        What follows from their content stays as delivered; without 6007h a lost master is reported
+        by an emergency (8130h, register 11h), and the axis moves on, as Lely core 2.4 has it.
 
         :param places: index and sub-index; None: all of the index.
         """
@@ -167,7 +167,7 @@ class SimulatedServoDrive(SimulatedDrive):
         self.plant.machine.set_safe(allowed)
 
     def _factory(self) -> tuple[dict[int, list[int]], dict[int, list[int]], int]:
-        """Return what is mapped at first."""
+        """Return the factory mapping."""
         configuration, options = self.configuration, self.configuration.options
         request, response = [states.CONTROL_PARAMETER], [states.STATUS_PARAMETER]
         if options.mapping == 'configure':
@@ -193,7 +193,7 @@ class SimulatedServoDrive(SimulatedDrive):
         return ServoPlant
 
     def power_lost(self, *, forget: bool) -> None:
-        """Have what was stored; a master is watched anew from its first heartbeat on."""
+        """Restore the stored set-up; a master is watched again from its first heartbeat on."""
         self.pdos.begin(factory=forget)
         self._consumer.begin()
 
@@ -257,7 +257,7 @@ class SimulatedServoDrive(SimulatedDrive):
                 self.answer(self.pdos.frame(pdo, now), now)
 
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
-        """Return the answer of an absent node, and its 29-bit twin."""
+        """Return the answer of an absent node, and its 29-bit counterpart."""
         base = answer.identifier - self.node.number
         return ((answer._replace(identifier=base + node) for node in range(
             1, network.NODE_MAX + 1) if node != self.node.number),
@@ -275,7 +275,7 @@ class SimulatedServoDrive(SimulatedDrive):
         self._serve(now)
 
     def _serve(self, now: float) -> None:
-        """See to what follows from time and from the state of the node."""
+        """Handle what follows from time and from the state of the node."""
         before, self._node_state = self._node_state, self.node.state
         operational = self._node_state is NmtState.OPERATIONAL
         if operational and before is not NmtState.OPERATIONAL:
@@ -294,7 +294,7 @@ class SimulatedServoDrive(SimulatedDrive):
                 self.answer(self.pdos.frame(pdo, now), now)
 
     def _connection_lost(self) -> bool:
-        """Do what 6007h says, and tell whether there is one."""
+        """Do as 6007h defines; return whether it exists."""
         if (states.ABORT_CONNECTION_OPTION, 0) in self.node.absent:
             return False
         self.plant.machine.connection_lost()
@@ -345,5 +345,5 @@ def _entry(parameter: Parameter) -> int:
 
 
 def _emergency(code: int) -> Emergency:
-    """Make the emergency of an error code: 603Fh has the same."""
+    """Return the emergency of an error code: 603Fh has the same."""
     return Emergency(code, 0x01 | _REGISTER_BITS.get(code >> 12, 0x80))

@@ -5,7 +5,7 @@ The inside of a simulated drive of CiA 402: objects, state machine, modes, and t
 What the profile lists keeps its name, type and limits; the other objects are there under their raw
 names (``x605a.00``). Types are those of EDS files of several makers, see docs/protocol_cia402.md.
 
-The axis is counted in revolutions, and what objects say of it in the units that the profile has
+The axis is counted in revolutions, and objects show it in the units that the profile has
 for them; without one an increment is 1/10,000 of a revolution, and speeds are increments per s.
 """
 
@@ -35,7 +35,7 @@ _TYPES = {'u8': ParameterType.UINT8, 'i8': ParameterType.INT8, 'u16': ParameterT
 INCREMENTS = 10_000.0
 #: revolutions per second, and per second each second at full current
 RATED_SPEED, FASTEST = 50.0, 1000.0
-#: where a new axis stands, in revolutions from its home switch
+#: position of a new axis, in revolutions from its home switch
 BEGINNING = 1.2345
 #: revolutions that homing looks for the switch
 SEARCH = 2.0
@@ -59,7 +59,7 @@ _PER_WAY = {'rev': 1.0, 'rad': 0.5 / math.pi, 'deg': 1 / 360, '°': 1 / 360}
 
 
 class Standard(NamedTuple):
-    """An object of the standard: its type, whether it may be written, and what is in a new one."""
+    """An object of the standard: its type, whether it may be written, and its initial content."""
 
     type: ParameterType
     access: AccessMode
@@ -67,7 +67,7 @@ class Standard(NamedTuple):
 
 
 def _standard(text: str) -> dict[Place, Standard]:
-    """Read a table: index[.sub-index], type, access, and what is in it at first."""
+    """Return the objects in a table: index[.sub-index], type, access, initial content."""
     found = {}
     for line in text.split('\n'):
         for row in filter(None, map(str.strip, line.split(';'))):
@@ -111,14 +111,14 @@ def own_parameters(configuration: DriveConfiguration) -> Mapping[str, Parameter]
 @dataclass(frozen=True)
 class Habits(PdoHabits):
     """
-    What else differs between makers.
+    Further differences between makers.
 
     :param start: s from NMT start to operational.
     :param mode_shown_early: 6061h shows a new mode at once; else in operation enabled only.
     :param leaves_quick_stop: 000Fh leads from quick stop active (605Ah 5 to 8) back to operation.
-    :param stand_bit: bit 10 tells in quick stop active that the axis stands.
+    :param stand_bit: bit 10 shows in quick stop active that the axis stands.
     :param ramp_bits: vl turns only with bits 4 to 6 of the control word.
-    :param home_switch: where the switch is, in revolutions from where the axis was made; None: it
+    :param home_switch: where the switch is, in revolutions from the initial position; None: it
         is not found within two.
     """
 
@@ -132,9 +132,9 @@ class Habits(PdoHabits):
     @classmethod
     def parse(cls, text: str) -> 'Habits':
         """
-        Read ``mapping=operational,start=0.3,types=254+255,stand_bit=0``.
+        Return the habits in ``mapping=operational,start=0.3,types=254+255,stand_bit=0``.
 
-        :raises ValueRefused: says what is allowed.
+        :raises ValueRefused: with what is allowed.
         """
         given: dict[str, Any] = {}
         for part in text.split(','):
@@ -166,7 +166,7 @@ def _switch(text: str) -> bool:
     return {'0': False, '1': True}[text]
 
 
-#: what may be said of a habit in a text, and what reads it
+#: keys of habits in a text, with their parsers
 _HABITS: Mapping[str, tuple[str, Callable[[str], Any]]] = {
     'mapping': ('|'.join(each.value for each in Checks), Checks),
     'start': ('0…60', _seconds),
@@ -237,11 +237,11 @@ class DriveOperation(OperatingState):
 
     @property
     def stays(self) -> bool:
-        """The quick stop ends in quick stop active."""
+        """Whether the quick stop ends in quick stop active."""
         return self._option(states.QUICK_STOP_OPTION) >= 5
 
     def standstill(self) -> None:
-        """See that the axis stands: the end of a ramp."""
+        """Handle standstill: the end of a ramp."""
         if self.leads_to is not None:
             self._enter(self.leads_to)
         elif self.state is MachineState.QUICK_STOP and not self.stays:
@@ -258,7 +258,7 @@ class DriveOperation(OperatingState):
             self._enter(MachineState.SWITCH_ON_DISABLED)
 
     def connection_lost(self) -> None:
-        """Do what 6007h says."""
+        """Do as 6007h defines."""
         option = self._option(states.ABORT_CONNECTION_OPTION)
         if option == 1:
             self.trip(code=LOST_MASTER)
@@ -268,7 +268,7 @@ class DriveOperation(OperatingState):
             self.word_written(states.QUICK_STOP)
 
     def set_safe(self, safe: bool) -> None:
-        """Have the input for safe torque off high or low. Low: power is off at once."""
+        """Set the input for safe torque off high or low. Low: power is off at once."""
         self.safe = safe
         if not safe:
             self._enter(MachineState.FAULT if self.faulted else MachineState.SWITCH_ON_DISABLED)
@@ -293,7 +293,7 @@ class ServoPlant:
         self._places: dict[str, Place] = {name: place for place, name in self._cells.items()}
         self._units = {name: _revolutions(registers.parameters[name])
                        for name in self._places}
-        # nothing survives a loss of power but what was stored
+        # only what was stored survives a loss of power
         self.volatile: Collection[str] = set(registers.parameters)
         fault = configuration.profile.fault
         self.trip_code = (quantities.likely_fault(fault.codes) if fault and fault.codes
@@ -307,7 +307,7 @@ class ServoPlant:
         self._begin()
 
     def _begin(self) -> None:
-        """Have nothing to do."""
+        """Reset the demand: nothing is commanded."""
         self._demand = self.shaft.position
         self._goal, self._goal_in = self._demand, 0.0
         self._target = self._demand
@@ -374,7 +374,7 @@ class ServoPlant:
         return self.raw(0x6071) if pulls else 1000.0 * self.motor.torque
 
     def _inputs(self) -> int:
-        """Return the inputs: home switch (bit 2), safe torque off is not asked for (bit 3)."""
+        """Return the inputs: home switch (bit 2), safe torque off inactive (bit 3)."""
         switch = self.habits.home_switch
         return (switch is not None and self.shaft.position <= switch) << 2 | (
             self.machine.safe << 3)
@@ -402,7 +402,7 @@ class ServoPlant:
     # -- what the control word does ---------------------------------------------------------------
 
     def control(self, word: int) -> None:
-        """Take a control word."""
+        """Handle a control word."""
         operation, before = self.machine, self.machine.word
         was_enabled = operation.state is MachineState.OPERATION_ENABLED
         operation.word_written(word)
@@ -424,7 +424,7 @@ class ServoPlant:
                 self._homing = None
 
     def _begin_mode(self) -> None:
-        """Begin a mode: where the axis is; a cyclic target is followed from here on."""
+        """Start a mode at the present position; a cyclic target is followed from here on."""
         shown = self._shown_mode
         self._begin()
         self._shown_mode = shown
@@ -501,7 +501,7 @@ class ServoPlant:
             self._demand = self._goal = shaft.position
 
     def _run_out(self, duration: float, rate: float) -> None:
-        """Brake, and see what follows from standstill: without torque a load sinks."""
+        """Brake, and handle standstill: without torque a load sinks."""
         needed = abs(self.shaft.speed) / rate
         self._halt(min(needed, duration), rate)
         self._demand = self._goal = self._target = self.shaft.position
@@ -519,7 +519,7 @@ class ServoPlant:
         return min(max(self.value(index), 0.01), FASTEST)
 
     def _follow(self, duration: float) -> None:
-        """Follow the interpolated target; a step that no motor makes trips."""
+        """Follow the interpolated target; a step that no motor can follow trips."""
         while duration > 1e-9:      # less is what sums of times are off
             step = min(duration, self._goal_in or duration)
             if self._goal_in:
@@ -592,7 +592,7 @@ class ServoPlant:
                 | states.BIT_12 * bit_12 | states.BIT_13 * self._homing_failed)
 
     def power_off(self) -> None:
-        """Stand still; the position is kept, as by an absolute encoder."""
+        """Stop the shaft; the position is kept, as by an absolute encoder."""
         self.shaft.speed = self.shaft.slope = 0.0
 
     def power_on(self) -> None:
@@ -601,7 +601,7 @@ class ServoPlant:
 
 
 def _revolutions(parameter: Parameter) -> float:
-    """Return how many revolutions, or revolutions per s, an object's raw step is."""
+    """Return the revolutions, or revolutions per s, of an object's raw step."""
     index, unit = parameter.index or 0, parameter.unit
     if index in _POSITIONS:
         known = _PER_WAY.get(unit)

@@ -2,7 +2,7 @@
 """
 A simulated drive that speaks one of the DataModel protocols.
 
-It does what the manual says and nothing more: it answers cyclic requests by its own maps, and
+It does what the manual defines and nothing more: it answers cyclic requests by its own maps, and
 reads of parameters that exist; it never answers a write, and never anything that the manual does
 not define. Unused bytes of a response hold junk, since the manual calls them undetermined.
 """
@@ -25,7 +25,7 @@ from drive_can_bridge.simulation.registers import Registers
 EEPROM_TIME = 0.018
 #: what unused bytes of a response hold
 JUNK = bytes([0xA5]) * 8
-#: what frames hold that nobody should send
+#: content of frames that no drive should send
 FOREIGN = bytes([0x5A]) * 8
 
 Request = extended.CyclicRequest | extended.WriteTelegram | extended.ReadTelegram
@@ -51,7 +51,7 @@ class DataModelTable:
         self._parameters: dict[int, Parameter] = {
             p.number + self._offset: p for p in registers.parameters.values()
             if p.number is not None}
-        # what is sent again and again is volatile, unless the profile says otherwise
+        # what is sent again and again is volatile, unless the profile has it otherwise
         self._volatile = {p.name for p in configuration.cyclic_request if p.storage is None}
         self._request_map, self._response_map = (
             [self._parameters[base + self._offset + slot].name for slot in range(SLOTS)]
@@ -142,7 +142,7 @@ class DataModelTable:
                 and parameter.name not in self._volatile)
 
     def _store(self, parameter: Parameter, word: int, wears: bool) -> None:
-        """Write within the limits; what is refused keeps its value, nobody is told."""
+        """Write within the limits; what is refused keeps its value, without an answer."""
         raw = self._registers.clamped(parameter.name, parameter.raw_from_word(word))
         if self._registers.refusal({parameter.name: raw}) is None:
             self._registers.write(parameter.name, raw, wear=int(wears))
@@ -172,23 +172,23 @@ class ExtendedWire:
         return request, 'read request with data other than 00h' if odd else ''
 
     def answer(self, request: Frame, words: Sequence[int]) -> Frame:
-        """Make the answer to a request."""
+        """Return the answer to a request."""
         return _with_junk(extended.encode_answer(request.identifier, words), words)
 
     def foreign(self, answer: Frame) -> Sequence[Iterable[Frame]]:
-        """Return answers of absent stations, an 11-bit twin, a write echo."""
+        """Return answers of absent stations, an 11-bit counterpart, a write echo."""
         rest, last = answer.identifier & ~extended.STATION_MASK, extended.STATION_MAX + 1
         others = ((self._station + step) % last for step in range(1, last - 1))
         return (
             (Frame(rest | other << extended.STATION_SHIFT, FOREIGN, True)
              for other in others if other),
             (Frame(answer.identifier & STANDARD_IDENTIFIER_MAX, FOREIGN, False),),
-            # drives do not acknowledge writes: nobody may take this for one
+            # drives do not acknowledge writes: this must not count as one
             (Frame(extended.DIR | self._bits | extended.W | 30 << 4 | 1, FOREIGN, True),))
 
 
 class StandardWire:
-    """Those with 11 bits: reads of one to four parameters, writes of one, nothing cyclic."""
+    """The frames with 11 bits: reads of one to four parameters, writes of one, nothing cyclic."""
 
     def __init__(self, configuration: DriveConfiguration) -> None:
         options = configuration.options
@@ -208,7 +208,7 @@ class StandardWire:
         return _with_junk(standard.encode_read_response(self._own[1], words), words)
 
     def foreign(self, answer: Frame) -> Sequence[Iterable[Frame]]:
-        """Return a 29-bit twin, answers of absent stations, a frame of CANopen."""
+        """Return a 29-bit counterpart, answers of absent stations, a frame of CANopen."""
         others = (answer.identifier ^ bit for bit in (8, 4, 2, 1))
         return (
             (Frame(answer.identifier, FOREIGN, True),),

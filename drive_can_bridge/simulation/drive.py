@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A drive played in software: what all protocol families have in common.
+A simulated drive: what all protocol families have in common.
 
 Sans-IO, in the dialect of the bridge's sessions:
 
@@ -32,27 +32,27 @@ from drive_can_bridge.simulation.registers import Mechanics, PlantFactory, Regis
 
 #: s that a drive is deaf after power came back
 BOOT_TIME = 0.5
-#: s without power, where a fault does not say
+#: s without power, where a fault has no time
 _POWER_CUTS = {FaultKind.RESTART: BOOT_TIME, FaultKind.FORGET: BOOT_TIME,
                FaultKind.POWER_CUT: 5.0, FaultKind.OFF: math.inf}
 
 
 class AddressTable(Protocol):
-    """What can be addressed."""
+    """The addresses of a drive."""
 
     def name_of(self, raw: Parameter) -> str | None:
         """Return the name of the register at an address; None: there is none."""
 
 
 class IgnoredFrame(DriveCanError):
-    """A frame that a drive leaves alone; the argument says which rule it breaks."""
+    """A frame that a drive ignores; the argument is the rule that it breaks."""
 
 
 class Companion:
-    """What stands on the bus beside the telegrams of a family: nothing, or a CANopen node."""
+    """What a drive has beside the telegrams of a family: nothing, or a CANopen node."""
 
     def receive(self, frame: Frame, now: float) -> bool:
-        """Take a frame, as :meth:`SimulatedDrive.receive` does, which gets the others."""
+        """Handle a frame, as :meth:`SimulatedDrive.receive` does, which gets the others."""
         return False
 
     def next_timer(self) -> float:
@@ -62,26 +62,26 @@ class Companion:
         """Do what is due."""
 
     def look(self, now: float) -> None:
-        """See what has become of the drive."""
+        """Update from the state of the drive."""
 
     def power_lost(self, back_at: float) -> None:
-        """Begin anew at some time."""
+        """Power-cycle the companion, with power back at some time."""
 
 
 class SimulatedDrive(ABC):
     """
     One simulated drive.
 
-    :param mechanics: what the motor carries; None: nothing.
-    :param plant: makes what moves; None: what the family chooses.
+    :param mechanics: the load of the motor; None: none.
+    :param plant: makes the plant; None: the family's choice.
     :ivar routes: the identifiers that belong to the drive, in both directions.
     :ivar neighbours: those of the other drives on the bus; scripted faults keep clear of them.
-    :ivar companion: what it composes beside its own telegrams.
+    :ivar companion: its node, if it has one.
     :ivar requests: requests understood.
-    :ivar answers: answers given, before scripted faults took theirs.
+    :ivar answers: answers given, before scripted faults.
     :ivar wear: EEPROM cells written, by parameter.
-    :ivar violations: how often the other side broke a rule of the protocol, by rule.
-    :ivar table: what can be addressed, by the protocol's addresses.
+    :ivar violations: how often the master broke a rule of the protocol, by rule.
+    :ivar table: the registers by the protocol's addresses.
     """
 
     table: AddressTable
@@ -113,7 +113,7 @@ class SimulatedDrive(ABC):
     # -- input and output -------------------------------------------------------------------------
 
     def receive_frame(self, frame: Frame, now: float) -> None:
-        """Take a frame from the bus. Any frame; what is not for this drive is ignored."""
+        """Handle a frame from the bus. Any frame; what is not for this drive is ignored."""
         if now < self._deaf_until:
             return
         self._advance(now)
@@ -133,7 +133,7 @@ class SimulatedDrive(ABC):
         return min(self._outbox.next_timer(), self.companion.next_timer())
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due: answers that were held back, and what the companion does."""
+        """Do what is due: delayed answers, and the companion's timer."""
         self._advance(now)
         self._outbox.handle_timer(now)
         self.companion.handle_timer(now)
@@ -155,7 +155,7 @@ class SimulatedDrive(ABC):
         Return a register as a physical value.
 
         :param name: a name of the profile, or a raw one where the family has some.
-        :param now: let the motor move up to this time first.
+        :param now: advance the motor up to this time first.
         :raises ValueRefused: there is no such register.
         """
         self._advance(now)
@@ -173,12 +173,12 @@ class SimulatedDrive(ABC):
             self.companion.look(now)
 
     def release(self, name: str) -> None:
-        """Let an actual value that was set by hand follow the motor again."""
+        """Release an actual value that was set by hand: it follows the motor again."""
         self.registers.release(self._known(name))
 
     def fault(self, fault: str | Fault, now: float) -> None:
         """
-        Play a fault, ``late=0.15``.
+        Apply a fault, ``late=0.15``.
 
         :raises ValueRefused: there is no such fault, or it does not suit this drive.
         """
@@ -216,7 +216,7 @@ class SimulatedDrive(ABC):
 
     @property
     def eeprom_writes(self) -> int:
-        """EEPROM cells written."""
+        """The number of EEPROM cells written."""
         return sum(self.wear.values())
 
     @property
@@ -230,16 +230,16 @@ class SimulatedDrive(ABC):
             texts.append('off')
         return ', '.join(texts) or 'ok'
 
-    # -- what a family says -----------------------------------------------------------------------
+    # -- hooks of a family ------------------------------------------------------------------------
 
     @abstractmethod
     def set_up(self) -> None:
-        """Make the table, and what else the family keeps: registers and plant are there."""
+        """Create the table, and other state of the family: registers and plant exist."""
 
     @abstractmethod
     def receive(self, frame: Frame, now: float) -> bool:
         """
-        Take a frame while there is power. False: it is none that this drive listens to.
+        Handle a frame while there is power; return False: it is none for this drive.
 
         :raises IgnoredFrame: it is one, but breaks a rule.
         """
@@ -247,7 +247,7 @@ class SimulatedDrive(ABC):
     @abstractmethod
     def foreign_frames(self, answer: Frame) -> Sequence[Iterable[Frame]]:
         """
-        Make frames that look like this answer and are none of anybody.
+        Return frames that look like this answer and belong to no drive.
 
         :return: kinds of them, which take turns; of each the first that is no neighbour's is sent.
         """
@@ -258,21 +258,21 @@ class SimulatedDrive(ABC):
         return [claim.route for claim in claims]
 
     def own_parameters(self) -> Mapping[str, Parameter]:
-        """Return what every drive of the family has, listed or not, by name."""
+        """Return the parameters that every drive of the family has, listed or not, by name."""
         return {}
 
     def choose_plant(self) -> PlantFactory:
-        """Return what makes the plant, where nobody brings another one."""
+        """Return what makes the plant, unless another one is passed."""
         return MotorPlant
 
     def trip(self, now: float, duration: float, code: float | None = None) -> None:
-        """Fail by itself; the cause lasts for some seconds. See :meth:`.Operation.trip`."""
+        """Trip by itself; the cause lasts for some seconds. See :meth:`.Operation.trip`."""
         self.plant.operation.trip(duration, code)
         self.plant.advance(now)
 
     def allow_torque(self, allowed: bool) -> None:
         """
-        Have the input for safe torque off high (allowed) or low.
+        Set the input for safe torque off high (allowed) or low.
 
         :raises ValueRefused: this drive has none.
         """
@@ -280,12 +280,12 @@ class SimulatedDrive(ABC):
             raise ValueRefused(command_sentences.no_sto_input(drive=self.name))
 
     def power_lost(self, *, forget: bool) -> None:  # noqa: B027  optional hook
-        """Forget what a family keeps outside the registers."""
+        """Forget the family's state outside the registers."""
 
     # -- what a family uses -----------------------------------------------------------------------
 
     def answer(self, frame: Frame, now: float) -> None:
-        """Send an answer, as far as scripted faults let it."""
+        """Send an answer, subject to scripted faults."""
         self.answers += 1
         self._outbox.answer(frame, now)
 
@@ -300,7 +300,7 @@ class SimulatedDrive(ABC):
         self._outbox.frames.append(frame)
 
     def lose_power(self, now: float, back_at: float, *, forget: bool = False) -> None:
-        """Lose power until some time; RAM is lost with it."""
+        """Cut the power until some time; RAM is lost with it."""
         self._outbox.clear()
         self.plant.operation.power_off()
         self.plant.power_off()
@@ -309,7 +309,7 @@ class SimulatedDrive(ABC):
         self._advance(now)
 
     def restart(self, back_at: float, *, forget: bool = False) -> None:
-        """Forget how far conversations have come, and be deaf until some time."""
+        """Reset all conversations, and be deaf until some time."""
         self._deaf_until = back_at
         self.companion.power_lost(back_at)
         self.power_lost(forget=forget)
@@ -339,7 +339,7 @@ class SimulatedDrive(ABC):
             route.matches(frame) for route in self.neighbours)][:1]
 
     def _advance(self, now: float | None) -> None:
-        """Let the motor move up to now, if that is known; power may have come back on the way."""
+        """Advance the motor up to now, if that is known; power may have come back on the way."""
         if now is None:
             return
         operation = self.plant.operation
@@ -364,7 +364,7 @@ class SimulatedDrive(ABC):
 
 def _value(parameter: Parameter, text: str) -> Value:
     """
-    Read a value as it stands on a command line.
+    Return the value in a text of the command line.
 
     :raises ValueRefused: it is none of this parameter's kind.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What control words make a simulated drive do, and what its status word tells of it.
+The effect of control words on a simulated drive, and its status word.
 
 One state machine, with the rules of a family or a profile as data. Of a status word, bits are
 found by their names; then the profile's patterns are met.
@@ -67,7 +67,7 @@ class Transition(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Machine:
     """
-    What a family or a profile says.
+    The state machine of a family or a profile, as data.
 
     :param rules: the first that applies counts.
     :param reset: mask and value of a word that ends a fault, where the word before was none.
@@ -87,7 +87,7 @@ class OperatingState:
     """
     The operating state of one simulated drive.
 
-    :ivar now: the time up to which it has come; before the first frame minus infinity.
+    :ivar now: the time of the last advance; before the first frame minus infinity.
     :ivar powered: there is power.
     :ivar state: what the machine is in.
     :ivar word: the last control word.
@@ -103,7 +103,7 @@ class OperatingState:
         self.powered = True
 
     def power_off(self) -> None:
-        """Begin anew, without a fault, once it is powered again."""
+        """Switch off; it starts without a fault once it is powered again."""
         self.powered = False
         state, self.word = self._machine.power_on
         self._cause_ends = -math.inf
@@ -111,7 +111,7 @@ class OperatingState:
 
     def advance(self, now: float) -> float:
         """
-        Let time pass up to now. It never runs backwards.
+        Advance the time up to now. It never runs backwards.
 
         :return: how much passed, in s.
         """
@@ -131,7 +131,7 @@ class OperatingState:
 
     def trip(self, duration: float = 0.0, code: float | None = None) -> None:
         """
-        Fail.
+        Trip.
 
         :param duration: s that the cause lasts, during which no reset helps.
         :param code: of the fault; None: it has none of its own.
@@ -148,15 +148,15 @@ class OperatingState:
 
     @property
     def reset_allowed(self) -> bool:
-        """The cause of a trip is gone."""
+        """Whether the cause of a trip is gone."""
         return self.now >= self._cause_ends
 
     def end_cause(self) -> None:
-        """Let a reset help from now on."""
+        """End the cause of a trip: a reset helps from now on."""
         self._cause_ends = min(self._cause_ends, self.now)
 
     def repair(self) -> None:
-        """Clear a fault, as a reset or somebody at the drive does."""
+        """Clear a fault, as a reset or a person at the drive does."""
         if self.faulted:
             self._enter(
                 MachineState.READY_TO_SWITCH_ON if self.state is MachineState.FAULT_RELEASED
@@ -175,7 +175,7 @@ class OperatingState:
 
 
 def machine_of(table: ControlTable | None) -> Machine:
-    """Return what the control section of a profile says; without one a drive just runs."""
+    """Return the machine for the control section of a profile; without one a drive just runs."""
     if table is None:
         return Machine(power_on=(MachineState.OPERATION_ENABLED, 0),
                        after_fault=MachineState.OPERATION_ENABLED)
@@ -196,7 +196,7 @@ def machine_of(table: ControlTable | None) -> Machine:
 
 
 class MachineStatus(NamedTuple):
-    """What status bits can tell."""
+    """What status bits can show."""
 
     operation: OperatingState
     warning: bool = False

@@ -41,7 +41,7 @@ _count = _number(int, 1, math.inf)
 
 
 class FaultKind(Enum):
-    """What can be wrong with a drive: how it is written, what it does, its argument."""
+    """The faults of a drive: how each is written, its effect, its argument."""
 
     SILENT = 'silent', 'obeys, but answers nothing'
     LATE = 'late=SECONDS', 'answers that much later (0 to 3600)', _seconds
@@ -96,9 +96,9 @@ class Fault:
 
 def parse_fault(text: str) -> Fault:
     """
-    Read a fault.
+    Return the fault in a text.
 
-    :raises ValueRefused: unknown, or its argument is missing or wrong; says what is allowed.
+    :raises ValueRefused: unknown, or its argument is missing or wrong; with what is allowed.
     """
     word, equals, argument = (part.strip() for part in text.partition('='))
     kind = _BY_WORD.get(word)
@@ -121,10 +121,10 @@ def parse_fault(text: str) -> Fault:
 
 class FaultyOutbox:
     """
-    What a drive sends, and the scripted faults of its answers.
+    The frames of a drive, with the scripted faults of its answers.
 
-    :param foreign_frames: makes the frames that accompany an answer under ``foreign``.
-    :ivar frames: those to be sent now; what is put here directly, no fault touches.
+    :param foreign_frames: returns the frames that accompany an answer under ``foreign``.
+    :ivar frames: those to be sent now; faults do not affect what is put here directly.
     """
 
     FAULTS = frozenset((FaultKind.SILENT, FaultKind.LATE, FaultKind.DROP, FaultKind.LENGTH,
@@ -139,12 +139,12 @@ class FaultyOutbox:
         self._order = count()       # keeps answers of one time in their order
 
     def add(self, fault: Fault) -> None:
-        """Put a fault into force; it replaces one of the same kind."""
+        """Apply a fault; it replaces one of the same kind."""
         self.faults[fault.kind] = fault
         self._answers = 0
 
     def answer(self, frame: Frame, now: float) -> None:
-        """Send an answer, as far as the faults let it."""
+        """Send an answer, subject to the faults."""
         faults = self.faults
         if not faults:
             self.frames.append(frame)

@@ -12,8 +12,8 @@ the largest in a second.
 A position goes to its setpoint with finite speed and acceleration. Without torque it rolls to a
 standstill, or sinks under its load.
 
-Not a model of any real machine. It is there so that values look alive, have the right signs, and
-react to what is commanded. Time is an argument; all formulas are closed, so that it does not
+Not a model of any real machine. It makes values look alive, have the right signs, and
+react to commands. Time is an argument; all formulas are closed, so that it does not
 matter how often time passes.
 """
 
@@ -37,7 +37,7 @@ LOAD_TORQUE = 0.30
 FRICTION_TORQUE = 0.05
 INERTIA_TORQUE = 0.35
 TORQUE_MAX = 2.0
-#: share of the rated current that an energised motor takes without any torque
+#: share of the rated current of an energised motor without any torque
 MAGNETISING_CURRENT = 0.2
 
 AMBIENT_TEMPERATURE = 25.0
@@ -71,7 +71,7 @@ class Rates:
 @dataclass
 class Travel:
     """
-    Something that moves: a speed, and the position that comes of it.
+    Something that moves: a speed, and the position that follows from it.
 
     :ivar slope: rate of change of the speed at the end of the last step.
     """
@@ -81,7 +81,7 @@ class Travel:
     slope: float = 0.0
 
     def run(self, duration: float, target: float, rates: Rates) -> None:
-        """Go towards a speed for some time; in no time the slope stays."""
+        """Accelerate towards a speed for some time; in no time the slope stays."""
         if duration <= 0.0:
             return
         way = self.slope = 0.0
@@ -99,7 +99,7 @@ class Travel:
         self.position += way + self.speed * duration
 
     def go(self, duration: float, target: float, speed_max: float, acceleration: float) -> None:
-        """Go towards a position for some time, as fast as possible and without overshoot."""
+        """Move towards a position for some time, as fast as possible and without overshoot."""
         distance = target - self.position
         braking = self.speed * abs(self.speed) / (2.0 * acceleration)
         way = math.copysign(1.0, self.speed if distance == braking else distance - braking)
@@ -133,8 +133,8 @@ class Motor:
     """
     Torque, current and temperature of a motor.
 
-    :param rated_speed: in whatever unit its shaft moves.
-    :param load: share of the rated torque that a weight takes.
+    :param rated_speed: in the unit of its shaft.
+    :param load: share of the rated torque for a weight.
     :ivar torque: share of the rated torque, with sign.
     :ivar current: share of the rated current, a magnitude.
     :ivar temperature: °C.
@@ -149,12 +149,12 @@ class Motor:
 
     @property
     def share(self) -> float:
-        """Speed as a share of the rated one, with sign."""
+        """The speed as a share of the rated one, with sign."""
         return self.shaft.speed / self.rated_speed
 
     def advance(self, duration: float, *, energised: bool,
                 torque_max: float = TORQUE_MAX) -> None:
-        """Record how the shaft has moved for some time, by what torque at most."""
+        """Update torque and temperature from the shaft's movement, within a largest torque."""
         goal = AMBIENT_TEMPERATURE + TEMPERATURE_RISE * self.current ** 2
         self.temperature += (goal - self.temperature) * -math.expm1(
             -duration / TEMPERATURE_TIME_CONSTANT)
@@ -235,7 +235,7 @@ class MotorPlant:
                 self._actuals[actual.name] = partial(getattr, follower, 'speed')
 
     def command(self, value: float) -> float:
-        """Return which speed the value of the speed setpoint stands for."""
+        """Return the speed for a value of the speed setpoint."""
         return value
 
     def initial(self, parameter: Parameter) -> int:
@@ -278,7 +278,7 @@ class MotorPlant:
 
     def _counter(self, parameter: Parameter, continuous: bool | int,
                  where: Callable[[], float]) -> int:
-        """Return what a counter shows that wraps; it begins near its end."""
+        """Return the value of a counter that wraps; it starts near its end."""
         steps = steps_of(parameter, continuous)
         low = -(steps // 2) if parameter.type.signed else 0
         first = low + steps - min(steps // 8, _BEFORE_END)
@@ -286,7 +286,7 @@ class MotorPlant:
         return (first + moved - low) % steps + low
 
     def _measure(self, parameter: Parameter, quantity: Quantity) -> Callable[[], float]:
-        """Return what a quantity of the motor amounts to in the parameter's unit."""
+        """Return a quantity of the motor in the parameter's unit."""
         motor, setpoint = self.motor, self.speed_setpoint
         if quantity is Quantity.SPEED:
             if setpoint is not None and parameter.unit == setpoint.unit:
@@ -320,7 +320,7 @@ class MotorPlant:
 
     @property
     def target(self) -> float:
-        """The speed that is commanded."""
+        """The commanded speed."""
         if self.speed_setpoint is None:
             return 0.0
         fastest = self._bound(Quantity.SPEED)
@@ -381,7 +381,7 @@ class MotorPlant:
                          rates.rising)
 
     def power_off(self) -> None:
-        """Stand still; the position is kept, as by an absolute encoder."""
+        """Stop all shafts; positions are kept, as by an absolute encoder."""
         for travel in (self.motor.shaft, *(each for _, each in self._followers.values())):
             travel.speed = travel.slope = 0.0
 
@@ -397,14 +397,14 @@ class MotorPlant:
                       setpoint_reached=operation.enabled and motor.shaft.speed == self.target)
 
     def _initial_ramp(self, ramp: RampParameter) -> float:
-        """Return what a new drive has in a ramp parameter."""
+        """Return the initial content of a ramp parameter."""
         seconds = QUICK_STOP_TIME if ramp.use is RampUse.QUICK_STOP else RAMP_TIME
         if not ramp.is_time:
             return self.motor.rated_speed / seconds
         return seconds * 1000.0 if ramp.parameter.unit == 'ms' else seconds
 
     def _rate(self, ramp: RampParameter | None, default: float) -> float:
-        """Return what a ramp parameter says, per s."""
+        """Return the rate of a ramp parameter, per s."""
         if ramp is None:
             return default
         rated, value = self.motor.rated_speed, self.registers.commanded(ramp.parameter.name)

@@ -1,10 +1,10 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a parameter means, found by its name, and how large it is in its unit.
+What a parameter measures, found by its name, and how large it is in its unit.
 
-A profile does not say which of its parameters is a speed. The simulated drive guesses from names,
-by the few rules of this module (docs/simulation.md has them as a table). A parameter that no rule
-takes is a plain register: it keeps what is written.
+A profile does not mark which of its parameters is a speed. The simulated drive guesses from names,
+by the few rules of this module (docs/simulation.md has them as a table). A parameter without a
+rule is a plain register: it keeps what is written.
 
 The motor computes shares of its rating. A rating of 100 % of a quantity is the figure of this
 module for its unit, made smaller where the parameter cannot carry it.
@@ -25,7 +25,7 @@ _REVOLUTIONS = {
     'Hz': 1.0, 'rev/s': 1.0, '1/s': 1.0,
     'rad/s': 0.5 / math.pi, 'deg/s': 1.0 / 360.0, 'mm/s': 0.1, 'm/s': 100.0,
 }
-#: revolutions per second at rated speed, for a unit that says nothing about revolutions
+#: revolutions per second at rated speed, for a unit without revolutions
 _RATED_REVOLUTIONS = 25.0
 #: value after one revolution
 _PER_REVOLUTION = {'rev': 1.0, 'rad': 2.0 * math.pi, 'deg': 360.0, '°': 360.0,
@@ -35,7 +35,7 @@ _DEFAULT_RATING = 100.0
 
 
 class Quantity(Enum):
-    """What a parameter measures, and the words that say so."""
+    """The quantities of parameters, with the words in their names."""
 
     # in this order: a "current_position" is a position, a "torque_current" follows the torque
     SPEED = 'speed', 'velocity', 'frequency', 'rpm'
@@ -56,7 +56,7 @@ _RATINGS = {
     Quantity.POWER: {'W': 3000.0, 'kW': 3.0},
 }
 MOVING = (Quantity.SPEED, Quantity.POSITION)
-#: what a parameter that is exchanged cyclically means, if its name does not say it
+#: quantities of parameters that are exchanged cyclically, where the name does not show it
 BY_UNIT = {
     **dict.fromkeys(('rpm', '1/min', 'min-1', 'rev/s', 'rad/s', 'deg/s', 'mm/s', 'm/s'),
                     Quantity.SPEED),
@@ -118,7 +118,7 @@ def measured(parameter: Parameter) -> Quantity | None:
 def mover(found: Sequence[Pair], cyclic: Sequence[Parameter], control: str | None,
           ) -> tuple[Parameter | None, Quantity | None]:
     """
-    Choose the setpoint that moves the shaft.
+    Return the setpoint that moves the shaft.
 
     :param cyclic: the cyclic request, in order. What is a speed or a position there counts first,
         by its name or by its unit.
@@ -136,7 +136,7 @@ def mover(found: Sequence[Pair], cyclic: Sequence[Parameter], control: str | Non
 
 def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) -> list[Pair]:
     """
-    Find setpoints and the actual values that follow them; first those that have one.
+    Return setpoints and the actual values that follow them; first those that have one.
 
     ``speed_setpoint`` (also ``setpoint_speed``, ``target_speed``, ``speed_reference``,
     ``speed_command``, or a writable ``speed``) goes with a read-only ``actual_speed`` (also
@@ -158,7 +158,7 @@ def pairs(parameters: Mapping[str, Parameter], *, without: str | None = None) ->
 
 
 def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
-    """Find ``ramp_time``, ``acceleration_time``, ``ramp_down_time``, ``deceleration`` …."""
+    """Return ``ramp_time``, ``acceleration_time``, ``ramp_down_time``, ``deceleration`` …."""
     found = []
     for parameter in parameters.values():
         words = words_of(parameter)
@@ -178,7 +178,7 @@ def ramp_parameters(parameters: Mapping[str, Parameter]) -> list[RampParameter]:
 
 
 def limits(parameters: Mapping[str, Parameter]) -> list[tuple[Parameter, Quantity]]:
-    """Find ``torque_limit``, ``maximum_speed`` … and what is a limit by its profile."""
+    """Return ``torque_limit``, ``maximum_speed`` … and the limits of the profile."""
     return [
         (parameter, quantity) for parameter in parameters.values()
         if (quantity := quantity_of(parameter)) in (
@@ -187,7 +187,7 @@ def limits(parameters: Mapping[str, Parameter]) -> list[tuple[Parameter, Quantit
 
 
 def likely_fault(codes: Sequence[tuple[int, str]]) -> int:
-    """Return what a drive trips with most of all: an overcurrent, if it knows one."""
+    """Return the most likely fault of a drive: an overcurrent, if it has one."""
     known = [raw for raw, _ in codes if raw]
     return next((raw for raw, name in codes if raw and 'overcurrent' in name.lower()),
                 known[0] if known else 0)
@@ -213,7 +213,7 @@ def rated_speed(setpoint: Parameter) -> float:
 
 
 def travel_speed(setpoint: Parameter) -> float:
-    """Return how fast a position moves, per s: over all its range, or 25 revolutions."""
+    """Return the speed of a position, per s: all its range, or 25 revolutions."""
     return min(highest(setpoint), _RATED_REVOLUTIONS * per_revolution(setpoint))
 
 
@@ -223,7 +223,7 @@ def revolutions_per_unit(speed: Parameter, rated: float) -> float:
 
 
 def speed_value(parameter: Parameter, revolutions: float, share: float) -> float:
-    """Express a speed, given in revolutions per second and as share of the rated one."""
+    """Return a speed, from revolutions per second and the share of the rated one, in a unit."""
     factor = _REVOLUTIONS.get(parameter.unit)
     if factor is not None:
         return revolutions / factor
@@ -231,7 +231,7 @@ def speed_value(parameter: Parameter, revolutions: float, share: float) -> float
 
 
 def position_value(parameter: Parameter, revolutions: float) -> float:
-    """Express a position; it wraps where the parameter ends, as counters do."""
+    """Return a position in a unit; it wraps where the parameter ends, as counters do."""
     value = revolutions * per_revolution(parameter)
     low, high = parameter.value_range
     if parameter.minimum is not None and parameter.maximum is not None:
@@ -248,7 +248,7 @@ def per_revolution(parameter: Parameter) -> float:
 
 def mains_swing(now: float) -> float:
     """
-    Return by which share of a voltage the mains are off.
+    Return the deviation of the mains, as a share of the voltage.
 
     Of a drive at rest it is the one value that moves: it shows that the drive is alive.
     """
@@ -261,7 +261,7 @@ def full(unit: str, quantity: Quantity) -> float:
 
 
 def measures(unit: str, quantity: Quantity) -> bool:
-    """Return whether a unit says how much of a quantity there is."""
+    """Return whether a unit is one of a quantity."""
     return unit == '%' or unit in _RATINGS[quantity]
 
 
@@ -274,7 +274,7 @@ def rating(parameter: Parameter, quantity: Quantity) -> float:
 
 
 def plausible(parameter: Parameter) -> int:
-    """Return the raw integer of a value that a new drive might have; the same one each time."""
+    """Return a plausible raw integer of a new drive; the same one each time."""
     limits, words = parameter.raw_limits, words_of(parameter)
     low, high = parameter.minimum, parameter.maximum
     if parameter.neutral is not None:

@@ -23,7 +23,7 @@ from drive_can_bridge.simulation.quantities import clamp, nearest_raw
 
 
 class WriteRefusal(Enum):
-    """Why a write is refused, where a protocol can say so; one kind is acknowledged instead."""
+    """Why a write is refused, where a protocol can report it; one kind is acknowledged instead."""
 
     READ_ONLY = 'read-only'
     OUT_OF_RANGE = 'out of range'
@@ -33,9 +33,9 @@ class WriteRefusal(Enum):
 
 class Plant(Protocol):
     """
-    A motor, or whatever a drive moves. Time is an argument and never runs backwards.
+    A motor, or another load of a drive. Time is an argument and never runs backwards.
 
-    A family chooses a plant when a drive is made; its maker may bring another one:
+    A family chooses a plant when a drive is made; a caller may pass another one:
     ``Simulation(configuration, plants={'lift': MyPlant})``, for instance derived from
     :class:`~.motor.MotorPlant`.
 
@@ -47,31 +47,31 @@ class Plant(Protocol):
     volatile: Collection[str] = ()
 
     def initial(self, parameter: Parameter) -> int:
-        """Return what a new drive has in a register, where its limits allow it."""
+        """Return the initial content of a register, where its limits allow it."""
 
     def source(self, parameter: Parameter) -> Callable[[], int] | None:
-        """Return what computes a read-only register; None: it is plain memory."""
+        """Return the function that computes a read-only register; None: it is plain memory."""
 
     def refusal(self, parameter: Parameter, raw: int) -> WriteRefusal | None:
-        """Say why a register does not take a value within its limits now; None: it does."""
+        """Return why a register refuses a value within its limits now; None: it does not."""
 
     def written(self, name: str, before: int, raw: int) -> None:
-        """React to a register that was written."""
+        """Handle a write to a register."""
 
     def advance(self, now: float) -> None:
-        """Move up to now, and let the clock of the operating state go with it."""
+        """Advance up to now, together with the operating state."""
 
     def power_off(self) -> None:
-        """Note that power is lost."""
+        """Record that power is lost."""
 
     def power_on(self) -> None:
-        """Begin anew; the registers have what EEPROM kept."""
+        """Start again; the registers have the contents of EEPROM."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mechanics:
     """
-    What a motor of a simulated drive has to carry, and how exactly its position is measured.
+    The load of a simulated drive's motor, and how exactly its position is measured.
 
     :param load: share of the rated torque with which a weight pulls it backwards. Without torque,
         and without a brake, it sinks, at full load with a tenth of its rated speed.
@@ -86,9 +86,9 @@ class Mechanics:
     @classmethod
     def parse(cls, text: str) -> 'Mechanics':
         """
-        Read ``load=0.3,noise=1,brake=1``; what is left out is 0.
+        Return the mechanics in ``load=0.3,noise=1,brake=1``; what is left out is 0.
 
-        :raises ValueRefused: says what is allowed.
+        :raises ValueRefused: with what is allowed.
         """
         highest = {'load': 1.0, 'noise': 100, 'brake': 1}
         given: dict[str, float] = {}
@@ -124,12 +124,12 @@ class Registers:
     All registers of one drive.
 
     :param volatile: names of parameters that a power cycle resets although the profile does not
-        say where they are stored (those exchanged cyclically live in RAM).
+        have where they are stored (those exchanged cyclically live in RAM).
     :ivar faults: the scripted faults in force, by kind, name and, where there is one, the name of
         another register that has to be written first.
     :ivar settings_written: writes that had an effect, of what is not exchanged cyclically.
     :ivar wear: EEPROM writes by name.
-    :ivar stand_ins: name of the register that counts for the motor instead of another one.
+    :ivar stand_ins: name of the register that the motor uses instead of another one.
     """
 
     def __init__(self, parameters: Mapping[str, Parameter], volatile: Collection[str]) -> None:
@@ -147,7 +147,7 @@ class Registers:
         self._sources: dict[str, Callable[[], int]] = {}
 
     def connect(self, plant: Plant) -> None:
-        """Fill the registers with what a new drive has, and let a plant compute the others."""
+        """Fill the registers with initial contents; the plant computes the others."""
         self._plant = plant
         for name, parameter in self.parameters.items():
             self._initial[name] = self.clamped(name, plant.initial(parameter))
@@ -165,7 +165,7 @@ class Registers:
         return source() if held is None else held
 
     def plain(self, name: str) -> int:
-        """Return what stands in a register that is computed from it."""
+        """Return the stored content of a register that is computed from it."""
         return self._raw[name]
 
     def clamped(self, name: str, raw: int) -> int:
@@ -173,7 +173,7 @@ class Registers:
         return clamp(raw, self.parameters[name].raw_limits)
 
     def refusal(self, raws: Mapping[str, int]) -> WriteRefusal | None:
-        """Say why registers that are written together refuse it; None: they do not."""
+        """Return why registers that are written together refuse it; None: they do not."""
         for name, raw in raws.items():
             parameter = self.parameters[name]
             if not parameter.writable:
@@ -193,8 +193,8 @@ class Registers:
         """
         Write a register as an accepted request does. Some are acknowledged and change nothing.
 
-        :param keep: survives a loss of power; None: as the profile says.
-        :param wear: EEPROM cells that it takes.
+        :param keep: survives a loss of power; None: as in the profile.
+        :param wear: EEPROM cells that it writes.
         """
         parameter = self.parameters[name]
         blocked = self.faults and any(
@@ -240,17 +240,17 @@ class Registers:
         self._held.pop(name, None)
 
     def commanded(self, name: str) -> float:
-        """Return what counts for the motor: the value of a register or of its stand-in."""
+        """Return the value for the motor: that of a register or of its stand-in."""
         name = self.stand_ins.get(name, name)
         return float(self.parameters[name].value_from_raw(self._raw[name]))
 
     def put(self, name: str, value: float) -> None:
-        """Change a register from inside: nobody is told."""
+        """Change a register from inside, without notice."""
         parameter = self.parameters[name]
         self._raw[name] = nearest_raw(parameter, value, parameter.raw_limits)
 
     def store_all(self) -> None:
-        """Keep all that may be written without power, as it is now."""
+        """Store all writable registers in EEPROM, as they are now."""
         for name, parameter in self.parameters.items():
             if parameter.writable:
                 self._kept[name] = self._raw[name]

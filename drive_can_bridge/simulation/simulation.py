@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Every drive of a bridge configuration, played on its buses.
+Every drive of a bridge configuration, simulated on its buses.
 
 .. code-block:: python
 
@@ -47,9 +47,9 @@ _OPEN_TIMEOUT = 10.0
 _ROUTES_MAX = 4096
 
 OpenBus = Callable[[BusConfiguration], EndPoint]
-#: takes one readable line
+#: prints one readable line
 Say = Callable[[str], None]
-#: takes bus name, frame, and True for a frame that a simulated drive sends
+#: called with bus name, frame, and True for a frame that a simulated drive sends
 ShowFrame = Callable[[str, Frame, bool], None]
 
 
@@ -57,9 +57,9 @@ class BusPlayer:
     """
     The drives of one bus, and the link's listener.
 
-    :param complain: takes lines about the bus.
-    :param say: takes the drives' lines.
-    :ivar failure: why a thread ended although nobody stopped it, or ''.
+    :param complain: prints lines about the bus.
+    :param say: prints the drives' lines.
+    :ivar failure: why a thread ended by itself, or ''.
     :ivar frames_rejected: what arrived and was no frame.
     """
 
@@ -84,13 +84,13 @@ class BusPlayer:
         self._complained = False
         self._answer_lost = False       # ever
         self._addressees = lru_cache(_ROUTES_MAX)(self._find_addressees)
-        # no filters: who looks on sees all frames
+        # no filters: the log shows all frames
         self._link = Link(bus, (), self, clock, send_timeout=_SEND_TIMEOUT, opener=self._open)
         self._thread = clock.worker(self._run, f'simulation {bus.name}')
 
     def start(self) -> None:
         """
-        Open the bus and begin to play. A bus that is not there yet is waited for.
+        Open the bus and start the drives. A bus that is not there yet is waited for.
 
         :raises BusMisconfigured: no attempt will ever succeed.
         :raises BusUnavailable: another process has the device.
@@ -111,7 +111,7 @@ class BusPlayer:
 
     @contextmanager
     def touch(self) -> Iterator[float]:
-        """Hold the drives, and give the time; what comes of it is sent at once afterwards."""
+        """Hold the drives, and yield the time; resulting frames are sent at once afterwards."""
         with self._lock:
             yield self._now()
         self._wake.ring()
@@ -134,14 +134,14 @@ class BusPlayer:
             self.link_failed(f'{type(error).__name__}: {error}')
 
     def _pump(self, drives: Sequence[SimulatedDrive]) -> list[str]:
-        """Send what drives want sent; return their notices."""
+        """Send the drives' frames; return their notices."""
         notices: list[str] = []
         for drive in drives:
             for frame in drive.take_frames():
                 if self._link.send(frame):
                     self._show_frame(self.bus.name, frame, True)
                     continue
-                # nobody acknowledges, or the queue is full: it is lost, as on a real bus
+                # not acknowledged, or the queue is full: it is lost, as on a real bus
                 if not self._answer_lost and self._link.is_open:
                     self._complain(f'bus {self.bus.name}: {self._link.last_error}')
                 self._answer_lost = True
@@ -163,7 +163,7 @@ class BusPlayer:
             raise BusUnavailable(str(error)) from error
 
     def frame_received(self, frame: Frame, age: float) -> None:
-        """Let the drives that a frame is for answer it."""
+        """Pass a frame to its drives, and send their answers."""
         self._show_frame(self.bus.name, frame, False)
         with self._lock:
             drives = self._addressees(frame.identifier, frame.extended)
@@ -194,7 +194,7 @@ class BusPlayer:
         self._complained = True
 
     def bus_misconfigured(self, reason: str) -> None:
-        """Leave it to :meth:`start`, which tells."""
+        """Keep the reason for :meth:`start`, which raises it."""
         self._misconfigured = reason
 
     def link_failed(self, reason: str) -> None:
@@ -216,11 +216,11 @@ def make_drives(configuration: BridgeConfiguration, *,
                 mechanics: Mapping[str, Mechanics] | None = None,
                 plants: Mapping[str, PlantFactory] | None = None) -> dict[str, SimulatedDrive]:
     """
-    Make every drive of a configuration.
+    Return every drive of a configuration.
 
-    :param mechanics: what motors carry, by the name of the drive.
-    :param plants: what moves instead of what the family chooses, by the name of the drive.
-    :raises ConfigurationError: a plant that a drive cannot do with.
+    :param mechanics: the loads of motors, by the name of the drive.
+    :param plants: plants in place of the family's choice, by the name of the drive.
+    :raises ConfigurationError: a plant that does not fit a drive.
     """
     drives = {
         name: SIMULATED_DRIVES[drive.protocol](
@@ -235,7 +235,7 @@ def make_drives(configuration: BridgeConfiguration, *,
 
 
 def _read(name: str) -> Any:
-    """Return a property: something of the drive, copied while nobody else touches it."""
+    """Return a property: an attribute of the drive, copied under its lock."""
     def read(self: 'PlayedDrive') -> Any:
         with self._touch():
             return copy(getattr(self.drive, name))
@@ -246,7 +246,7 @@ class PlayedDrive:
     """
     A simulated drive on a running bus, for use from any thread.
 
-    What it does and tells is what :class:`.SimulatedDrive` does and tells, now.
+    Its methods are those of :class:`.SimulatedDrive`, at the present time.
     """
 
     requests: int = _read('requests')
@@ -282,15 +282,15 @@ class Simulation:
     """
     All drives of a configuration, and a thread per bus.
 
-    :param clock: what everything waits by; None: that of this machine.
+    :param clock: the clock of all waiting; None: that of this machine.
     :param open_bus: opens the end point of a bus; None: python-can, by the configuration.
-    :param say: takes lines about the drives (faults, violations); None: they are dropped.
-    :param complain: takes lines about the buses; None: standard error.
+    :param say: prints lines about the drives (faults, violations); None: they are dropped.
+    :param complain: prints lines about the buses; None: standard error.
     :param show_frame: called for each frame.
-    :param mechanics: what the motors of drives carry, by name.
-    :param plants: what drives move instead of what they would choose, by name.
+    :param mechanics: the loads of motors, by name.
+    :param plants: plants in place of the drives' choice, by name.
     :ivar drives: the drives by name.
-    :raises ConfigurationError: a plant that a drive cannot do with.
+    :raises ConfigurationError: a plant that does not fit a drive.
     """
 
     def __init__(self, configuration: BridgeConfiguration, clock: Clock | None = None, *,
@@ -316,7 +316,7 @@ class Simulation:
 
     def start(self) -> None:
         """
-        Open the buses and play.
+        Open the buses, and start the drives.
 
         :raises BusMisconfigured: no attempt to open a bus will ever succeed.
         """

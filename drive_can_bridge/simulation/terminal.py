@@ -3,7 +3,7 @@
 A pseudo-terminal that behaves like the serial port of an SLCAN adapter.
 
 A bridge in another process opens it with ``interface: slcan``. There is no kernel CAN in it, and
-no root. It never blocks: while nobody reads, the oldest frames are dropped. The slave side is kept
+no root. It never blocks: without a reader, the oldest frames are dropped. The slave side is kept
 open here too, so that bridges may come and go.
 """
 
@@ -26,7 +26,7 @@ from drive_can_bridge.transport.end_point import EndPoint
 
 DONE = b'\r'
 REFUSED = b'\a'
-#: commands of which nobody here needs to know more: version, serial number, and filters, polling
+#: commands that need no answer of their own here: version, serial number, and filters, polling
 #: and serial speed by their first letters
 ANSWERS = {'V': b'V1013\r', 'N': b'NSIM1\r', 'F': b'F00\r', 'Z0': DONE,
            **dict.fromkeys('MmWXU', DONE)}
@@ -90,11 +90,11 @@ class SlcanAdapter:
 
     @property
     def connected(self) -> bool:
-        """Frames pass: the channel is open, with the bit rate of the bus as far as we know."""
+        """Whether frames pass: the channel is open, with the bus's bit rate if known."""
         return self.is_open and self._set == self._bitrate
 
     def receive_bytes(self, data: bytes) -> list[Frame]:
-        """Take what the client wrote; return the frames it sends. Any bytes will do."""
+        """Handle bytes of the client; return the frames it sends. Any bytes will do."""
         *commands, begun = (self._begun + data).split(DONE)
         # of what is too long already, enough is kept to be refused when it ends
         self._begun = begun[:_COMMAND_MAX + 1]
@@ -107,7 +107,7 @@ class SlcanAdapter:
 
     @staticmethod
     def encode(frame: Frame) -> bytes:
-        """Return what the adapter writes when it receives a frame from the bus."""
+        """Return what the adapter writes for a frame from the bus."""
         head = (f'T{frame.identifier:08X}' if frame.extended else f't{frame.identifier:03X}')
         return f'{head}{len(frame.data)}{frame.data.hex().upper()}\r'.encode()
 
@@ -128,7 +128,7 @@ class SlcanAdapter:
             if self.is_open or not (command in BIT_RATES or _TIMING.fullmatch(command)):
                 reply = REFUSED
             elif self._bitrate is not None:
-                self._set = BIT_RATES.get(command, self._bitrate)   # s…: by somebody who knows
+                self._set = BIT_RATES.get(command, self._bitrate)   # s…: not checked
         elif command == 'F' and not self.is_open:
             reply = REFUSED
         else:
@@ -152,7 +152,7 @@ class SlcanTerminal(EndPoint):
     A bus end point on a pseudo-terminal. One thread may receive while others send.
 
     :param now: the steady time.
-    :param bitrate: of the bus, bit/s: a client that sets another hears nothing; None: any.
+    :param bitrate: of the bus, bit/s: a client that sets another receives nothing; None: any.
     :ivar path: the device that a client opens.
     :raises BusUnavailable: the system has no pseudo-terminal left.
     """
@@ -164,7 +164,7 @@ class SlcanTerminal(EndPoint):
             self._master, self._slave = os.openpty()
         except OSError as error:
             raise BusUnavailable(f'pseudo-terminal: {error.strerror}') from error
-        # Raw before anybody may write: an echo would play every frame back into the bus.
+        # Raw before others may write: an echo would send every frame back into the bus.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
@@ -206,7 +206,7 @@ class SlcanTerminal(EndPoint):
 
     def send(self, frame: Frame, timeout: float = 0.0) -> None:
         """
-        Hand a frame to the client. It is dropped while that is not connected.
+        Pass a frame to the client. It is dropped while that is not connected.
 
         :raises BusUnavailable: closed.
         """
@@ -219,9 +219,9 @@ class SlcanTerminal(EndPoint):
 
     def link(self, path: Path) -> None:
         """
-        Let a symbolic link point here for as long as the terminal is open.
+        Make a symbolic link to this terminal, for as long as it is open.
 
-        A link to another terminal is replaced: its simulation has died, and left it.
+        A link to another terminal is replaced: its simulation has ended without removing it.
 
         :raises OSError: it cannot be made, or something that is no such link is in the way.
         """
@@ -230,7 +230,7 @@ class SlcanTerminal(EndPoint):
         if path.is_symlink() and not os.readlink(path).startswith(_TERMINALS):
             raise FileExistsError(f'{path} exists and is not a link to a pseudo-terminal')
         path.parent.mkdir(parents=True, exist_ok=True)
-        # a name of its own first: who looks finds the old link or the new one, never none
+        # a name of its own first: others find the old link or the new one, never none
         temporary = path.with_name(f'.{path.name}.{os.getpid()}')
         temporary.unlink(missing_ok=True)
         temporary.symlink_to(self.path)
@@ -264,7 +264,7 @@ class SlcanTerminal(EndPoint):
         before = self._adapter.is_open, self._adapter.opened
         self._received.extend(self._adapter.receive_bytes(data))
         if before != (self._adapter.is_open, self._adapter.opened):
-            # what an earlier client has not read is nothing for the next one (the kernel's share
+            # what an earlier client has not read is not for the next one (the kernel's share
             # is for the client to discard: doing that here would race with its first read)
             self._outgoing.clear()
         replies = self._adapter.take_replies()
@@ -273,7 +273,7 @@ class SlcanTerminal(EndPoint):
             self._flush()
 
     def _flush(self) -> None:
-        """Write as much as a client may want, without waiting."""
+        """Write as much as the client reads, without waiting."""
         oldest = self._now() - BACKLOG_AGE
         while self._outgoing and self._outgoing[0][0] < oldest:
             self._outgoing.popleft()

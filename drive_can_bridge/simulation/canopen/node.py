@@ -21,7 +21,7 @@ from drive_can_bridge.simulation.registers import AccessRefused
 #: objects by index and sub-index
 Contents = dict[tuple[int, int], bytes]
 
-#: ms between heartbeats where nobody watches them
+#: ms between heartbeats without a consumer
 HEARTBEAT = 1000
 #: heartbeats within the time after which the bridge misses them
 HEARTBEATS_WATCHED = 3
@@ -53,8 +53,8 @@ class CanopenNode(Companion):
     :param constants: returns the content of the family's other, read-only objects, by address.
     :param trip_code: the maker's code of a trip that has none of its own.
     :param heartbeat: ms between heartbeats after power came on; None: as they are watched.
-    :param make_emergency: makes the message of a trip from its code.
-    :param segmented_writes: takes them by SDO.
+    :param make_emergency: returns the message of a trip from its code.
+    :param segmented_writes: accepts them by SDO.
     :ivar state: boot-up: without power, or still starting.
     :ivar start_time: s from NMT start to operational.
     :ivar absent: objects that it does not have, although it could.
@@ -76,7 +76,7 @@ class CanopenNode(Companion):
         self.absent = Absent()
         self._now = -math.inf
         self._looks_at = math.inf
-        # the boot-up frame leaves as soon as somebody looks
+        # the boot-up frame leaves with the first call
         self.power_lost(-math.inf)
 
     @staticmethod
@@ -98,7 +98,7 @@ class CanopenNode(Companion):
         if extended:
             return False
         if self.state is NmtState.BOOT_UP:
-            # who is ready to receive has sent its boot-up frame
+            # a node that is ready to receive has sent its boot-up frame
             self._report_state(now)
         self._started(now)
         if identifier == network.NMT_IDENTIFIER:
@@ -129,7 +129,7 @@ class CanopenNode(Companion):
                 self._started(now)
 
     def _started(self, now: float) -> None:
-        """Be operational once the start has taken its time."""
+        """Become operational once the start has taken its time."""
         if self._starts_at <= now:
             self.state, self._starts_at = NmtState.OPERATIONAL, math.inf
 
@@ -142,7 +142,7 @@ class CanopenNode(Companion):
                 self._drive.answer(Frame(RESPONSE_BASE + self.number, response, False), now)
 
     def look(self, now: float) -> None:
-        """Report a trip that has come or gone, and plan the next look at a running motor."""
+        """Report a trip that has come or gone, and plan the next check of a running motor."""
         operation = self._drive.plant.operation
         self._looks_at = now + TICK if operation.enabled else math.inf
         code = int(operation.fault_code(self._trip_code))
@@ -153,7 +153,7 @@ class CanopenNode(Companion):
 
     @property
     def _communicates(self) -> bool:
-        """Takes and sends SDOs and emergencies."""
+        """Whether it handles SDOs and emergencies."""
         return self.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 
     def next_timer(self) -> float:
@@ -181,14 +181,14 @@ class CanopenNode(Companion):
         self._beats_at = now + self._heartbeat / 1000.0 if self._heartbeat else math.inf
 
     def take_away(self, places: frozenset[tuple[int, int | None]]) -> None:
-        """Have these objects no more; a sub-index None is all of the index."""
+        """Remove these objects; a sub-index None is all of the index."""
         self.absent.places = places
         if HEARTBEAT_TIME in self.absent:
             self._default_heartbeat = self._heartbeat = 0
             self._beats_at = math.inf
 
     def send_error(self, error: Emergency) -> None:
-        """Send an emergency that stays, whatever becomes of the motor."""
+        """Send an emergency that stays, independent of the motor."""
         if self._communicates:
             self._drive.send(network.encode_emergency(self.number, error))
 

@@ -3,8 +3,8 @@
 PDOs of a simulated drive: their objects (1400h to 1BFFh), the rules of their mapping, and traffic.
 
 A mapping is changed as CANopenNode 4 and the manuals of Festo and Nanotec want it: only while bit
-31 of the COB-ID is set, entries only while their number is 0, of objects that exist; the number
-says whether all fit. Fewer bytes than an object has are taken, more are not. Other stacks check
+31 of the COB-ID is set, entries only while their number is 0, of objects that exist; the number is
+checked against all. Fewer bytes than an object has are accepted, more are not. Other stacks check
 less (:class:`Checks`).
 """
 
@@ -32,7 +32,7 @@ _WIDTHS = {1: 4, 2: 1, 3: 2, 5: 2}
 
 
 class Checks(Enum):
-    """What is checked when a mapping is written."""
+    """The checks when a mapping is written."""
 
     #: everything, in every state: CANopenNode 4
     CHECKED = 'checked'
@@ -45,10 +45,10 @@ class Checks(Enum):
 @dataclass(frozen=True)
 class PdoHabits:
     """
-    What differs between makers.
+    The differences between makers.
 
     :param mapping: what is checked when a mapping is written.
-    :param types: transmission types that PDOs take.
+    :param types: transmission types that PDOs accept.
     :param fixed_mapping: mappings cannot be written.
     :param no_remote: TPDOs want bit 30 of their COB-ID.
     """
@@ -81,7 +81,7 @@ class SimulatedPdo:
 
     @property
     def identifier(self) -> int | None:
-        """Where it travels; None: it does not."""
+        """The identifier of its frames; None: it has none."""
         return None if self.cob_id & INVALID or not self.count else self.cob_id & 0x7FF
 
     @property
@@ -90,7 +90,7 @@ class SimulatedPdo:
 
     @property
     def length(self) -> int:
-        """How many bytes it has."""
+        """Its length in bytes."""
         return sum(entry & 0xFF for entry in self.mapped) // 8
 
 
@@ -98,8 +98,8 @@ class Pdos:
     """
     All PDOs of one drive.
 
-    :param receive: entries that are mapped when it leaves the factory, by number.
-    :param kind: type of transmission then.
+    :param receive: entries of the factory mapping, by number.
+    :param kind: type of transmission of these.
     """
 
     def __init__(self, node: int, objects: ObjectDictionary, receive: dict[int, list[int]],
@@ -112,11 +112,11 @@ class Pdos:
         self.begin()
 
     def store(self) -> None:
-        """Keep the set-up without power."""
+        """Store the set-up in EEPROM."""
         self._stored = deepcopy((self.receive, self.transmit))
 
     def begin(self, *, factory: bool = False) -> None:
-        """Have what was stored, else what the factory put in."""
+        """Restore the stored set-up, else that of the factory."""
         if factory:
             self._stored = None
         if self._stored is not None:
@@ -215,7 +215,7 @@ class Pdos:
         self.absent.check(*place)
         cell = self._objects.cells.get(place)
         if cell is None and place[0] >= _MAPPABLE_FROM:
-            self._objects.find(*place)      # says what is missing
+            self._objects.find(*place)      # names what is missing
         if (cell is None or place[0] < _MAPPABLE_FROM or bits % 8 or bits > 8 * bytes_of(cell)
                 or not (cell.readable if pdo.transmit else cell.writable)):
             raise AccessRefused(NOT_MAPPABLE)
@@ -223,7 +223,7 @@ class Pdos:
     # -- traffic ----------------------------------------------------------------------------------
 
     def cells(self, pdo: SimulatedPdo, data: bytes) -> list[tuple[Parameter, int]]:
-        """Return what an RPDO says: parameters and raw integers."""
+        """Return the parameters and raw integers in an RPDO."""
         found, at = [], 0
         for entry in pdo.mapped:
             length = (entry & 0xFF) // 8
@@ -239,7 +239,7 @@ class Pdos:
         return None if place in self.absent else self._objects.cells.get(place)
 
     def frame(self, pdo: SimulatedPdo, now: float) -> Frame:
-        """Make a TPDO of what its objects hold now."""
+        """Return a TPDO with the present content of its objects."""
         pdo.sent = self.content(pdo)
         pdo.sent_at = now
         return Frame(pdo.cob_id & 0x7FF, pdo.sent, False)
@@ -259,7 +259,7 @@ class Pdos:
         return bool(pdo.type) or self.content(pdo) != pdo.sent
 
     def due(self, pdo: SimulatedPdo) -> float:
-        """Return when a TPDO leaves by itself."""
+        """Return when a TPDO leaves by its timer."""
         if pdo.identifier is None or pdo.type < 254:
             return math.inf
         inhibited = pdo.sent_at + pdo.inhibit / 10_000.0

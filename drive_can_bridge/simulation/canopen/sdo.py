@@ -36,7 +36,7 @@ def bytes_of(parameter: Parameter) -> int:
 
 class Absent:
     """
-    Objects that were taken away from a node.
+    Objects that were removed from a node.
 
     :ivar places: index and sub-index; None: all of the index.
     """
@@ -49,9 +49,9 @@ class Absent:
 
     def check(self, index: int, subindex: int) -> None:
         """
-        See whether an object is there.
+        Check that an object exists.
 
-        :raises AccessRefused: it was taken away.
+        :raises AccessRefused: it was removed.
         """
         if (index, subindex) in self:
             raise AccessRefused(sdo.NO_SUCH_OBJECT)
@@ -59,7 +59,7 @@ class Absent:
 
 class ObjectDictionary:
     """
-    Registers that have an index. Sub-index 0 says how many there are, where none stands there.
+    Registers with an index. Without an entry of its own, sub-index 0 is the number of them.
 
     :ivar cells: parameters by index and sub-index.
     """
@@ -85,7 +85,7 @@ class ObjectDictionary:
         return self.content(cell)
 
     def content(self, cell: Parameter) -> bytes:
-        """Return what an object holds, as it travels."""
+        """Return the content of an object, as on the wire."""
         word = cell.word_from_raw(self._registers.raw(cell.name))
         return word.to_bytes(cell.type.bits // 8, 'little')[:bytes_of(cell)]
 
@@ -104,7 +104,7 @@ class ObjectDictionary:
         self._registers.write(cell.name, raw)
 
     def raw(self, index: int, subindex: int = 0) -> int:
-        """Return the raw integer of an object that there is."""
+        """Return the raw integer of an existing object."""
         return self._registers.raw(self.cells[index, subindex].name)
 
     def find(self, index: int, subindex: int) -> Parameter:
@@ -134,7 +134,7 @@ class SdoServer:
     """
     Answers the requests of one client.
 
-    :param segmented_writes: takes them.
+    :param segmented_writes: accepts them.
     """
 
     def __init__(self, objects: ServedObjects, *, segmented_writes: bool = False) -> None:
