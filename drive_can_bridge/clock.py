@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The one place that asks for the time, waits, and begins threads.
+The only module that reads the time, waits, and starts threads.
 
-Everybody else is handed a :class:`Clock`, and made with it. The executables make a
-:class:`SteadyClock`; a test has one that jumps from one time that somebody waits for to the next,
+All others are created with a :class:`Clock`. The executables create a
+:class:`SteadyClock`; a test has one that jumps from one awaited time to the next,
 and runs one thread at a time.
 """
 
@@ -17,7 +17,7 @@ from typing import Generic, Protocol, TypeVar
 
 from drive_can_bridge.memory import data_limit
 
-#: CLOCK_MONOTONIC stands still while the machine is suspended; the drives do not
+#: CLOCK_MONOTONIC does not count suspends of the machine; the drives do
 _CLOCK = getattr(time, 'CLOCK_BOOTTIME', time.CLOCK_MONOTONIC)
 
 #: s that may be slept at once; more is an error where the end has no place in a time of the system
@@ -30,7 +30,7 @@ class WakeEvent(Protocol):
     """Wakes one sleeper. A ring while nobody sleeps is kept for the next; several count once."""
 
     def wait(self, until: float = math.inf) -> bool:
-        """Sleep until then, or until somebody rings; tell whether somebody did."""
+        """Sleep until then, or until a ring; return whether there was one."""
 
     def ring(self) -> None:
         """Wake the sleeper, or the next one at once. From any thread."""
@@ -40,7 +40,7 @@ class Worker(Protocol):
     """A thread of this program."""
 
     def start(self) -> None:
-        """Begin."""
+        """Start."""
 
     def is_alive(self) -> bool:
         """Return whether it has begun, and not ended."""
@@ -50,13 +50,13 @@ class Worker(Protocol):
 
 
 class Lock(Protocol):
-    """Of one thread at a time, which may take it again. For what waits while it has it."""
+    """A re-entrant lock, for code that waits while it has it."""
 
     def acquire(self, timeout: float = math.inf) -> bool:
-        """Take it; False: not in so many s."""
+        """Acquire it; return False: not in so many s."""
 
     def release(self) -> None:
-        """Give it back, as often as it was taken."""
+        """Release it, as often as it was acquired."""
 
     def __enter__(self) -> object: ...
 
@@ -64,23 +64,23 @@ class Lock(Protocol):
 
 
 class Clock(Protocol):
-    """The time, and everything that waits for it."""
+    """The time, and all waiting for it."""
 
     @property
     def now(self) -> Callable[[], float]:
-        """The steady time in s, which nobody can set, and for which suspend counts."""
+        """The steady time in s, which cannot be set, and which includes suspends."""
 
     def stamp(self) -> int:
-        """Return the time of the day, in ns since 1970: for stamps, and for what people read."""
+        """Return the time of the day, in ns since 1970: for stamps, and for people."""
 
     def used(self) -> float:
         """Return the s of a processor that this thread has used."""
 
     def wake_event(self) -> WakeEvent:
-        """Return what a thread waits by, for a time or for somebody."""
+        """Return an event by which a thread waits, for a time or for a ring."""
 
     def lock(self) -> Lock:
-        """Return what keeps others out, even while one waits."""
+        """Return a lock that is held even while its thread waits."""
 
     def worker(self, run: Callable[[], object], name: str) -> Worker:
         """Return a thread that can be started; the process does not wait for it."""
@@ -103,7 +103,7 @@ class Bell:
         self._silence.acquire()
 
     def wait(self, until: float = math.inf) -> bool:
-        """Sleep until then, or until somebody rings; tell whether somebody did."""
+        """Sleep until then, or until a ring; return whether there was one."""
         timeout = until - self._now()
         if timeout > threading.TIMEOUT_MAX:
             return self._silence.acquire()
@@ -118,10 +118,10 @@ class Bell:
 
 
 class SystemThread(threading.Thread):
-    """A thread that may be joined whatever became of it, and begins if memory is short."""
+    """A thread that may be joined in any state, and starts even if memory is short."""
 
     def start(self) -> None:
-        """Begin."""
+        """Start."""
         with data_limit.room():
             super().start()
 
@@ -138,11 +138,11 @@ class SystemLock:
         self._lock = threading.RLock()
 
     def acquire(self, timeout: float = math.inf) -> bool:
-        """Take it; False: not in so many s."""
+        """Acquire it; return False: not in so many s."""
         return self._lock.acquire(timeout=-1 if timeout == math.inf else timeout)
 
     def release(self) -> None:
-        """Give it back."""
+        """Release it."""
         self._lock.release()
 
     def __enter__(self) -> 'SystemLock':
@@ -172,11 +172,11 @@ class SteadyClock:
         return time.thread_time()
 
     def wake_event(self) -> Bell:
-        """Return what a thread waits by."""
+        """Return an event."""
         return Bell(self.now)
 
     def lock(self) -> SystemLock:
-        """Return what keeps others out."""
+        """Return a lock."""
         return SystemLock()
 
     def worker(self, run: Callable[[], object], name: str) -> SystemThread:
@@ -190,7 +190,7 @@ class SteadyClock:
 
 class Mailbox(Generic[Item]):
     """
-    What one thread gets and any thread puts, in order.
+    A queue that any thread puts into, and one thread reads, in order.
 
     :param limit: so many may wait.
     """
@@ -203,9 +203,9 @@ class Mailbox(Generic[Item]):
 
     def put(self, item: Item, *, always: bool = False) -> bool:
         """
-        Put something, without waiting; False: too much waits already.
+        Put an item, without waiting; return False: too many wait already.
 
-        :param always: however much waits.
+        :param always: however many wait.
         """
         if len(self._items) >= self._limit and not always:
             return False
@@ -215,9 +215,9 @@ class Mailbox(Generic[Item]):
 
     def get(self, until: float = math.inf) -> Item:
         """
-        Wait for what comes next, and return it.
+        Wait for the next item, and return it.
 
-        :raises TimeoutError: nothing came until then.
+        :raises TimeoutError: there was none until then.
         """
         while not self._items:
             if not self._wake.wait(until) and not self._items:

@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A limit on what this process may allocate, and what is kept ready for when somebody has reached it.
+A limit on the memory of this process, and reserves for when it is reached.
 
-The limit (``RLIMIT_DATA``) is one of the process: while one thread has reached it, nobody gets new
+The limit (``RLIMIT_DATA``) is one of the process: while one thread has reached it, none gets new
 memory from the system, neither a thread nor a page of the heap. So whatever must go on has some
 before. glibc gives each thread a heap of its own (an *arena*), and what is free in that is for
-nobody else: every arena begins with :data:`RESERVE` and keeps as much when others would give it
+no other: every arena begins with :data:`RESERVE` and keeps as much when others would give it
 back, and threads that matter have it enlarged. What cannot be had before, a thread (Python maps
 memory for each, and waits for ever for one that could not begin), gets :data:`ROOM` above the
 limit for a moment. Where there is no glibc, there is only the limit.
@@ -36,7 +36,7 @@ def in_use() -> int:
     """
     Return the bytes that count against the limit.
 
-    :raises OSError: this system does not tell.
+    :raises OSError: this system does not report it.
     """
     status = os.open(_STATUS, os.O_RDONLY | os.O_CLOEXEC)
     try:
@@ -68,7 +68,7 @@ class DataLimit:
             self._apply()
 
     def lift(self) -> None:
-        """Go back to what was given."""
+        """Restore the original limit."""
         with self._lock:
             if self._limit:
                 self._limit = 0
@@ -76,7 +76,7 @@ class DataLimit:
 
     @contextmanager
     def room(self) -> Iterator[None]:
-        """Have a little more for a moment."""
+        """Allow a little more for a moment."""
         self._change_room(1)
         try:
             yield
@@ -93,7 +93,7 @@ class DataLimit:
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
         soft = self._limit or self._given
         if self._limit and self._rooms:
-            try:    # what was there for a moment before may be taken, too
+            try:    # the room of a moment before may be in use, too
                 soft = max(self._limit, in_use()) + ROOM
             except (MemoryError, OSError):
                 soft = self._given
@@ -110,7 +110,7 @@ data_limit = DataLimit()
 
 
 def keep_reserves() -> None:
-    """Have every thread that begins from now on keep a reserve. First of all."""
+    """Make every thread that starts from now on keep a reserve. To be called first of all."""
     try:
         from ctypes import CDLL
         mallopt = CDLL(None).mallopt
@@ -122,7 +122,7 @@ def keep_reserves() -> None:
 
 
 def reserve() -> None:
-    """Have the reserve of this thread free beyond what it uses now."""
+    """Free the reserve of this thread beyond what it uses now."""
     import ctypes
     library = ctypes.CDLL(None)
     malloc, free = library.malloc, library.free

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What comes with the package: profiles, examples, launch files; and how its extras are brought.
+The files of the package: profiles, examples, launch files; and how to install its extras.
 
 They are found in a source checkout (also when installed with ``pip install -e`` or
 ``colcon build --symlink-install``), in a ROS 2 workspace or distribution, and in whatever prefix
@@ -20,7 +20,7 @@ _NO_ROS = ('{command}: needs ROS 2 (Python module {module}): source your install
 
 def share_directory() -> Path:
     """
-    Directory that holds ``config`` and ``launch``.
+    Return the directory that holds ``config`` and ``launch``.
 
     :raises FileNotFoundError: when there is none; the message names the places.
     """
@@ -33,13 +33,13 @@ def share_directory() -> Path:
 
 
 def profiles_directory() -> Path:
-    """Directory of the profiles shipped with the package."""
+    """Return the directory of the shipped profiles."""
     return share_directory() / 'config' / 'profiles'
 
 
 def config_file(name: str) -> Path:
     """
-    Path of a shipped configuration file.
+    Return the path of a shipped configuration file.
 
     :param name: file name below ``config``, with its suffix.
     :raises FileNotFoundError: when there is none; the message names those that exist.
@@ -53,7 +53,7 @@ def config_file(name: str) -> Path:
 
 
 def command_that_brings(extra: str) -> str:
-    """Return what to type for the Python packages that an extra of this package needs."""
+    """Return the command that installs the Python packages of an extra."""
     from importlib.metadata import PackageNotFoundError, requires
     try:
         entries = [entry.partition(';') for entry in requires(_PACKAGE) or ()]
@@ -66,7 +66,7 @@ def command_that_brings(extra: str) -> str:
 
 
 def what_is_missing(command: str, error: ImportError) -> str:
-    """Say what to install where a module cannot be imported."""
+    """Return what to install where a module cannot be imported."""
     module = error.name or str(error)
     if module.startswith('drive_can_bridge'):
         return f'{command}: {error}'
@@ -76,7 +76,7 @@ def what_is_missing(command: str, error: ImportError) -> str:
 
 
 def _candidates() -> Iterator[Path]:
-    """Go through the possible share directories, nearest to this very module first."""
+    """Yield the possible share directories, nearest to this very module first."""
     module = Path(__file__).resolve()
     checkout = module.parent.parent
     if (checkout / 'package.xml').is_file():

@@ -2,6 +2,6 @@
 """
 ``drive_can demo``: simulated drives, bridge and live view, each a process of its own.
 
-They are the ones that a user starts by hand, and meet as those do: bridge and drives on
+They are the ones that a user starts by hand, connected in the same way: bridge and drives on
 pseudo-terminals, view and commander in the ROS graph.
 """

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-A process of the demo, from both sides: started and ended by one, run in the other.
+A process of the demo, from both sides: started and ended in one, run in the other.
 
-It ends with the demo, whatever that one dies of: the kernel sends it SIGTERM then.
+It ends with the demo, however that ends: the kernel sends it SIGTERM then.
 """
 
 from contextlib import nullcontext
@@ -34,10 +34,10 @@ class Child:
     """
     A process of the demo.
 
-    :param what: what it is to a user, ``the bridge``.
+    :param what: its name for users, ``the bridge``.
     :param shared: stays in the terminal's foreground, and gets its signals; others have a session
         of their own, so that nothing but the demo ends them.
-    :param log: takes its standard error; None: it is the demo's.
+    :param log: file for its standard error; None: it is the demo's.
     """
 
     def __init__(self, what: str, program: str, *arguments: str,
@@ -54,7 +54,7 @@ class Child:
 
     @property
     def code(self) -> int | None:
-        """Exit code; negative: killed by that signal; None: it runs."""
+        """The exit code; negative: killed by that signal; None: it runs."""
         return self.process.poll()
 
     @property
@@ -64,14 +64,14 @@ class Child:
         return f'killed by signal {-code}' if code < 0 else f'exit code {code}'
 
     def ask_to_end(self, signum: int = signal.SIGTERM) -> None:
-        """Send a signal, if there is somebody to get it."""
+        """Send a signal, if the process still runs."""
         if self.code is None:
             # stopped processes have to go on in order to end
             for number in (signum, signal.SIGCONT):
                 self.process.send_signal(number)
 
     def ends(self, timeout: float) -> bool:
-        """Wait for its end; tell whether it has come."""
+        """Wait for its end; return whether it has come."""
         try:
             self.process.wait(timeout)
         except subprocess.TimeoutExpired:
@@ -87,7 +87,7 @@ class Child:
         return False
 
     def errors(self) -> str:
-        """Return what it wrote to standard error and nobody has seen."""
+        """Return what it wrote to standard error and was not shown."""
         return self.log.read_text(encoding='utf-8', errors='replace') if self.log else ''
 
 
@@ -95,7 +95,7 @@ def main() -> int:
     """Run a program in this process."""
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM))
-    if os.getppid() != parent:  # it has gone already
+    if os.getppid() != parent:  # it is gone already
         return 1
     program, *arguments = sys.argv[1:]
     sys.argv = [program, *arguments]

@@ -1,8 +1,8 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The model: takes what arrives from the graph, gives snapshots.
+The model: is fed with what arrives from the graph, returns snapshots.
 
-Nothing is believed that arrives: text is made printable, names have to be names, and there is an
+Nothing that arrives is trusted: text is made printable, names have to be names, and there is an
 upper limit to everything. ``now`` is the time of a steady clock in s.
 """
 
@@ -22,13 +22,13 @@ from drive_can_bridge.monitor.values import ParameterInfo
 OFFLINE, ONLINE = 'offline', 'online'
 #: key of diagnostics; there for drives with a control word only
 CONTROL_STATE = 'control_state'
-#: what a bridge says of a drive at its end: its stop was confirmed, or was not
+#: the last status of a drive: its stop was confirmed, or was not
 _ENDED, _ENDED_IN_DOUBT = sentences.bridge_ended().code, sentences.bridge_ended_may_run().code
 #: of a drive that exchanges nothing
 _SILENT_STATES = (OFFLINE, 'mapping differs', '')
-#: s after which a drive that is sampled all the time, and said to be online, has lost its bridge
+#: s after which a drive that is sampled all the time, and reported online, has lost its bridge
 SAMPLES_MISSING = 3.0
-#: parameters that one drive may tell of, and values that a message may carry
+#: parameters that one drive may have, and values that a message may carry
 PARAMETERS_MAX = 4000
 VALUES_MAX = 64
 
@@ -94,7 +94,7 @@ class DriveRecord:
         return self._rate.value
 
     def reported(self, report: StatusReport, stamp: float, now: float) -> bool:
-        """Take what the bridge says; return whether it has begun anew."""
+        """Handle the bridge's status of the drive; return whether its counts have restarted."""
         self._report, self._reported_at = report, now
         if report.state in _SILENT_STATES:
             self._offline_at = now
@@ -103,7 +103,7 @@ class DriveRecord:
         return anew
 
     def went_online(self, online: bool, now: float) -> None:
-        """Take ``~/online``."""
+        """Handle ``~/online``."""
         if online != self._online:
             self._online, self._online_at = online, now
         if not online:
@@ -117,9 +117,9 @@ class DriveRecord:
             self._sampled_since = now
 
     def described(self, parameters: Iterable[ParameterInfo]) -> None:
-        """Take what the drive says of its parameters."""
+        """Handle the descriptors of the drive's parameters."""
         known, self.parameters = self.parameters, {info.name: info for info in parameters}
-        # told anew: by a bridge that was started again, perhaps with another configuration, behind
+        # described again: by a restarted bridge, perhaps with another configuration, behind
         # which there may be another drive
         again = {name for name, info in self.parameters.items()
                  if known.get(name, info) is not info}
@@ -130,7 +130,7 @@ class DriveRecord:
             self.responses, self.requests = _Values(), _Values()
 
     def read(self, readings: Iterable[tuple[str, Value | None]], now: float) -> None:
-        """Take values that a service has read; None: it could not be read."""
+        """Handle values that a service has read; None: could not be read."""
         for name, value in readings:
             info = self.parameters.get(name)
             if info is not None:
@@ -138,12 +138,12 @@ class DriveRecord:
 
     @property
     def stopped(self) -> bool:
-        """Its bridge has ended, and its stop was confirmed."""
+        """Whether its bridge has ended, with the stop of this drive confirmed."""
         return self._farewell == _ENDED
 
     @property
     def _farewell(self) -> str:
-        """What its bridge said at its end; '': it was not the end, or it was started again."""
+        """The code of its bridge's farewell; '' where there was none, or it was restarted."""
         if self._report is None or self._online and self._online_at > self._reported_at:
             return ''
         code = self._report.facts.get('code', '')
@@ -152,19 +152,19 @@ class DriveRecord:
     def look(self, now: float, *, label: str, silent: float, started_here: bool = False,
              ) -> DriveSnapshot:
         """
-        Return how the drive is.
+        Return a snapshot of the drive.
 
-        :param silent: s for which the bridge says nothing any more, or 0.
-        :param started_here: nobody is told to start its bridge again.
+        :param silent: s for which the bridge is silent, or 0.
+        :param started_here: no advice to start its bridge again.
         """
-        if self._farewell:      # nothing is to follow that: it says how it was left
+        if self._farewell:      # that was the last status: it shows how the drive was left
             silent = 0.0
         report = self._report or StatusReport('', True, '', Level.STALE, 'nothing known yet')
         state, level, advice, online = self._judge(report, now, silent)
         if started_here and self.stopped:
             advice = sentences.bridge_ended_here()
         responses, requests = self.responses, self.requests
-        # what it said before it was away is no news of how it is
+        # samples from before it was offline are not its present state
         sampled = online and responses.at > self._offline_at
         return DriveSnapshot(
             name=self.name, label=label, bridge=report.bridge, state=state, level=level,
@@ -211,19 +211,19 @@ LOG_MAX = 500
 BRIDGES_MAX, BUSES_MAX, DRIVES_MAX = 64, 256, 1024
 #: s that a bridge may be late with its diagnostics, beside one and a half of its periods
 _PATIENCE = 1.5
-#: s of that period: taken for it until it is known (an answer may take its time), and limits
+#: s of that period: assumed until it is known (an answer may take its time), and limits
 _PERIOD_UNKNOWN, _PERIOD_MIN, _PERIOD_MAX = 3.0, 1.0, 3600.0
 
 
 class _BusRecord:
-    """What a bridge says about a bus."""
+    """What a bridge reports of a bus."""
 
     def __init__(self) -> None:
         self._sent, self._received = Rate(), Rate()
         self._report: StatusReport | None = None
 
     def reported(self, report: StatusReport, stamp: float) -> bool:
-        """Take a report; return whether its bridge has begun anew."""
+        """Handle a status; return whether the counts of its bridge have restarted."""
         self._report = report
         anew = self._sent.went_back(report.count('frames_sent'))
         self._sent.update(report.count('frames_sent'), stamp)
@@ -242,7 +242,7 @@ class _BusRecord:
 
 
 class _BridgeRecord:
-    """One bridge: its buses and drives, in the order in which it tells of them."""
+    """One bridge: its buses and drives, in the order of its diagnostics."""
 
     def __init__(self) -> None:
         self.buses: dict[str, _BusRecord] = {}
@@ -252,7 +252,7 @@ class _BridgeRecord:
         self._period = _PERIOD_UNKNOWN
 
     def heard(self, stamp: float, now: float) -> None:
-        # else its host's clock was set: nothing else passes so much quicker there than here
+        # else its host's clock was set: nothing else runs so much faster there than here
         if 0.0 < stamp - self._stamp <= 2.0 * (now - self._at) + _PERIOD_UNKNOWN:
             self._goes_on_after(stamp - self._stamp)
         self._at, self._stamp = now, stamp
@@ -266,7 +266,7 @@ class _BridgeRecord:
         self._period = min(max(period, _PERIOD_MIN), _PERIOD_MAX)
 
     def late(self, now: float) -> bool:
-        """Return whether it is to be asked for its period: that may have become longer."""
+        """Return whether its period is to be read again: it may have become longer."""
         return now - max(self._at, self._paced_at) > 1.5 * self._period
 
     def silent(self, now: float) -> float:
@@ -279,7 +279,7 @@ class Model:
     Everything that is known of all bridges.
 
     :param namespace: only bridges in it, or below it; '' or '/': all.
-    :param started_here: whoever looks has started the bridge, and ends it.
+    :param started_here: the viewer has started the bridge, and ends it.
     """
 
     def __init__(self, namespace: str = '', *, started_here: bool = False) -> None:
@@ -295,7 +295,7 @@ class Model:
 
     def diagnosed(self, statuses: Iterable[Status], stamp: float, now: float) -> None:
         """
-        Take a diagnostic message, of whomever.
+        Handle a diagnostic message, of any node.
 
         :param stamp: s, of the message.
         """
@@ -309,61 +309,61 @@ class Model:
                 self._reported(self._bridges.setdefault(name, _BridgeRecord()), found, stamp, now)
 
     def went_online(self, drive: str, online: bool, now: float) -> None:
-        """Take ``~/online`` of a drive."""
+        """Handle ``~/online`` of a drive."""
         if drive in self._drives:
             self._drives[drive].went_online(online, now)
 
     def responded(self, drive: str, values: Iterable[tuple[str, Value]], now: float) -> None:
-        """Take ``~/response`` of a drive."""
+        """Handle ``~/response`` of a drive."""
         if drive in self._drives:
             self._drives[drive].responses.take(
                 [(printable(name), value) for name, value in values], now)
 
     def requested(self, drive: str, values: Iterable[tuple[str, Value]], now: float) -> None:
-        """Take ``~/request`` of a drive."""
+        """Handle ``~/request`` of a drive."""
         if drive in self._drives:
             self._drives[drive].requests.take(
                 [(printable(name), value) for name, value in values], now)
 
     def bit(self, drive: str, parameter: str, bit: str, state: bool) -> None:
-        """Take a bit of a drive."""
+        """Handle a bit of a drive."""
         if drive in self._drives:
             self._drives[drive].bits.setdefault(printable(parameter), {})[printable(bit)] = state
 
     def described(self, drive: str, parameters: Sequence[ParameterInfo]) -> None:
-        """Take what a drive says about its parameters."""
+        """Handle the descriptors of a drive's parameters."""
         if drive in self._drives:
             self._drives[drive].described(parameters[:PARAMETERS_MAX])
 
     def read(self, drive: str, readings: Iterable[tuple[str, Value | None]], now: float) -> None:
-        """Take values of parameters that were asked for; None: it could not be read."""
+        """Handle values of parameters that were read; None: could not be read."""
         if drive in self._drives:
             self._drives[drive].read(readings, now)
 
     def paced(self, bridge: str, period: float, now: float) -> None:
-        """Take every how many s a bridge says that it tells of itself; NaN: it does not say."""
+        """Set the period of a bridge's diagnostics in s; NaN: unknown."""
         if bridge in self._bridges:
             self._bridges[bridge].paced(period, now)
 
     def placed(self, drive: str, place: Place) -> None:
-        """Take where a drive is."""
+        """Set where a drive is."""
         if drive in self._drives:
             self._drives[drive].place = place
 
     def sampled(self, drives: Iterable[str], now: float) -> None:
-        """Set the drives whose samples are asked for from now on, and no others."""
+        """Set the drives whose samples are subscribed to, and no others."""
         wanted = set(drives)
         for name, drive in self._drives.items():
             drive.sampled(name in wanted, now)
 
     def logged(self, at: float, level: str, logger: str, text: str) -> None:
-        """Take a line of the log, of whomever; ``at`` in s since the epoch."""
+        """Handle a line of the log, of any node; ``at`` in s since the epoch."""
         # what comes before the first diagnostics may turn out to be of a bridge
         if not self._bridges or f'/{logger.replace(".", "/")}' in self._bridges:
             self._log.append(LogLine(at, level, printable(logger), printable(text, LOG_LIMIT)))
 
     def noticed(self, drives: Iterable[str], now: float) -> None:
-        """Take the full names of all drives in the graph that nobody has told of."""
+        """Set the full names of all drives in the graph that no bridge reports."""
         found = sorted(name for name in drives if name.startswith(self._prefix))[:DRIVES_MAX]
         self._noticed = {name: self._noticed.get(name, now) for name in found}
 
@@ -391,9 +391,9 @@ class Model:
 
     def take_anew(self) -> set[str]:
         """
-        Return the full names of bridges that were started again, and of their drives, once.
+        Return the full names of restarted bridges, and of their drives, once.
 
-        What they have told of themselves may hold no longer, however short a time they were away.
+        What was read from them may be outdated, however short a time they were away.
         """
         anew, self._anew = self._anew, set()
         return anew
@@ -404,7 +404,7 @@ class Model:
 
     def look(self, now: float, at: float) -> Snapshot:
         """
-        Return how everything is.
+        Return a snapshot of everything.
 
         :param at: s since the epoch, for the clock of the view.
         """
@@ -412,7 +412,7 @@ class Model:
         several = len({name.rpartition('/')[0] for name in self._bridges}) > 1
         for name, bridge in self._bridges.items():
             silent = bridge.silent(now)
-            # of one drive that may run the banner of a silent bridge tells, too
+            # of one drive that may run, the banner of a silent bridge warns, too
             ended = bool(bridge.drives) and all(
                 drive.stopped for drive in bridge.drives.values())
             bridges.append(BridgeSnapshot(name, 0.0 if ended else silent, ended))
@@ -431,7 +431,7 @@ class Model:
 
     def _reported(self, bridge: _BridgeRecord, reports: list[StatusReport], stamp: float,
                   now: float) -> None:
-        """Take all that one bridge says in one message: what it does not name has gone."""
+        """Handle all that one bridge reports in one message: what it leaves out is removed."""
         bridge.heard(stamp, now)
         buses = {report.name: report for report in reports if not report.is_drive}
         drives = {report.full_name: report for report in reports if report.is_drive}
@@ -446,7 +446,7 @@ class Model:
             record = bridge.drives.get(name)
             if record is None:
                 if name in self._drives or len(self._drives) >= DRIVES_MAX:
-                    continue  # of another bridge; two of one name are no drives of anybody
+                    continue  # of another bridge; two of one name count for no bridge
                 record = bridge.drives[name] = self._drives[name] = DriveRecord(name)
             anew |= record.reported(report, stamp, now)
         if anew:

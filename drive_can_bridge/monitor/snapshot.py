@@ -1,9 +1,9 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-How bridges, buses and drives are at one moment: plain values, ready to be shown anywhere.
+Bridges, buses and drives at one moment: plain values, ready to be shown anywhere.
 
 Diagnostics are read here, and what values and counters were a moment ago is kept. Text from the
-graph is made printable: anybody can put anything there.
+graph is made printable: any node can put anything there.
 """
 
 from collections import deque
@@ -21,18 +21,18 @@ from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.values import ParameterInfo
 from drive_can_bridge.protocols.families import FAMILIES
 
-#: characters kept of a line of the log, which may tell of several drives
+#: characters kept of a line of the log, which may name several drives
 LOG_LIMIT = 2000
 
 _SUBJECT = re.compile(r'(?P<bridge>\S+): (?P<kind>bus|drive) (?P<name>\S+)')
 #: keys that one status may have
 _FACTS_MAX = 100
-#: by which a status of a bridge is told from others of a similar name
+#: the part that distinguishes a status of a bridge from others of a similar name
 _MARKS = {'bus': 'load_percent', 'drive': 'missed_exchanges'}
 
 
 class Level(IntEnum):
-    """How bad it is, numbered as in diagnostic_msgs."""
+    """The levels, numbered as in diagnostic_msgs."""
 
     OK = 0
     WARN = 1
@@ -53,7 +53,7 @@ class Status:
 @dataclass(frozen=True, slots=True)
 class StatusReport:
     """
-    What a bridge says about a bus or a drive.
+    What a bridge reports of a bus or a drive.
 
     :param bridge: full name of the bridge, ``/cell/drive_can_bridge``.
     :param is_drive: about a drive; otherwise about a bus.
@@ -70,16 +70,16 @@ class StatusReport:
 
     @property
     def full_name(self) -> str:
-        """Name of the drive's node: it lives in its bridge's namespace."""
+        """The full name of the drive's node, which is in its bridge's namespace."""
         return f'{self.bridge.rpartition("/")[0]}/{self.name}'
 
     @property
     def state(self) -> str:
-        """State in one word, as the bridge says it."""
+        """The state in one word, from the bridge."""
         return self.facts.get('state', '')
 
     def number(self, key: str) -> float:
-        """Return a number of the facts, NaN where there is none, or no finite one."""
+        """Return a number from the facts, NaN where there is none, or no finite one."""
         try:
             number = float(self.facts.get(key, 'nan'))
         except ValueError:
@@ -87,7 +87,7 @@ class StatusReport:
         return number if math.isfinite(number) else math.nan
 
     def count(self, key: str) -> int:
-        """Return a count of the facts, 0 where there is none."""
+        """Return a count from the facts, 0 where there is none."""
         number = self.number(key)
         return 0 if math.isnan(number) else int(number)
 
@@ -119,7 +119,7 @@ class History:
         self._points: deque[tuple[float, float]] = deque(maxlen=_POINTS_MAX)
 
     def add(self, value: float, now: float) -> None:
-        """Take a value; what is not finite leaves a gap."""
+        """Add a value; what is not finite leaves a gap."""
         points = self._points
         while points and now - points[0][0] > SPAN:
             points.popleft()
@@ -134,9 +134,9 @@ class History:
 def columns(points: tuple[tuple[float, float], ...], span: float, count: int,
             ) -> tuple[float | None, ...]:
     """
-    Put points into columns of equal time, the newest on the right; None where there is no point.
+    Return points in columns of equal time, the newest on the right; None where there is none.
 
-    A gap of one column between two points is closed: it says no more than that both were looked at
+    A gap of one column between two points is closed: it only shows that both were read
     a little late.
     """
     found: list[float | None] = [None] * count
@@ -154,21 +154,21 @@ def columns(points: tuple[tuple[float, float], ...], span: float, count: int,
 
 
 class Rate:
-    """How fast a counter counts, from its last two looks."""
+    """The rate of a counter, from its last two updates."""
 
     def __init__(self) -> None:
         self._last: tuple[float, float] | None = None
         self.value = 0.0
 
     def went_back(self, count: float) -> bool:
-        """Return whether a count is less than the last: counting has begun anew."""
+        """Return whether a count is less than the last one: counting has restarted."""
         return self._last is not None and count < self._last[1]
 
     def update(self, count: float, at: float) -> None:
         """
-        Take a count.
+        Update with a count.
 
-        :param at: s, of whatever clock; a clock or a counter that went back begins anew.
+        :param at: s, of whatever clock; a clock or a counter that went back starts over.
         """
         if self._last is not None:
             since, before = self._last
@@ -182,7 +182,7 @@ class Rate:
 
 
 Points = tuple[tuple[float, float], ...]
-#: what families call a bit that has no meaning of its own
+#: the names that families give to a bit without a meaning of its own
 _UNNAMED = re.compile(r'bit_([0-9]+)')
 #: state of a bus whose bridge is silent
 UNKNOWN = 'unknown'
@@ -229,7 +229,7 @@ class Place:
 @dataclass(frozen=True, slots=True)
 class ParameterReading:
     """
-    What became of reading a parameter.
+    The outcome of reading a parameter.
 
     :param text: the value; '' when it could not be read.
     :param age: s since it was read.
@@ -244,7 +244,7 @@ class Bit:
     """
     One bit of a word.
 
-    :param number: None: nobody has told.
+    :param number: None: unknown.
     :param named: it has a meaning; others are called by their number.
     """
 
@@ -261,19 +261,19 @@ class DriveSnapshot:
 
     :param name: full name of its node.
     :param label: as short as it may be among the others.
-    :param state: in one or two words, as the bridge says it.
+    :param state: in one or two words, from the bridge.
     :param online: it exchanges process data.
-    :param silent: its bridge says nothing any more: how it is nobody knows.
+    :param silent: its bridge is silent: the state of the drive is unknown.
     :param advice: in words, and what to do.
     :param control: state of its control word; '' without control.
     :param bits: parameter -> bit -> set.
     :param rate: exchanges per second.
     :param command_age: s; NaN before the first command.
-    :param facts: everything that diagnostics say.
+    :param facts: everything in diagnostics.
     :param sampled: a sample was received since it came online.
-    :param asked_for: s for which its samples have been asked for without a break; 0: they are not.
-    :param parameters: what the drive has; empty until it has told.
-    :param readings: of the parameters that were asked for.
+    :param asked_for: s since its samples were subscribed to; 0: they are not.
+    :param parameters: what the drive has; empty until read.
+    :param readings: of the parameters that were read.
     """
 
     name: str
@@ -302,7 +302,7 @@ class DriveSnapshot:
     silent: bool = False
 
     def bits_of(self, parameter: str) -> list['Bit']:
-        """Return the bits of a word by number; those whose number nobody knows behind them."""
+        """Return the bits of a word by number; those without a known number at the end."""
         info = next((info for info in self.parameters if info.name == parameter), None)
         family = FAMILIES.get(self.place.protocol)
         built_in = family.status_bits if family and parameter == STATUS_NAME else {}
@@ -340,7 +340,7 @@ class BridgeSnapshot:
 
     :param silent: s since its last diagnostics, once that is longer than it should be; else 0,
         also when it has ended.
-    :param ended: it took its leave, and said of each drive that it was told to stop and heard it.
+    :param ended: it has ended, and reported the stop of each drive as confirmed.
     """
 
     name: str
@@ -355,7 +355,7 @@ class LogLine:
 
     :param at: s since the epoch.
     :param level: as ROS names it.
-    :param logger: who said it.
+    :param logger: the name of its logger.
     """
 
     at: float
@@ -370,7 +370,7 @@ class Snapshot:
     Everything.
 
     :param at: s since the epoch.
-    :param unheard: full names of drives that are in the graph, and of which no bridge tells in its
+    :param unheard: full names of drives that are in the graph, and that no bridge has in its
         diagnostics; s since that is so.
     """
 
@@ -387,30 +387,30 @@ class Snapshot:
 
 
 class ModelSource(Protocol):
-    """Fills a model; what takes time happens in :meth:`poll`, and is over soon."""
+    """Fills a model; everything happens in :meth:`poll`, which returns soon."""
 
     def poll(self, now: float) -> None:
-        """Take what has arrived, and ask for what is missing."""
+        """Handle what has arrived, and request what is missing."""
 
     def focus(self, *drives: str) -> None:
-        """Look at drives closely: all of their samples, and their bits."""
+        """Subscribe to all samples of drives, and to their bits."""
 
     def glance(self, now: float) -> None:
-        """Take the samples of what is looked at closely, and nothing else."""
+        """Handle the samples of the drives in focus, and nothing else."""
 
     def watch(self, wanted: bool) -> None:
-        """Ask for samples, or for none: nobody looks at them."""
+        """Subscribe to samples, or to none while no view shows them."""
 
     @property
     def busy(self) -> bool:
-        """Wait for an answer to something: polling soon is worth it."""
+        """Whether an answer is awaited: polling soon is worth it."""
 
     def close(self) -> None:
         """Leave."""
 
 
 class StopAction(Enum):
-    """What ends the movement of a drive."""
+    """The requests that stop a drive."""
 
     QUICK_STOP = 'quick_stop'
     DISABLE = 'disable'
@@ -419,9 +419,9 @@ class StopAction(Enum):
 @dataclass(frozen=True, slots=True)
 class OperationOutcome:
     """
-    What became of a request to a drive.
+    The outcome of a request to a drive.
 
-    :param text: what the bridge or the drive says, in words; may be '' after a success.
+    :param text: the answer of the bridge or the drive, in words; may be '' after a success.
     """
 
     success: bool
@@ -430,18 +430,18 @@ class OperationOutcome:
 
 class Operations(Protocol):
     """
-    Asks drives for what a person wants; none of it ever moves one.
+    Sends a user's requests to drives; none of them ever moves one.
 
     The answer comes in a later :meth:`poll`, in its thread.
     """
 
     def poll(self, stops: Mapping[str, Collection[StopAction]], now: float) -> bool:
         """
-        Take the answers that have arrived.
+        Handle the answers that have arrived.
 
-        :param stops: of each drive: their services are kept at hand, so that a stop waits for no
+        :param stops: of each drive: their services are kept ready, so that a stop waits for no
             discovery.
-        :return: somebody still waits for an answer.
+        :return: an answer is still awaited.
         """
 
     def stop(self, drive: str, stop: StopAction, done: Callable[[OperationOutcome], None],

@@ -23,7 +23,7 @@ FEW = 6
 #: drives with the same trouble that are named
 _NAMED = 4
 _OTHER = '…'
-#: s that a bridge may take to tell of its drives for the first time
+#: s that a bridge may take to report its drives for the first time
 _UNHEARD = 5.0
 #: what differs although the trouble is the same: times and counts, not which fault it is
 _VARYING = re.compile(r'\b\d+:\d\d:\d\d\b|(?<!fault )\b\d+(?:\.\d+)?\b')
@@ -32,7 +32,7 @@ _MOVING = {'rpm', 'rad/s', 'deg/s', 'rev', 'rev/s', 'Hz', 'm/s', 'mm/s', 'm', 'm
 
 
 class Tone(Enum):
-    """What colour a drive has; the worst first."""
+    """The colours of drives, by their legend; the worst first."""
 
     ERROR = 'fault, offline or not seen'
     UNKNOWN = 'its bridge is silent'
@@ -53,7 +53,7 @@ def tone_of(drive: DriveSnapshot) -> Tone:
 
 
 def in_order(drives: Sequence[DriveSnapshot]) -> tuple[DriveSnapshot, ...]:
-    """Return drives as they are shown: the worst first where they are many."""
+    """Return drives in the order of the view: the worst first where they are many."""
     if len(drives) <= FEW:
         return tuple(drives)
     return tuple(sorted(drives, key=lambda drive: _RANKS[tone_of(drive)]))
@@ -67,7 +67,7 @@ def counts(drives: Iterable[DriveSnapshot]) -> list[tuple[Tone, str, int]]:
 
 
 def counts_in_words(drives: Sequence[DriveSnapshot]) -> str:
-    """Write ``15 drives: 2 offline, 4 not armed, 9 online``."""
+    """Return ``15 drives: 2 offline, 4 not armed, 9 online``."""
     states = Counter[str]()
     for _, state, count in counts(drives):
         states[state] += count
@@ -76,7 +76,7 @@ def counts_in_words(drives: Sequence[DriveSnapshot]) -> str:
 
 
 def principal(items: Sequence[Shown]) -> Shown | None:
-    """Return the value that tells most: what moves, or else one with a unit, or the first."""
+    """Return the most important value: what moves, or else one with a unit, or the first."""
     wishes: tuple[Callable[[Shown], bool], ...] = (
         lambda item: item.unit in _MOVING, lambda item: bool(item.unit), lambda item: True)
     return next((item for wish in wishes for item in items if wish(item)), None)
@@ -85,7 +85,7 @@ def principal(items: Sequence[Shown]) -> Shown | None:
 @dataclass(frozen=True, slots=True)
 class Trouble:
     """
-    What is not well, and what to do.
+    A problem, and what to do.
 
     :param who: a bus, a drive, or how many of them; begins the text.
     :param drives: full names of those.
@@ -99,7 +99,7 @@ class Trouble:
 
 def troubles(snapshot: Snapshot) -> list[Trouble]:
     """
-    Say what is not well: the worst first, drives with the same trouble together.
+    Return the problems: the worst first, drives with the same problem together.
 
     A silent bridge has a banner of its own (:func:`silence`).
     """
@@ -133,7 +133,7 @@ def _of_anybody(drive: DriveSnapshot) -> str:
 
 def silence(snapshot: Snapshot, clock: Callable[[float], str]) -> list[str]:
     """
-    Say which bridges are silent, and what that means: a line for each; and which drives none has.
+    Return a line for each silent bridge, and one for drives without a bridge.
 
     :param clock: writes a time of day.
     """
@@ -157,11 +157,11 @@ _PATIENCE = 2.0
 
 class Lines:
     """
-    A line for each drive, again and again.
+    Lines for all drives, again and again.
 
     That a drive is online arrives before its first sample, up to some seconds on a busy machine. A
     line that says ``online`` has the values, so until then there is none of a drive that is new,
-    and one that was told of before is ``offline`` still. Samples that this monitor did not ask
+    and one that was shown before is ``offline`` still. Samples that this monitor did not ask
     for, because there are too many, are not waited for.
     """
 
@@ -170,7 +170,7 @@ class Lines:
         self._told: set[str] = set()
 
     def look(self, snapshot: Snapshot, now: float) -> list[str]:
-        """Return a line for each drive of which it is known how it is."""
+        """Return a line for each drive whose state is known."""
         told = []
         for drive in snapshot.drives:
             if self._known(drive, now) or not drive.online:
@@ -194,7 +194,7 @@ class Lines:
 
 
 def documents(snapshot: Snapshot) -> list[dict[str, Any]]:
-    """Return what programs are told of each drive."""
+    """Return the documents of all drives for programs."""
     return [{'time': round(snapshot.at, 3), 'drive': drive.name, 'bridge': drive.bridge,
              'state': drive.state, 'level': drive.level.name, 'online': drive.online,
              'message': drive.advice, 'control': drive.control,
@@ -207,7 +207,7 @@ def _values(shown: Sequence[Shown]) -> dict[str, dict[str, Any]]:
 
 
 def _value(text: str) -> float | bool | str | None:
-    """Return a value that is shown as a number where it is one; None: there is none yet."""
+    """Return a shown value as a number where it is one; None: there is none yet."""
     if text in ('true', 'false'):
         return text == 'true'
     word = text.partition(' ')[0]       # behind it, the name of the value
@@ -219,7 +219,7 @@ def _value(text: str) -> float | bool | str | None:
 
 
 def line(drive: DriveSnapshot) -> str:
-    """Write ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or what is wrong."""
+    """Return ``conveyor online actual_speed=12.3 rpm motor_current=1.25 A``, or what is wrong."""
     if not drive.online:
         why = drive.advice.removeprefix('offline').lstrip(': ')
         return f'{drive.label} offline' + f' ({why})' * bool(why)
@@ -229,7 +229,7 @@ def line(drive: DriveSnapshot) -> str:
 
 
 def balance(snapshot: Snapshot) -> list[str]:
-    """Say of each drive how the exchange went."""
+    """Return a line for each drive on how its exchange went."""
     width = max((len(drive.label) for drive in snapshot.drives), default=0)
     return [f'{drive.label:{width}}  {_balance(drive)}' for drive in snapshot.drives]
 

@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Parameters as their descriptors tell of them, and values the way people read them."""
+"""Parameters by their descriptors, and values the way people read them."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,17 +12,17 @@ from drive_can_bridge.core.parameters import ParameterType, Value, ValueKind
 from drive_can_bridge.core.text import printable, taken_apart
 
 _DECIMALS_MAX = 6
-#: columns for a value of which nothing is known
+#: columns for an unknown value
 _WIDTH = 8
-#: what a drive says about its states is read in hexadecimal
+#: state words of a drive are read in hexadecimal
 _WORD_SUFFIX = 'word'
 _BOOLS = {'true': True, 'on': True, 'false': False, 'off': False}
 #: what the bridge uses a parameter for, and so writes itself
 _ROLES = {'cyclic': sentences.setpoint_of_bridge(), 'control': sentences.word_of_bridge(),
           'map': sentences.map_of_bridge()}
-#: names that say what a profile cannot: setpoints, those of CiA 402 (targets) too
+#: names that show what a profile cannot: setpoints, those of CiA 402 (targets) too
 _MOVING = re.compile(r'(setpoint|control_word)$|(^|_)target(_|$)')
-#: the second of them and so on; one that is stored is no setpoint, but says what such a one means
+#: the second of them and so on; one that is stored is no setpoint, but the preset of one
 _NUMBERED = re.compile(r'(setpoint|control_word)_?[0-9]+$')
 #: of an integer in a message, without its sign
 _BITS_MAX = 63
@@ -34,7 +34,7 @@ class ParameterInfo:
     """
     A parameter of a drive, by its descriptor.
 
-    :param minimum: smallest allowed value; None: not told.
+    :param minimum: smallest allowed value; None: unlimited.
     :param facts: of ``additional_constraints``: unit, number, type, scale, access, storage, role …
     """
 
@@ -48,27 +48,27 @@ class ParameterInfo:
 
     @property
     def unit(self) -> str:
-        """Unit of the value, or ''."""
+        """The unit of the value, or ''."""
         return self.facts.get('unit', '')
 
     @property
     def names(self) -> dict[int, str]:
-        """Names of values, of those that have one."""
+        """The names of values, of those that have one."""
         return dict(taken_apart(self.facts.get('values', '')))
 
     @property
     def bits(self) -> dict[str, int]:
-        """Numbers of bits, of those that have a name."""
+        """The numbers of bits, of those that have a name."""
         return {name: number for number, name in taken_apart(self.facts.get('bits', ''))}
 
     @property
     def readable(self) -> bool:
-        """Can be read by a service."""
+        """Whether a service can read it."""
         return self.facts.get('access') != 'wo'
 
     @property
     def address(self) -> str:
-        """Name the parameter as the drive's manual does: ``P30``, ``P613.5``, ``2004h.06h``."""
+        """The address as in the drive's manual: ``P30``, ``P613.5``, ``2004h.06h``."""
         number, index = self.facts.get('number'), self.facts.get('index', '')
         subindex = self.facts.get('subindex')
         if number:
@@ -80,14 +80,14 @@ class ParameterInfo:
 
     @property
     def range_text(self) -> str:
-        """What is allowed, ``-3000 … 3000``; '' where nothing is told."""
+        """The allowed range, ``-3000 … 3000``; '' where it is unknown."""
         if self.minimum is None or self.maximum is None:
             return ''
         return f'{self.minimum:.10g} … {self.maximum:.10g}'
 
     @property
     def width(self) -> int:
-        """Characters that the longest possible value takes: columns must not move."""
+        """The characters of the longest possible value: columns must not move."""
         if self.kind is ValueKind.BOOL:
             return len('false')
         kind = next((kind for kind in ParameterType if kind.value == self.facts.get('type')), None)
@@ -99,7 +99,7 @@ class ParameterInfo:
         return max(len(self.text(end * scale + offset)) for end in kind.raw_range)
 
     def text(self, value: Value) -> str:
-        """Write a value: as many decimals as it has, words in hexadecimal."""
+        """Return a value as text: as many decimals as it has, words in hexadecimal."""
         if isinstance(value, bool):
             return 'true' if value else 'false'
         if isinstance(value, int):
@@ -115,7 +115,7 @@ class ParameterInfo:
         return text.removeprefix('-') if not float(text) else text
 
     def assignment(self, value: Value) -> str:
-        """Write ``actual_speed=12.3 rpm``; integers as they are, for programs to read."""
+        """Return ``actual_speed=12.3 rpm``; integers as they are, for programs to read."""
         text = self.text(value)
         if isinstance(value, int) and not isinstance(value, bool):
             text = f'{value} {name}' if (name := self.names.get(value)) else str(value)
@@ -123,16 +123,16 @@ class ParameterInfo:
 
     def parse(self, text: str) -> Value:
         """
-        Read what a person has typed; whether it is allowed is for the bridge to say.
+        Return the value that a user has typed; the bridge decides whether it is allowed.
 
-        :raises ValueRefused: not a value of this kind; says what is.
+        :raises ValueRefused: not a value of this kind; with what is one.
         """
         word = text.strip()
         for number, name in self.names.items():
             if word in (name, f'{number} {name}'):
                 return number
         try:
-            # Python takes 1_5 for 15, and digits of all scripts
+            # Python reads 1_5 as 15, and digits of all scripts
             if '_' in word or not word.isascii():
                 raise ValueError(word)
             if self.kind is ValueKind.BOOL:
@@ -153,13 +153,13 @@ class ParameterInfo:
 
     @property
     def refusal(self) -> str:
-        """Say why a view does not write it: what moves a drive, or is protected; '' if it may."""
+        """Return why a view does not write it: it moves a drive, or is protected; '' if it may."""
         if self.read_only:
             return sentences.read_only()
         role = self.facts.get('role')
         if role is not None:
             return _ROLES.get(role, role)
-        if _MOVING.search(self.name) or (   # also while nobody maps it
+        if _MOVING.search(self.name) or (   # also while it is not mapped
                 self.facts.get('storage') != 'eeprom' and _NUMBERED.search(self.name)):
             return sentences.moves_the_drive()
         return sentences.protected() * (
@@ -174,7 +174,7 @@ class ParameterInfo:
 
     @property
     def _decimals(self) -> int | None:
-        """Digits behind the point that one raw step needs; None while the step is not known."""
+        """The digits behind the point that one raw step needs; None while the step is unknown."""
         step = abs(self._number('scale', 0.0))
         if not step:
             return None
@@ -193,7 +193,7 @@ TURN = 1.5
 
 
 class SamplingPlan:
-    """Chooses drives, anew for every turn."""
+    """Chooses the drives to be sampled, in turns."""
 
     def __init__(self, budget: float = BUDGET) -> None:
         self._budget = budget
@@ -207,7 +207,7 @@ class SamplingPlan:
         Return the drives to be sampled.
 
         :param rates: exchanges per second of all drives; 0 while unknown, or offline.
-        :param focus: drives that are looked at closely.
+        :param focus: the drives in focus.
         """
         known = {name for name in rates if name in focus}
         if now < self._turn_ends and known <= self._chosen <= rates.keys():
@@ -218,7 +218,7 @@ class SamplingPlan:
         names: Sequence[str] = [name for name in rates if name not in known]
         for _ in names:
             name = names[self._next % len(names)]
-            # one in turn at least, or nobody ever would be
+            # one in turn at least, or none ever would be
             if rates[name] > left and len(chosen) > len(known):
                 break
             left -= rates[name]

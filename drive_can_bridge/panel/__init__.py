@@ -2,11 +2,11 @@
 """
 The drives in a browser: pages on the model of :mod:`drive_can_bridge.monitor`.
 
-:mod:`.access` decides who may come in, for every request and every WebSocket. What reaches a drive
+:mod:`.access` checks every request and every WebSocket. What reaches a drive
 is a POST to one of :mod:`.actions`, where the role counts; pages and their WebSocket only show.
 """
 
 import sys
 
-# The web framework would load it for a client of Socket.IO, which nobody is here: 9 MB.
+# The web framework would load it for a client of Socket.IO, of which there is none: 9 MB.
 sys.modules.setdefault('aiohttp', None)  # type: ignore[arg-type]

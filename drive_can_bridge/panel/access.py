@@ -1,11 +1,11 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-Who may come in: token, Host and Origin of a request, judged without any input or output.
+Access to the panel: token, Host and Origin of a request, checked without any input or output.
 
-*Host* keeps out DNS rebinding: a page whose name suddenly leads to this machine still says its own
-name. *Origin* and *Sec-Fetch-Site* keep out what other pages of the same browser send with the
-user's cookie. The *token* says who may look, and who may act. The ASGI middleware lets nothing in
-but by these.
+*Host* keeps out DNS rebinding: a page whose name suddenly leads to this machine still sends its
+own name. *Origin* and *Sec-Fetch-Site* keep out what other pages of the same browser send with the
+user's cookie. The *token* decides who may look, and who may act. The ASGI middleware lets nothing
+in but by these.
 """
 
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.monitor.snapshot import StopAction
 
-#: with colours as in panel.css, which who is not let in does not get
+#: with colours as in panel.css, which refused requests do not get
 _PAGE = Template((Path(__file__).parent / 'static' / 'refused.html').read_text(encoding='utf-8'))
 
 
@@ -45,7 +45,7 @@ TOKEN = 'token'
 
 
 class PanelRole(Enum):
-    """What somebody may do."""
+    """The roles of users."""
 
     VIEWER = 'viewer'
     OPERATOR = 'operator'
@@ -54,10 +54,10 @@ class PanelRole(Enum):
 @dataclass(frozen=True, slots=True)
 class AccessRefusal:
     """
-    Nobody comes in.
+    A refused request.
 
     :param status: of HTTP.
-    :param reason: in words, for a person.
+    :param reason: in words, for people.
     """
 
     status: int
@@ -67,7 +67,7 @@ class AccessRefusal:
 @dataclass(frozen=True, slots=True)
 class Entry:
     """
-    Somebody comes in.
+    An accepted request.
 
     :param cookie: to be set: the token came with the address.
     """
@@ -97,7 +97,7 @@ class PanelAccess:
     def judge(self, scope_type: str, method: str, headers: Iterable[tuple[bytes, bytes]],
               query: bytes) -> Entry | AccessRefusal:
         """
-        Decide about a request.
+        Check a request; return its role, or a refusal.
 
         :param scope_type: ``http`` or ``websocket``.
         :param headers: as ASGI has them, names in lower case.
@@ -120,7 +120,7 @@ class PanelAccess:
                      query: bytes) -> Entry | AccessRefusal:
         given = parse_qs(query.decode('latin-1'), keep_blank_values=True).get(TOKEN, [])
         if given and scope_type == 'http' and method == 'GET':
-            # who shows a token wants to be who it says, whatever cookie there is
+            # a shown token decides the role, whatever cookie there is
             role = self._role(given[0])
             if role is not None:
                 return Entry(role, f'{self.cookie_name}={given[0]}; HttpOnly; SameSite=Strict; '
@@ -143,7 +143,7 @@ class PanelAccess:
 def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
                   ) -> AccessRefusal | None:
     origins, host = fields.get('origin', []), fields['host'][0].lower()
-    # https: behind somebody who adds TLS
+    # https: behind a proxy that adds TLS
     if len(origins) > 1 or origins and origins[0].lower() not in (
             f'http://{host}', f'https://{host}'):
         return AccessRefusal(403, command_sentences.panel_other_origin())
@@ -158,7 +158,7 @@ def _judge_origin(fields: Mapping[str, list[str]], scope_type: str, method: str,
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether nobody but this machine reaches an address to listen on."""
+    """Return whether an address to listen on is reached from this machine only."""
     address = _address(host.strip('[]'))
     return address.is_loopback if address else host.lower() == 'localhost'
 
@@ -173,7 +173,7 @@ def _host_name(host: str) -> str:
 
 
 def _host_address(name: str) -> _Address | None:
-    """Return the address that a Host is; None where it is a name, which may lead elsewhere."""
+    """Return the address in a Host; None where it is a name, which may lead elsewhere."""
     bracketed = name.startswith('[') and name.endswith(']')
     address = _address(name[1:-1] if bracketed else name)
     return address if address and bracketed == (address.version == 6) else None
@@ -206,8 +206,8 @@ _STOPS = frozenset(f'/do/{stop.value}' for stop in StopAction)
 #: bytes that a request may carry: a backup has some tens of thousands
 BODY_MAX = 1_000_000
 
-#: The pages load nothing from elsewhere, talk to nobody else, and stand in nobody's frame: a stop
-#: must not be clicked in somebody else's disguise, nor a drive's name become a script's address.
+#: The pages load nothing from elsewhere, talk to no other host, and are in no other frame: a stop
+#: must not be clicked in disguise, nor a drive's name become a script's address.
 _HEADERS = [
     (b'content-security-policy',
      b"default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
@@ -227,7 +227,7 @@ class Gate:
     """
     The middleware.
 
-    :param app: sees only those who may come in; their role is ``scope[ROLE]``.
+    :param app: gets accepted requests only; their role is ``scope[ROLE]``.
     """
 
     def __init__(self, app: ASGIApp, access: PanelAccess) -> None:
@@ -235,7 +235,7 @@ class Gate:
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let somebody in, or not."""
+        """Pass an accepted request on, or refuse it."""
         if scope['type'] == 'lifespan':
             await self.app(scope, receive, send)
             return
@@ -257,14 +257,14 @@ class Gate:
 
 
 def _enters(scope: Scope, entry: Entry) -> bool:
-    """Let a connection in; False: all places are taken."""
+    """Admit a connection; return False: all places are taken."""
     enter = scope.get(ENTER)    # a WebSocket has come in before it became one
     return enter is None or enter(
         entry.role, stop=entry.role is PanelRole.OPERATOR and scope['path'] in _STOPS)
 
 
 def _limited(receive: Receive) -> Receive:
-    """Return a receive that takes no more than a body may have, whatever was declared."""
+    """Return a receive that accepts no more than a body may have, whatever was declared."""
     taken = 0
 
     async def limited() -> Message:
@@ -290,7 +290,7 @@ def _dressed(send: Send, cookie: str | None) -> Send:
 
 
 async def _refuse(refusal: AccessRefusal, scope: Scope, send: Send) -> None:
-    """Say no, in words."""
+    """Send a refusal, in words."""
     websocket = scope['type'] == 'websocket'
     if websocket and 'websocket.http.response' not in scope.get('extensions', {}):
         await send({'type': 'websocket.close', 'code': 1008})  # becomes a 403

@@ -1,12 +1,12 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What a browser may ask for: each a request of its own, whose role the gate has found.
+The actions of a browser: each a request of its own, whose role the gate has found.
 
 None of it moves a drive. Answers are JSON, ``{"success": bool, "text": words}`` at least; a stop
 of all gets ``failed``, a line for each drive that does not stand, which ``text`` begins with.
 
 Backups are made by ``drive_can backup``, ``compare``, ``restore``, each in a process of its own,
-through the running bridge: one way of doing it, with the same rules and words.
+through the running bridge: one implementation, with the same rules and texts.
 """
 
 import asyncio
@@ -45,13 +45,13 @@ _BUSY = command_sentences.panel_busy()
 
 @dataclass(frozen=True, slots=True)
 class Done(OperationOutcome):
-    """What a command has done: ``file`` is what it wrote."""
+    """The outcome of a command: ``file`` is what it wrote."""
 
     file: bytes = b''
 
 
 def _for_a_browser(text: str) -> str:
-    """Say where options can be given that a command speaks of."""
+    """Return a command's text with a remark on where its options can be given."""
     options = dict.fromkeys(_OPTION.findall(text))
     where = (f'{", ".join(options)}: of the command drive_can in a terminal; there is no such '
              'thing here')
@@ -59,7 +59,7 @@ def _for_a_browser(text: str) -> str:
 
 
 async def _command(arguments: Sequence[str], directory: str) -> tuple[int, str]:
-    """Run ``drive_can`` and return its exit code and what it said."""
+    """Run ``drive_can``; return its exit code and output."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, '-m', 'drive_can_bridge.cli.main', *arguments,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
@@ -84,7 +84,7 @@ async def _command(arguments: Sequence[str], directory: str) -> tuple[int, str]:
 
 
 def _ask_to_end(process: asyncio.subprocess.Process) -> None:
-    """Ask: a restore has the drive leave its mode first, and says what was written."""
+    """Ask it to end: a restore leaves the drive's mode first, and prints what was written."""
     with suppress(ProcessLookupError):
         process.terminate()
 
@@ -94,7 +94,7 @@ NO_WRITES = command_sentences.panel_without_writes()
 
 
 class _Refused(Exception):
-    """A request that cannot be obeyed."""
+    """A request that cannot be carried out."""
 
     def __init__(self, status: int, reason: str) -> None:
         super().__init__(reason)
@@ -105,7 +105,7 @@ class Actions:
     """
     The requests.
 
-    :param allow_writes: parameters may be written and backups restored, by an operator.
+    :param allow_writes: operators may write parameters and restore backups.
     """
 
     def __init__(self, feed: Feed, *, allow_writes: bool) -> None:
@@ -114,7 +114,7 @@ class Actions:
         self._running = 0
 
     def routes(self) -> list[Route]:
-        """Return what the web server offers."""
+        """Return the routes of the web server."""
         found = [Route(f'/do/{stop.value}', self._stopping(stop), methods=['POST'])
                  for stop in StopAction]
         found += [Route(f'/do/{name}', _answering(action), methods=['POST'])
@@ -132,7 +132,7 @@ class Actions:
         return _answering(action)
 
     async def _stop_all(self) -> Response:
-        """Stop all drives at once; say first which do not stand."""
+        """Stop all drives at once; answer with those first that do not stand."""
         told = await self._feed.stop_all()
         failed = [f'{name[1:]}: {outcome.text or "not stopped"}'
                   for name, outcome in told if not outcome.success]
@@ -162,7 +162,7 @@ class Actions:
         except ValueRefused as error:
             return _said(OperationOutcome(False, str(error)))
         outcome = await self._feed.write(drive.name, info.name, value)
-        # what the drive has now, whatever has become of it
+        # the drive's present settings, whatever the outcome
         if info.readable:
             await self._feed.read(drive.name, [info.name])
         return _said(outcome)
@@ -196,7 +196,7 @@ class Actions:
         """
         Run a command on a backup, a few at once.
 
-        :param arguments: makes them of the name of the drive and the file of the backup.
+        :param arguments: returns them for the name of the drive and the file of the backup.
         :param backup: that was sent; None: the command makes it.
         :param fine: exit codes that are no failure.
         """
@@ -238,7 +238,7 @@ def _operator(request: Request, what: str) -> None:
 
 
 def _of_type(request: Request, kind: str) -> None:
-    # a form of another page could not say this without being asked about
+    # a form of another page could not send this without a question to the user
     if request.headers.get('content-type', '').partition(';')[0] != kind:
         raise _Refused(415, command_sentences.panel_wrong_kind(kind=kind))
 

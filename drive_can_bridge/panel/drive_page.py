@@ -34,10 +34,10 @@ _AT_MOST = 8
 
 class Chart:
     """
-    A chart, with what chooses and what holds it.
+    A chart, with the choice of its values.
 
-    :param view: which drives it shows is told to it.
-    :param drive: whose values it shows at first.
+    :param view: gets the drives that it shows.
+    :param drive: the drive whose values it shows at first.
     """
 
     def __init__(self, view: View, drive: DriveSnapshot) -> None:
@@ -88,7 +88,7 @@ class Chart:
                 f'panel.plot({self._chart.id}, {round(1e3 * snapshot.at)}, {json.dumps(series)})')
 
     def _offer(self, found: dict[str, tuple[DriveSnapshot, Shown]]) -> None:
-        """Keep the list of what there is; it grows while drives appear."""
+        """Update the list of values to choose from; it grows while drives appear."""
         missing = [name for name in found if name not in self._options]
         if missing:
             self._options += missing
@@ -96,7 +96,7 @@ class Chart:
         if not self._chosen_once:
             own = [name for name, (drive, shown) in found.items()
                    if drive.name == self._own and shown.unit]
-            # what is measured first: a setpoint alone tells little
+            # measured values first: a setpoint alone shows little
             own.sort(key=lambda name: found[name][1] in found[name][0].setpoints)
             if own:
                 self._chosen_once = True
@@ -140,7 +140,7 @@ class ParameterTable:
                     ui.label(text)
 
     def look(self, wanted: bool) -> None:
-        """Somebody looks at it now, or no more: what is seen is read."""
+        """Set whether the table is open: then its values are read."""
         if wanted and not self._looked_at:
             self._read_again()
         self._looked_at = wanted
@@ -224,12 +224,12 @@ class _ParameterRow:
                 else:
                     self._label = words('…' if info.readable else 'cannot be read', 'number')
             words(_limits(info), 'small number')
-            # its end says once more what stands on the left
+            # its end repeats what stands on the left
             words(info.description.partition(f' ({info.address}')[0], 'small')
             box('answer')
 
     def show(self, drive: DriveSnapshot) -> None:
-        """Show what was read; what somebody types is left alone, and that stands beside it."""
+        """Show a reading; a field that is being edited stays, with the reading beside it."""
         reading = drive.readings.get(self._info.name)
         if reading is None or reading.text == self._text:
             return
@@ -245,7 +245,7 @@ class _ParameterRow:
             self._now.set_text(f'now {text}')
 
     def _same(self, text: str) -> bool:
-        """Return whether what is typed is what was read."""
+        """Return whether the typed text is the value that was read."""
         try:
             return self._info.parse(self._field.value) == self._info.parse(text)
         except (ValueRefused, AttributeError):  # empty, or nothing that a browser would send
@@ -275,7 +275,7 @@ class DrivePage:
     The page of one drive.
 
     :param name: full name of its node.
-    :param allow_writes: parameters may be written by an operator.
+    :param allow_writes: operators may write parameters.
     """
 
     def __init__(self, feed: Feed, name: str, role: PanelRole, *, allow_writes: bool) -> None:
@@ -382,7 +382,7 @@ class _PageContent:
 
 def _make_lamps(words_of: tuple[tuple[str, tuple[tuple[int | None, str, bool], ...]], ...],
                 ) -> list[Look]:
-    """Make a lamp for each bit, in their order; those without a meaning are folded."""
+    """Create a lamp for each bit, in their order; those without a meaning are folded."""
     looks: list[Look] = []
     for parameter, bits in words_of:
         if parameter:
@@ -410,7 +410,7 @@ def _make_facts(names: tuple[str, ...]) -> list[ui.label]:
 
 
 def _facts(drive: DriveSnapshot) -> Mapping[str, str]:
-    """Return everything that diagnostics say, times together."""
+    """Return everything in diagnostics, times together."""
     told = {key: text for key, text in drive.facts.items()
             if not key.startswith(('period_error_', 'latency_'))}
     return {**told, 'period_error': _times(drive.period_error), 'latency': _times(drive.latency)}

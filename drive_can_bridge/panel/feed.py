@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The heartbeat of the panel: one model for all browsers, looked at a few times a second.
+The feed of the panel: one model for all browsers, polled a few times a second.
 
 Everything happens in the thread of the web server, between two of its requests: no locks.
 """
@@ -17,7 +17,7 @@ from drive_can_bridge.monitor.model import CONTROL_STATE, Model
 from drive_can_bridge.monitor.snapshot import (
     DriveSnapshot, ModelSource, OperationOutcome, Operations, Snapshot, StopAction)
 
-#: s between two looks, and while somebody waits for an answer
+#: s between two polls, and while an answer is awaited
 PERIOD = 0.5
 _WAITING_PERIOD = 0.02
 #: between two samples of what a chart may show
@@ -42,9 +42,9 @@ class View:
 
 class Feed:
     """
-    Looks, and lets pages show it.
+    Polls the model, and updates the pages.
 
-    :param model: what ``source`` fills.
+    :param model: filled by ``source``.
     """
 
     def __init__(self, source: ModelSource, operations: Operations, model: Model,
@@ -59,7 +59,7 @@ class Feed:
         self.snapshot = Snapshot()
 
     async def run(self) -> None:
-        """Look for ever."""
+        """Poll for ever."""
         while True:
             pause = PERIOD
             try:
@@ -104,28 +104,28 @@ class Feed:
                 _LOG.error('a page was given up: %s: %s', type(error).__name__, error)
 
     def show(self, view: View) -> None:
-        """Let a page take part, at once."""
+        """Update a page from now on, and at once."""
         self._views.add(view)
         self._wake.set()
 
     def hide(self, view: View) -> None:
-        """Leave a page alone from now on."""
+        """Stop updating a page."""
         self._views.discard(view)
 
-    # -- for those who act ------------------------------------------------------------------------
+    # -- operations -------------------------------------------------------------------------------
 
     def drive(self, name: str) -> DriveSnapshot | None:
         """Return a drive by its full name."""
         return self.snapshot.drive(name)
 
     async def stop(self, drive: DriveSnapshot, stop: StopAction) -> OperationOutcome:
-        """Stop a drive; return what became of it."""
+        """Stop a drive; return the outcome."""
         if stop not in stops(drive):
             return OperationOutcome(False, command_sentences.no_word_to_disable())
         return await self._stop(drive.name, stop)
 
     async def stop_all(self) -> list[tuple[str, OperationOutcome]]:
-        """Stop all drives at once, whether their bridges tell of them or not; by full name."""
+        """Stop all drives at once, whether their bridges report them or not; by full name."""
         names = [*(drive.name for drive in self.snapshot.drives), *self.snapshot.unheard]
         outcomes = await asyncio.gather(*(self._stop(name,
                                                      StopAction.QUICK_STOP) for name in names))
@@ -136,7 +136,7 @@ class Feed:
             drive, stop, done, self._clock.now()))
 
     async def write(self, drive: str, name: str, value: Value) -> OperationOutcome:
-        """Write a parameter; return what became of it."""
+        """Write a parameter; return the outcome."""
         return await self._told(lambda done: self._operations.write(
             drive, name, value, done, self._clock.now()))
 
@@ -160,5 +160,5 @@ class Feed:
 
 
 def stops(drive: DriveSnapshot) -> tuple[StopAction, ...]:
-    """Return what stops a drive: quick stop each of them, disable one with a control word."""
+    """Return the stop actions of a drive: quick stop each, disable those with a control word."""
     return tuple(StopAction) if CONTROL_STATE in drive.facts else (StopAction.QUICK_STOP,)

@@ -46,9 +46,9 @@ _LINES = 100
 
 class Overview:
     """
-    The page.
+    The overview page.
 
-    :param place: where bridges are looked for, in words.
+    :param place: where bridges are searched for, in words.
     """
 
     def __init__(self, role: PanelRole, place: str) -> None:
@@ -82,7 +82,7 @@ class Overview:
         for label, (_, state, count) in zip(
                 self._counts.of(tuple((tone, state) for tone, state, _ in found)), found):
             label.set_text(f'{count} {state}')
-        # what concerns one drive stands in its card
+        # the rest of one drive stands in its card
         told = [trouble for trouble in troubles(snapshot)
                 if trouble.drives and (many or len(trouble.drives) > 1)]
         self._troubles.of(tuple(told))
@@ -193,13 +193,13 @@ class _DriveRow:
 
     def show(self, drive: DriveSnapshot, place: int, told_of: str, *, hidden: bool) -> None:
         self._look.set(f'{class_of(tone_of(drive))}{" hidden-now" if hidden else ""}')
-        if place != self._order:    # no row is made anew: somebody may be about to click
+        if place != self._order:    # no row is created again: a user may be about to click
             self._order = place
             self._element.style(f'order: {place}')
         self._state.set_text(drive.state or 'unknown')
         for label, arrow, shown in zip(self._values, ('→ ', ''), (drive.setpoints, drive.values)):
             label.set_text(arrow + _value(principal(shown)) if shown else '')
-        # what others of these have is said above all of them; why one is grey stands with it
+        # what several of these have is shown above all of them; why one is grey stands with it
         self._grey.set('why' if drive.silent else '')
         self._place.set_text(told_of if drive.silent else place_in_words(drive))
 
@@ -209,7 +209,7 @@ def _value(shown: Shown | None) -> str:
 
 
 class LogPage:
-    """The page."""
+    """The page of the log."""
 
     def __init__(self) -> None:
         with box('section'):
@@ -278,7 +278,7 @@ class LogPage:
 
 
 def _overlap(known: Sequence[LogLine], lines: Sequence[LogLine]) -> int:
-    """Return how many of the lines are the last ones that are known."""
+    """Return how many of the lines are the last known ones."""
     for count in range(min(len(known), len(lines)), 0, -1):
         if known[-count:] == list(lines[:count]):
             return count
@@ -300,22 +300,22 @@ _HEAD = ''.join((
     f'<script src="/panel/panel.js?{__version__}"></script>'))
 _TITLE = 'drive_can panel'
 _PAGES = {'/': 'Drives', '/log': 'Log'}
-#: what the button does, said beside it
+#: the effect of the button, shown beside it
 _STOP_ALL = ('Quick stop of every drive; one that has none is disabled, one without a control '
              'word gets neutral setpoints')
 #: pages at once for each role, so that viewers do not keep operators out: each takes memory until
-#: its browser has gone for a while
+#: its browser was gone for a while
 PAGES_MAX = 20
 
 
 @dataclass(frozen=True)
 class PanelSetting:
     """
-    What holds for the whole panel.
+    The settings of the whole panel.
 
-    :param place: where bridges are looked for, in words.
-    :param robot: which one this is: host and domain.
-    :param allow_writes: parameters may be written and backups restored.
+    :param place: where bridges are searched for, in words.
+    :param robot: host and domain.
+    :param allow_writes: operators may write parameters and restore backups.
     """
 
     place: str
@@ -324,7 +324,7 @@ class PanelSetting:
 
 
 def application(feed: Feed, access: PanelAccess, setting: PanelSetting) -> ASGIApp:
-    """Make the web application; it runs the feed."""
+    """Return the web application; it runs the feed."""
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         task = asyncio.create_task(feed.run())
@@ -375,19 +375,19 @@ def _full(role: PanelRole) -> bool:
 
 
 async def _nothing(request: Request, _: Exception) -> Response:
-    """Say that there is no such page; the web framework would make one, for anybody."""
+    """Answer that there is no such page; the web framework would create one."""
     return _said(request, 404, 'there is nothing at this address')
 
 
 def _said(request: Request, status: int, reason: str) -> Response:
-    """Say why there is no page: in one, to a browser."""
+    """Answer why there is no page: with a page, for a browser."""
     if 'text/html' in request.headers.get('accept', ''):
         return HTMLResponse(plain_page(status, reason), status)
     return PlainTextResponse(f'{reason}\n', status)
 
 
 def _frame(here: str, role: PanelRole, setting: PanelSetting) -> tuple[Element, Banner]:
-    """Make what all pages have; return where the page goes, and what stands above it."""
+    """Create the frame of all pages; return the container of the page, and the banner."""
     ui.add_head_html(_HEAD)
     with box('bar'):
         words('drive_can', 'brand')
@@ -405,7 +405,7 @@ def _frame(here: str, role: PanelRole, setting: PanelSetting) -> tuple[Element, 
 
 
 def _live(feed: Feed, view: View, banner: Banner) -> None:
-    """Show what is known, and all that follows while the page is looked at."""
+    """Keep a page updated while it is open."""
     update = view.update
 
     def both(snapshot: Snapshot) -> None:

@@ -2,7 +2,7 @@
 """
 Small pieces of pages. What has not changed is not sent: nothing flickers, little is spent.
 
-Text goes in as text, never as HTML: descriptions and log lines come from anybody.
+Text is inserted as text, never as HTML: descriptions and log lines come from any node.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,23 +24,23 @@ _STOPS = {StopAction.QUICK_STOP: 'Quick stop', StopAction.DISABLE: 'Disable'}
 
 
 def box(classes: str = '', tag: str = 'div') -> Element:
-    """Make a container."""
+    """Create a container."""
     return ui.element(tag).classes(classes)
 
 
 def marked(element: Element, **marks: str) -> Element:
-    """Give an element ``data-`` attributes; not by ``props``, which would read what is in them."""
+    """Add ``data-`` attributes to an element; not by ``props``, which would parse their values."""
     element.props.update({f'data-{name}': text for name, text in marks.items()})
     return element
 
 
 def words(text: str = '', classes: str = '') -> ui.label:
-    """Make a piece of text."""
+    """Create a text element."""
     return ui.label(text).classes(classes)
 
 
 class Look:
-    """What an element looks like: its classes, sent on change only."""
+    """The classes of an element, sent on change only."""
 
     def __init__(self, element: Element, base: str) -> None:
         self._element = element
@@ -48,7 +48,7 @@ class Look:
         self._now = ''
 
     def set(self, more: str) -> None:
-        """Add classes to those it always has, in place of what was added before."""
+        """Replace the classes added before."""
         if more != self._now:
             self._now = more
             self._element.classes(replace=f'{self._base} {more}')
@@ -56,9 +56,9 @@ class Look:
 
 class Changing:
     """
-    A container whose content is made anew when what it is made of changes.
+    A container whose content is created again when its key changes.
 
-    :param make: makes the content from the key and returns what updates it.
+    :param make: creates the content for the key, and returns the function that updates it.
     """
 
     def __init__(self, container: Element, make: Callable[[Any], Any]) -> None:
@@ -84,7 +84,7 @@ def class_of(what: Level | Tone) -> str:
 
 def button(text: str, classes: str, script: str) -> Element:
     """
-    Make a button that does something in the browser.
+    Create a button that runs a script in the browser.
 
     :param script: JavaScript; ``button`` is the button. Quote what is inserted by
         :func:`in_script`.
@@ -97,15 +97,15 @@ def button(text: str, classes: str, script: str) -> Element:
 
 
 def in_script(value: Any) -> str:
-    """Write a value into a script."""
+    """Return a value as JavaScript."""
     return json.dumps(value).replace('<', '\\u003c')
 
 
 def stop_buttons(drive: DriveSnapshot, role: PanelRole) -> None:
     """
-    Make the buttons that stop a drive, those that it has, for an operator.
+    Create the stop buttons of a drive, for an operator.
 
-    They are never off: its bridge may only seem to be silent, and what does not arrive is said.
+    They are never disabled: its bridge may only seem to be silent, and a failure is shown.
     """
     if role is PanelRole.OPERATOR:
         with box('stops'):
@@ -115,19 +115,19 @@ def stop_buttons(drive: DriveSnapshot, role: PanelRole) -> None:
 
 
 class Banner:
-    """What is said above every page, once."""
+    """The banner above every page."""
 
     def __init__(self) -> None:
         self._lines = Changing(box('banners'), lambda lines: [
             words(line, 'banner') for line in lines])
 
     def show(self, snapshot: Snapshot) -> None:
-        """Say which bridges are silent."""
+        """Show which bridges are silent."""
         self._lines.of(tuple(silence(snapshot, clock)))
 
 
 def advice(drive: DriveSnapshot, snapshot: Snapshot) -> str:
-    """Say what to do about a drive, or why it is grey; '' where it is well."""
+    """Return what to do about a drive, or why it is grey; '' where it is well."""
     if drive.silent:
         ago = next((bridge.silent for bridge in snapshot.bridges if bridge.name == drive.bridge),
                    0.0)
@@ -136,7 +136,7 @@ def advice(drive: DriveSnapshot, snapshot: Snapshot) -> str:
 
 
 def clock(at: float) -> str:
-    """Write the time of day, where the panel runs."""
+    """Return the time of day, where the panel runs."""
     return time.strftime('%H:%M:%S', time.localtime(at))
 
 
@@ -164,7 +164,7 @@ def _make_values(key: tuple[Any, ...]) -> Sequence[ui.label]:
 
 
 def place_in_words(drive: DriveSnapshot) -> str:
-    """Say where a drive is."""
+    """Return where a drive is."""
     place = drive.place
     parts = [f'bus {place.bus}' if place.bus else '',
              f'station {place.station}' if place.station else '', place.protocol,
@@ -174,5 +174,5 @@ def place_in_words(drive: DriveSnapshot) -> str:
 
 
 def series_name(drive: DriveSnapshot, shown: Shown) -> str:
-    """Name a value among those of all drives."""
+    """Return the name of a value among those of all drives."""
     return f'{drive.label}.{shown.name}'

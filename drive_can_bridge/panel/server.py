@@ -42,7 +42,7 @@ _LOOK_PERIOD = 0.1
 #: lines on standard error in so many s
 _LINES_MAX, _WHILE = 10, 60.0
 _GRACE = 1
-#: who logs in a server, and from which level on it is said
+#: loggers of a server, and the level from which on their lines are written
 LOGGERS = {'uvicorn': logging.CRITICAL, 'nicegui': logging.ERROR,
            'drive_can_panel': logging.ERROR, 'asyncio': logging.ERROR,
            'engineio.server': logging.CRITICAL, 'socketio.server': logging.CRITICAL}
@@ -56,10 +56,10 @@ _SHOWN_OUT = ('HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n'
 
 class Connection(H11Protocol):
     """
-    A connection. It stands outside until the gate has found its token.
+    A connection. It counts as outside until the gate has found its token.
 
-    Where there are too many outside, the one that has stood there longest has to leave, so that
-    those who say nothing keep nobody from being heard. Inside there is a limit, but not for stops.
+    Where there are too many outside, the oldest is closed, so that
+    silent ones keep no others out. Inside there is a limit, but not for stops.
 
     :param outside: those that have shown no token yet, the oldest first; of all connections.
     """
@@ -94,7 +94,7 @@ class Connection(H11Protocol):
             super().data_received(data)
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        # a WebSocket is no connection of this kind any more when the gate hears of it
+        # a WebSocket is no connection of this kind any more when the gate gets it
         entry = self._access.judge('websocket', 'GET', self.headers, b'')
         role = entry.role if isinstance(entry, Entry) else PanelRole.VIEWER
         if not self.enter(role, stop=False):
@@ -104,7 +104,7 @@ class Connection(H11Protocol):
 
     def enter(self, role: PanelRole, *, stop: bool) -> bool:
         """
-        Come in.
+        Move the connection inside.
 
         :param stop: a drive is to be stopped: there is always a place.
         :return: False: all places are taken.
@@ -117,7 +117,7 @@ class Connection(H11Protocol):
         return True
 
     def show_out(self) -> None:
-        """Close it, in words."""
+        """Close it, with the reason."""
         self._outside.pop(self, None)
         self.connections.discard(self)
         self.transport.write(_SHOWN_OUT)
@@ -142,20 +142,20 @@ class _Server(uvicorn.Server):
 
 
 class _OneLine(logging.Formatter):
-    """No traceback reaches a user, nor anything that a terminal would obey: browsers say it."""
+    """Formats errors in one line, without tracebacks and control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
         text = record.getMessage()
         if record.exc_info and record.exc_info[1] is not None:
             error = record.exc_info[1]
             said = f'{type(error).__name__}: {error}'
-            # asyncio tells of its tasks besides
+            # asyncio lists its tasks besides
             text = said if record.name == 'asyncio' else f'{text} ({said})'
         return f'drive_can panel: {printable(" ".join(text.split()))}'
 
 
 class _NotMany(logging.Filter):
-    """Nobody fills standard error: so many lines in a while, and how many there were besides."""
+    """Limits the lines on standard error: so many in a while, then the number of the others."""
 
     def __init__(self, clock: Clock) -> None:
         super().__init__()
@@ -199,7 +199,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def log_to_standard_error(clock: Clock) -> None:
-    """Have what goes wrong in a server said there: in a line each, and not in many."""
+    """Log the errors of a server to standard error: in a line each, and not many."""
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
     handler.addFilter(_NotMany(clock))
@@ -214,9 +214,9 @@ def serve(app: ASGIApp, listener: socket.socket, access: PanelAccess, clock: Clo
     """
     Serve until the end; then the port is closed, however far this had come.
 
-    :param access: as behind ``app``; here it tells whose place a WebSocket takes.
-    :param ended: tells whether this is to end.
-    :param ready: is told when the first request can come, unless it is to end by then.
+    :param access: as behind ``app``; here it decides whose place a WebSocket takes.
+    :param ended: returns whether to end.
+    :param ready: called when the first request can come, unless it is to end by then.
     """
     _make_room()
     log_to_standard_error(clock)
@@ -243,7 +243,7 @@ def serve(app: ASGIApp, listener: socket.socket, access: PanelAccess, clock: Clo
 
 
 def _make_room() -> None:
-    """Let connections not use up the file descriptors."""
+    """Raise the limit of file descriptors for connections."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:

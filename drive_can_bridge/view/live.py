@@ -1,13 +1,13 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-The live view: whole pages, as large as the terminal, and the loop that looks, draws and listens.
+The live view: whole pages, as large as the terminal, and the loop of polls, drawing and keys.
 
-A page has a header, all drives or one in detail, the keys. Every part is told how many lines it
-may have. Drives come first; then what is not well, the buses, and as much of the log as there is
+A page has a header, all drives or one in detail, the keys. Every part is given how many lines it
+may have. Drives come first; then problems, the buses, and as much of the log as there is
 room for.
 
-Ctrl-Z gives the terminal back until the process is continued, unless somebody else looks after
-SIGTSTP. A terminal that takes nothing (Ctrl-S) is drawn on when it does again.
+Ctrl-Z gives the terminal back until the process is continued, unless another part handles
+SIGTSTP. A terminal that accepts nothing (Ctrl-S) is drawn on when it does again.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,7 +40,7 @@ from drive_can_bridge.view.parts import (
 
 
 class Page(Enum):
-    """What is shown."""
+    """The pages."""
 
     DRIVES = 'drives'
     DRIVE = 'drive'
@@ -48,7 +48,7 @@ class Page(Enum):
 
 
 class Key(Enum):
-    """A key that means something."""
+    """The keys with a meaning."""
 
     UP = 'up'
     DOWN = 'down'
@@ -77,7 +77,7 @@ HINTS: dict[Page, tuple[tuple[str, str], ...]] = {
 
 
 def keys_in(text: str) -> list[Key]:
-    """Return the keys in what was typed; what means nothing is left out."""
+    """Return the keys in what was typed; keys without a meaning are left out."""
     found = []
     while text:
         for length in range(min(_LONGEST, len(text)), 0, -1):
@@ -92,7 +92,7 @@ def keys_in(text: str) -> list[Key]:
 
 
 def _unknown(text: str) -> int:
-    """Return how long an escape sequence is that nobody here knows; 0: it is none."""
+    """Return the length of an unknown escape sequence; 0: it is none."""
     if text[:2] not in ('\x1b[', '\x1bO'):
         return 0
     end = next((place for place in range(2, len(text)) if '@' <= text[place] <= '~'), None)
@@ -111,13 +111,13 @@ class Choice:
     drive: str | None = None
 
     def among(self, drives: Sequence[str]) -> 'Choice':
-        """Return the same for these drives: one that has gone cannot be chosen."""
+        """Return the same for these drives: one that is gone cannot be chosen."""
         if self.drive in drives or (self.drive is None and not drives):
             return self
         return replace(self, drive=drives[0] if drives else None)
 
     def press(self, key: Key, drives: Sequence[str]) -> 'Choice':
-        """Return what is chosen after a key."""
+        """Return the choice after a key."""
         if key in (Key.UP, Key.DOWN):
             if self.drive not in drives:
                 return self.among(drives)
@@ -139,7 +139,7 @@ _BAD = ('error', 'failed', 'refused', 'rejected')
 
 
 def identity_lines(drive: DriveSnapshot, width: int) -> Lines:
-    """Say who it is, how it is, where, and what to do."""
+    """Return lines with a drive's name, state, place, and what to do."""
     place = drive.place
     words = [Text(drive.name, style='bold'), state(drive)]
     if drive.control:
@@ -157,7 +157,7 @@ def identity_lines(drive: DriveSnapshot, width: int) -> Lines:
 
 
 def value_lines(drive: DriveSnapshot, width: int) -> Lines:
-    """Write setpoints and actual values with their trends."""
+    """Return setpoints and actual values with their trends."""
     columns = ValueColumns([*drive.setpoints, *drive.values])
     trend = min(_TREND_MAX, width - columns.width - 2)
     trend = trend if trend >= 8 else 0
@@ -170,7 +170,7 @@ def value_lines(drive: DriveSnapshot, width: int) -> Lines:
 
 
 def bit_lines(drive: DriveSnapshot, width: int) -> Lines:
-    """Write the bits of all words."""
+    """Return the bits of all words."""
     several = len(drive.bits) > 1
     lines: Lines = []
     for parameter in drive.bits:
@@ -181,7 +181,7 @@ def bit_lines(drive: DriveSnapshot, width: int) -> Lines:
 
 
 def exchange_lines(drive: DriveSnapshot, width: int) -> Lines:
-    """Write how the exchange goes, and all else that diagnostics say."""
+    """Return how the exchange goes, and the other facts of diagnostics."""
     lines = [
         Text(f'{drive.rate:.1f} exchanges/s, {drive.exchanges} in all, ').append(
             f'{drive.missed} missed', style='bold yellow' if drive.missed else ''),
@@ -193,7 +193,7 @@ def exchange_lines(drive: DriveSnapshot, width: int) -> Lines:
 
 
 def _facts(drive: DriveSnapshot, width: int, *, bad: bool) -> Lines:
-    """Write what has no line of its own: what is bad, or what is not."""
+    """Return facts without a line of their own: the bad ones, or the others."""
     lines: Lines = []
     for key, value in drive.facts.items():
         if key in _TOLD or value in ('', '0') or bad != any(word in key for word in _BAD):
@@ -222,10 +222,10 @@ class ViewSetting:
     """
     What surrounds a page.
 
-    :param title: what this is.
-    :param place: where it looks, ``ROS domain 0, on this machine only``.
+    :param title: of the page.
+    :param place: where bridges are searched for, ``ROS domain 0, on this machine only``.
     :param namespace: that it is limited to, or ''.
-    :param environment: commands that let another terminal see the same.
+    :param environment: commands for another terminal to see the same.
     :param bridge: command that starts one; '': one is being started.
     """
 
@@ -246,12 +246,12 @@ class _Frame:
 
     @property
     def overhead(self) -> int:
-        """Lines that a section has beside its body."""
+        """The lines that a section has beside its body."""
         return 2 if self.boxed else 1
 
     @property
     def inner(self) -> int:
-        """Columns that a body has."""
+        """The columns of a body."""
         return self.width - 4 if self.boxed else self.width
 
     def bare(self, body: RenderableType) -> None:
@@ -273,7 +273,7 @@ class _Frame:
             self.left -= lines + self.overhead
 
     def fill(self, title: str, body: Callable[[int], Sequence[RenderableType]]) -> None:
-        """Give a section all that is left; ``body`` is told how much that is."""
+        """Add a section with all that is left; ``body`` gets the number of lines."""
         lines = self.left - self.overhead
         if lines > 0:
             self.add(title, body(lines), lines)
@@ -284,7 +284,7 @@ def page(snapshot: Snapshot, choice: Choice, setting: ViewSetting, *, width: int
     """
     Compose the page that was chosen, so many columns wide and lines high.
 
-    :param notice: to be said in the last line, instead of the keys.
+    :param notice: shown in the last line, instead of the keys.
     """
     choice = choice.among([drive.name for drive in in_order(snapshot.drives)])
     frame = _Frame(width, height - 1)
@@ -311,7 +311,7 @@ def page(snapshot: Snapshot, choice: Choice, setting: ViewSetting, *, width: int
 
 
 def help_lines(drive: DriveSnapshot | None, setting: ViewSetting, width: int) -> Lines:
-    """Say what can be typed elsewhere, of the drive that is marked, and what the colours mean."""
+    """Return commands for the marked drive in other terminals, and the meaning of the colours."""
     name = drive.name if drive is not None else 'DRIVE'
     lines: Lines = [Text('in another terminal', style=DIM)]
     for command in setting.environment:
@@ -334,7 +334,7 @@ def help_lines(drive: DriveSnapshot | None, setting: ViewSetting, width: int) ->
 
 
 def closely(choice: Choice) -> str | None:
-    """Return the drive that is looked at closely, if one is."""
+    """Return the drive in focus, if there is one."""
     return choice.drive if choice.page is Page.DRIVE else None
 
 
@@ -364,7 +364,7 @@ def _keys(shown: Page, width: int) -> Text:
 
 
 def _nobody(frame: _Frame, snapshot: Snapshot, setting: ViewSetting) -> None:
-    """Say what is looked for, and how to make it appear."""
+    """Show what is searched for, and how to start it."""
     where = f' below {setting.namespace}' if setting.namespace else ''
     if snapshot.bridges:
         names = ', '.join(bridge.name for bridge in snapshot.bridges)
@@ -446,7 +446,7 @@ def _drive(frame: _Frame, snapshot: Snapshot, drive: DriveSnapshot) -> None:
 # -- in a terminal --------------------------------------------------------------------------------
 
 _CHUNK = 1024
-#: s to wait for a terminal that takes nothing before it is left as it is
+#: s to wait for a terminal that accepts nothing before it is left as it is
 _PATIENCE = 0.2
 
 
@@ -471,12 +471,12 @@ class Screen:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and lines, at this moment."""
+        """The columns and lines, at this moment."""
         try:
             width, height = os.get_terminal_size(self._out)
-        except OSError:  # it has gone
+        except OSError:  # it is gone
             width = height = 0
-        # not what COLUMNS and LINES said once
+        # not the values of COLUMNS and LINES, which may be old
         self._console.size = ConsoleDimensions(max(10, width or 80), max(3, height or 24))
         return self._console.size
 
@@ -497,11 +497,11 @@ class Screen:
             return
         try:
             self._live.update(shown, refresh=True)
-        except OSError:  # the terminal has gone; SIGHUP is on its way
+        except OSError:  # the terminal is gone; SIGHUP is on its way
             self.gone = True
 
     def wait(self, timeout: float) -> list[Key]:
-        """Wait for keys for as long as ``timeout`` says; obey Ctrl-Z."""
+        """Wait for keys for ``timeout`` s; handle Ctrl-Z."""
         if self._suspend_asked:
             self._suspend()
         if not self._readable:
@@ -539,7 +539,7 @@ class Screen:
             self._settings = None
 
     def _quiet_keyboard(self) -> list[Any] | None:
-        """Get keys at once, and without an echo; Ctrl-C and the like still work."""
+        """Read keys at once, and without an echo; Ctrl-C and the like still work."""
         try:
             settings = termios.tcgetattr(self._in)
             flags = settings[3] & ~(termios.ECHO | termios.ICANON)
@@ -576,9 +576,9 @@ _LOOK_PERIOD = 0.1
 def show(source: ModelSource, model: Model, setting: ViewSetting, steady: Clock, *,
          ended: Callable[[], bool], quit_code: int, notice: Callable[[], str] = str) -> int:
     """
-    Draw until the end, or until the user has enough.
+    Draw until the end, or until the user quits.
 
-    :param notice: returns what is to be said instead of the keys; '' for nothing.
+    :param notice: returns the text in place of the keys; '' for none.
     :return: 0, or ``quit_code`` after the key that quits.
     """
     choice = Choice()

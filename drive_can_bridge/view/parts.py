@@ -34,7 +34,7 @@ _LOG_STYLES = {'WARN': 'bold yellow', 'ERROR': 'bold red', 'FATAL': 'bold white 
 #: bits that are no good news, whatever the drive
 _ALARMS = {'fault': 'bold red', 'alarm': 'bold red', 'trip': 'bold red', 'warning': 'bold yellow'}
 NO_VALUE = '–'
-#: between columns, and between what stands one behind the other
+#: between columns, and between texts in a row
 GAP = 2
 _BARS = '▁▂▃▄▅▆▇█'
 #: a trend that spans less than this part of its values is a level line: noise is no news
@@ -55,7 +55,7 @@ LOAD_WARNING = 70.0
 
 
 def section(title: str, body: Sequence[RenderableType], *, boxed: bool) -> RenderableType:
-    """Put a title above something, or a frame around it: two lines more than it has, or one."""
+    """Return something under a title, or in a frame: one or two lines more than it has."""
     if boxed:
         return Panel(Group(*body), title=Text(title, style='bold'), title_align='left',
                      border_style=DIM, box=box.ROUNDED, padding=(0, 1))
@@ -70,7 +70,7 @@ def state(drive: DriveSnapshot) -> Text:
 
 
 def spark(points: Points, width: int, span: float = TREND_SPAN) -> Text:
-    """Draw the last values in one line, the newest on the right."""
+    """Return the last values as a line of bars, the newest on the right."""
     found = columns(points, span, width)
     known = [value for value in found if value is not None]
     if not known:
@@ -97,25 +97,25 @@ class ValueColumns:
 
     @property
     def width(self) -> int:
-        """Columns of a whole line."""
+        """The columns of a whole line."""
         return self.name + 1 + self.number + 1 + self.unit if self.name else 0
 
     def line(self, item: Shown, trend: int = 0) -> Text:
-        """Write a value, and its trend on so many columns."""
+        """Return a value, and its trend on so many columns."""
         text = Text(f'{item.name:{self.name}} ').append_text(self.short(item))
         if trend:
             text.append('  ').append_text(spark(item.points, trend))
         return text
 
     def short(self, item: Shown) -> Text:
-        """Write a value without its name."""
+        """Return a value without its name."""
         return Text().append(f'{item.text or NO_VALUE:>{self.number}}',
                              style=NUMBER if item.text else DIM).append(
             f' {item.unit:{self.unit}}', style=DIM)
 
 
 def lamps(bits: Mapping[str, bool], width: int) -> Lines:
-    """Put bits one behind the other, a lamp before each."""
+    """Return bits one behind the other, a lamp before each."""
     found: Lines = []
     for name, on in bits.items():
         style = _ALARMS.get(name, 'bold green') if on else DIM
@@ -125,7 +125,7 @@ def lamps(bits: Mapping[str, bool], width: int) -> Lines:
 
 
 def flow(words: Iterable[Text], width: int, gap: int) -> Lines:
-    """Put texts one behind the other, so far apart, as many on a line as fit."""
+    """Return texts one behind the other, so far apart, as many on a line as fit."""
     lines: Lines = []
     for word in words:
         if lines and lines[-1].cell_len + gap + word.cell_len <= width:
@@ -136,25 +136,25 @@ def flow(words: Iterable[Text], width: int, gap: int) -> Lines:
 
 
 def plain_table() -> Table:
-    """Make a table without any lines."""
+    """Return a table without any lines."""
     return Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, header_style=DIM,
                  show_edge=False)
 
 
 def wrapped(text: str, width: int, style: str = '') -> Lines:
-    """Break a text into lines."""
+    """Return a text as lines."""
     return [Text(line, style=style) for line in textwrap.wrap(text, max(10, width))] or [Text()]
 
 
 def milliseconds(number: float) -> str:
-    """Write a time in ms that may be unknown."""
+    """Return a time in ms that may be unknown."""
     if math.isnan(number):
         return NO_VALUE
     return f'{number:.2f}' if number < 99.995 else f'{number:.0f}'
 
 
 def times(found: Times) -> str:
-    """Write mean and 99th percentile."""
+    """Return mean and 99th percentile as text."""
     return f'{milliseconds(found.mean)} / {milliseconds(found.p99)}'
 
 
@@ -178,7 +178,7 @@ def _log_entry(entry: LogLine, width: int) -> Lines:
 
 
 def clock(at: float) -> str:
-    """Write the time of day, where the reader is."""
+    """Return the time of day, where the reader is."""
     return time.strftime('%H:%M:%S', time.localtime(at))
 
 
@@ -219,10 +219,10 @@ class _FullTable:
             need += self._setpoints.width + GAP
         self._too_wide = need > width
         left = width - need - GAP
-        # where there is room for one of them only, a trend tells more
+        # where there is room for one of them only, a trend is more useful
         self._exchange = left >= _TREND_MIN + GAP + _EXCHANGE_WIDTH
         left -= (GAP + _EXCHANGE_WIDTH) * self._exchange
-        if any(drive.control for drive in drives):     # a word tells more than a longer trend
+        if any(drive.control for drive in drives):     # a word is more useful than a longer trend
             wanted = max(_CONTROL, *(len(drive.control) for drive in drives)) + 2 - self._first
             widened = max(0, min(wanted, left))
             self._first += widened
@@ -280,7 +280,7 @@ def _exchange(drive: DriveSnapshot) -> Text:
 
 def _line_table(all_drives: Sequence[DriveSnapshot], drives: Sequence[DriveSnapshot],
                 marked: str | None, width: int) -> Table:
-    """One line for each drive; columns that do not fit are left out, the least telling first."""
+    """Return a line for each drive; columns that do not fit are left out, least useful first."""
     setpoints = {drive.name: principal(drive.setpoints) for drive in all_drives}
     values = {drive.name: principal(drive.values) for drive in all_drives}
     first = max(len(drive.label) for drive in all_drives) + 2
@@ -329,7 +329,7 @@ def _cell(columns: ValueColumns, item: Shown | None) -> Text:
 
 def advice_lines(snapshot: Snapshot, width: int, *, brief: bool = False) -> Lines:
     """
-    Say what is not well, and what to do.
+    Return what is not well, and what to do.
 
     :param brief: in a line for each trouble.
     """
@@ -346,7 +346,7 @@ def advice_lines(snapshot: Snapshot, width: int, *, brief: bool = False) -> Line
 
 
 def bus_lines(buses: Sequence[BusSnapshot], width: int, height: int) -> Lines:
-    """Write a line for each bus."""
+    """Return a line for each bus."""
     label = max((len(bus.label) for bus in buses), default=0)
     name = max((len(bus.state) for bus in buses), default=0)
     lines = []
