@@ -355,6 +355,15 @@ class Client:
         success, message = self.ask('control', service=service, wanted=wanted)
         return bool(success), str(message)
 
+    def meet(self, service: str) -> None:
+        """Be known to a ~/quick_stop or ~/reset_fault, so that it can be called at any time."""
+        self.ask('meet', service=service)
+
+    def control_again(self, service: str) -> tuple[bool, str, float]:
+        """Call one that was met; return what it answers, and after how many s."""
+        success, message, took = self.ask('control_again', service=service)
+        return bool(success), str(message), float(took)
+
     def get(self, drive: str, *names: str) -> list[Any]:
         """Call GetParameters; None is NOT_SET."""
         values: list[Any] = self.ask('get', drive=drive, names=names)

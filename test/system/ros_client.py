@@ -158,6 +158,13 @@ class Client:
     # -- services ---------------------------------------------------------------------------------
 
     def call(self, kind, name, request, timeout, **options):
+        service = self.known(kind, name, timeout, **options)
+        future = service.call_async(request)
+        self.until(future.done, timeout, f'the answer of {name}')
+        return future.result()
+
+    def known(self, kind, name, timeout, **options):
+        """Return a client that can be answered."""
         if name not in self.services:
             self.services[name] = self.node.create_client(kind, name, **options)
         service = self.services[name]
@@ -173,9 +180,7 @@ class Client:
                 self.spin(0.02)
             return condition()
         shake_hands(self.node, name, wait)
-        future = service.call_async(request)
-        self.until(future.done, timeout, f'the answer of {name}')
-        return future.result()
+        return service
 
     def get(self, drive, names, timeout):
         answer = self.call(GetParameters, f'{drive}/get_parameters',
@@ -201,6 +206,16 @@ class Client:
         else:
             answer = self.call(SetBool, service, SetBool.Request(data=wanted), timeout)
         return answer.success, answer.message
+
+    def meet(self, service, timeout):
+        self.known(Trigger, service, timeout)
+
+    def control_again(self, service, timeout):
+        begun = clock().now()
+        future = self.services[service].call_async(Trigger.Request())
+        self.until(future.done, timeout, f'the answer of {service}')
+        answer = future.result()
+        return answer.success, answer.message, clock().now() - begun
 
     def transition(self, node, number, timeout):
         request = ChangeState.Request()
