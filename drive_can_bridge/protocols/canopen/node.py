@@ -21,11 +21,13 @@ Who starts a node, and when, the sessions decide.
 
 from enum import Enum
 import math
+from typing import Protocol
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.reporter import Reporter
+from drive_can_bridge.core.session import Stage
 from drive_can_bridge.protocols.canopen import network
 from drive_can_bridge.protocols.canopen.network import Emergency, NmtState
 
@@ -226,3 +228,32 @@ class WatchedNode:
     @property
     def _belief(self) -> float:
         return max(BELIEF_TIME, BELIEF_INTERVALS * (self._interval or 0.0))
+
+
+class OfNode(Protocol):
+    """The session of a node."""
+
+    stage: Stage
+
+    def heartbeat_lost(self, now: float) -> None:
+        """Handle a node whose heartbeats have ceased."""
+
+
+class HeartbeatWatch:
+    """The part of a session that waits for the heartbeats of its node."""
+
+    def __init__(self, session: OfNode, node: WatchedNode) -> None:
+        self._session, self._node = session, node
+
+    @property
+    def due(self) -> float:
+        """When one is overdue, of a node that is looked for or in exchange."""
+        return self._node.due if self._session.stage is Stage.RUNNING else math.inf
+
+    def handle_timer(self, now: float) -> None:
+        """Lose a node whose heartbeats have ceased."""
+        if now >= self.due and self._node.handle_timer(now) is NodeChange.HEARTBEAT_LOST:
+            self._session.heartbeat_lost(now)
+
+    def stop(self) -> None:
+        """Do nothing: the stage says it."""

@@ -1,6 +1,6 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """
-What the drives of one bus have in common: SYNC, and the heartbeat of the bridge.
+SYNC, which the drives of one bus have in common.
 
 *A round* is one SYNC behind the RPDOs of all drives that are in exchange. Each session sends its
 own when it is due, which is the same moment for all; the last of them in the order of the bus
@@ -14,7 +14,6 @@ into effect what an operational drive has in its buffers: so the first one waits
 start no drive of the bus (:attr:`InStep.sync_at`).
 """
 
-from collections.abc import Sequence
 import math
 from typing import Protocol
 
@@ -28,8 +27,6 @@ from drive_can_bridge.protocols.exchange_book import CYCLE_SPACING_MIN, CycleTim
 SYNC_WAIT_MAX = 0.02
 #: s since a drive was heard for which SYNC goes on between rounds
 HEARD_TIME = 1.0
-#: s for which the longest pause between two heartbeats is remembered
-GAP_TIME = 5.0
 #: s before NMT start, and behind it, in which there is SYNC although nobody is heard
 BEFORE_START, BEHIND_START = 0.1, 0.2
 
@@ -289,44 +286,3 @@ class FreeSync:
     def stop(self) -> None:
         """Send none any more on account of this drive."""
         self._beat.ended()
-
-
-class BridgeHeartbeat:
-    """
-    The heartbeat that the drives of a bus watch.
-
-    :param node: node-ID of the bridge.
-    :param interval: s between two of them.
-    :ivar due: when the next one is.
-    """
-
-    def __init__(self, node: int, interval: float) -> None:
-        self._frame = network.encode_heartbeat(node, network.NmtState.OPERATIONAL)
-        self._interval = interval
-        self.due = self._sent_at = self._longest_at = -math.inf
-        self._longest = 0.0
-
-    def beat(self, outbox: Outbox, now: float) -> None:
-        """Send one, if it is due."""
-        if now >= self.due:
-            self.due = now + self._interval if now > self.due + self._interval else (
-                self.due + self._interval)
-            outbox.put(self._frame)
-            gap = now - self._sent_at
-            if gap < math.inf and (gap > self._longest or now > self._longest_at + GAP_TIME):
-                self._longest, self._longest_at = gap, now
-            self._sent_at = now
-
-    def gap(self, now: float) -> float:
-        """Return how many s lay between two of them at most, in the last few seconds."""
-        return max(self._longest, now - self._sent_at if self._sent_at > -math.inf else 0.0)
-
-    def rest(self) -> None:
-        """Begin anew with what lies between two: a drive is left alone, which may be the last."""
-        self._sent_at = -math.inf
-        self._longest = 0.0
-
-
-def smallest(intervals: Sequence[float]) -> float:
-    """Return the shortest interval that is on; 0: none is."""
-    return min((interval for interval in intervals if interval > 0.0), default=0.0)

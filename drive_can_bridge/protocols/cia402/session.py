@@ -39,16 +39,18 @@ from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtState
 from drive_can_bridge.protocols.canopen.node import (
-    NodeChange, START_PAUSE, START_PERIOD, START_SPACING, WatchedNode)
+    HeartbeatWatch, NodeChange, START_PAUSE, START_PERIOD, START_SPACING, WatchedNode)
 from drive_can_bridge.protocols.channel import Channel, Priority
 from drive_can_bridge.protocols.cia402 import states
-from drive_can_bridge.protocols.cia402.beat import (
-    Beat, BridgeHeartbeat, EventTimer, FreeSync, smallest, Turn)
+from drive_can_bridge.protocols.cia402.beat import Beat, EventTimer, FreeSync, Turn
 from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.control import control_table, DriveRules, hint
 from drive_can_bridge.protocols.cia402.handover import Handover
+from drive_can_bridge.protocols.cia402.heartbeats import (
+    BridgeHeartbeat, common_heartbeat, HeartbeatSender)
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
+from drive_can_bridge.protocols.cia402.looks import StateLooks
 from drive_can_bridge.protocols.cia402.objects import SetUpOutcome, SetUpState
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.procedures import cells, MAP, SdoAccess
@@ -56,14 +58,13 @@ from drive_can_bridge.protocols.cia402.sdo_stop import SdoStop, StopProcedure
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
+from drive_can_bridge.protocols.cia402.stop_options import stops_by
 from drive_can_bridge.protocols.cia402.transactor import (
     SdoChannel, SdoTransactor, Transfer, TransferResult)
-from drive_can_bridge.protocols.cia402.watch import WATCH_INTERVALS
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import (
     ANSWER_TIME, SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain, StopWrite)
-from drive_can_bridge.protocols.slack import enough, Slack
 
 #: s until a drive that differs, or runs on, is looked at again
 LOOK_AGAIN = 1.0
@@ -72,50 +73,6 @@ EVENT_PERIODS = 1.5
 #: emergency code of a node that has missed the heartbeats of another
 HEARTBEAT_ERROR = 0x8130
 _MODE_PARAMETER = Parameter(name='mode', type=ParameterType.INT8, index=states.MODE, subindex=0)
-
-
-class Heartbeats:
-    """The part of a session that sends the bridge's heartbeat, and waits for that of the node."""
-
-    def __init__(self, session: 'Cia402Session', node: WatchedNode, beat: BridgeHeartbeat | None,
-                 ) -> None:
-        self._session, self._node, self._beat = session, node, beat
-
-    def send(self, now: float) -> None:
-        """Send one, if it is due."""
-        if self._beat is not None:
-            self._beat.beat(self._session.outbox, now)
-
-    def handle_timer(self, now: float) -> None:
-        """Do what is due."""
-        stage = self._session.stage
-        if stage is not Stage.IDLE:
-            self.send(now)
-        if stage is Stage.RUNNING and self._node.handle_timer(now) is NodeChange.HEARTBEAT_LOST:
-            self._session.heartbeat_lost(now)
-
-    @property
-    def due(self) -> float:
-        """When one is due, or overdue."""
-        stage = self._session.stage
-        own = math.inf if self._beat is None or stage is Stage.IDLE else self._beat.due
-        return min(own, self._node.due) if stage is Stage.RUNNING else own
-
-    def stop(self) -> None:
-        """Send none on account of this drive: the stage says it."""
-        if self._beat is not None:
-            self._beat.rest()
-
-    def was_missed(self, slack: Slack, now: float) -> None:
-        """Say what would have held: the drive has missed that of the bridge."""
-        if self._beat is None:      # whose else it watches, it does not say
-            return
-        interval, gap = self._session.configuration.options.bridge_heartbeat, self._beat.gap(now)
-        if gap > (WATCH_INTERVALS - 0.5) * interval:
-            slack.tell('bridge_heartbeat', sentences.longer_beat_would_hold(
-                gap=gap, interval=enough(gap / WATCH_INTERVALS)))
-        else:
-            slack.tell('1016h', sentences.beats_were_sent(gap=gap))
 
 
 class Cia402Session(Session):
@@ -139,7 +96,7 @@ class Cia402Session(Session):
         control = ControlMachine(
             table, timeout=drive.control_timeout, rules=self._rules,
             wording=Wording(lambda status: state_of(status).value, hint))
-        self._machine, self._mode = control, MODES[options.mode].number
+        self._machine = control
         super().__init__(
             drive, control, image=ProcessImage.of(
                 drive, controlled=True, word=(CONTROL_PARAMETER,), status=(STATUS_PARAMETER,)),
@@ -169,10 +126,8 @@ class Cia402Session(Session):
                                period_max=INTERPOLATION_MAX if MODES[options.mode].interpolated
                                else math.inf)
         self.exchange: CyclicExchange[list[bytes]] = CyclicExchange(self._answers, self, slot=0)
-        if heartbeat is None and options.bridge_heartbeat > 0.0:
-            heartbeat = BridgeHeartbeat(options.bridge_node, options.bridge_heartbeat)
         self._heard = Heard('no complete set of PDOs')
-        self._heartbeats = Heartbeats(self, self._node, heartbeat)
+        self._heartbeats = HeartbeatSender(self, heartbeat or common_heartbeat([drive]))
         self._limits = LimitCheck(
             [] if options.mapping == 'assume' else [
                 each for each in drive.cyclic_request if each.limit],
@@ -184,20 +139,17 @@ class Cia402Session(Session):
         self._handover = Handover(
             self.setpoints, self._rules, drive.control_timeout, self.report,
             ) if options.mode == 'pp' else None
-        self._homing = Homing(self, control, self._rules, self._channel, self._mode)
+        self._homing = Homing(
+            self, control, self._rules, self._channel, MODES[options.mode].number)
+        self._looks = StateLooks(
+            self, control, self._rules, self._channel, self._bring_up, self._homing)
         self._course = Life(self._channel)
         self.look_after(
-            self._course, self._heartbeats, self._homing, self.exchange,
+            self._course, self._heartbeats, HeartbeatWatch(self, self._node), self._homing,
+            self.exchange,
             *([FreeSync(self, self._beat)] if self._synchronous else ()), channel=self._channel)
         self._stop_until = -math.inf
         self._runs_on = False       # what its stop by SDO has come to
-        self._forget_state()
-
-    def _forget_state(self) -> None:
-        """Know nothing of what the drive shows while it is enabled."""
-        self._mode_shown: int | None = None
-        self._looking = False
-        self._error_code: int | None = None
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -208,7 +160,7 @@ class Cia402Session(Session):
         self.exchange.stop()
         self._channel.cancel(Priority.OWN)
         self._course.stop()
-        self._forget_state()
+        self._looks.forget()
         self._limits.stop()
         self._standing.forget()
         self._node.begin(now)
@@ -219,7 +171,7 @@ class Cia402Session(Session):
 
     def prepare_stop(self, now: float) -> bool:
         self._channel.clear()
-        self._looking = False
+        self._looks.ended()
         self._homing.stop()
         self._limits.stop()
         self._stop.forget()
@@ -359,7 +311,7 @@ class Cia402Session(Session):
             self._heard.clear()
         self._homing.stop()
         self._limits.stop()
-        self._forget_state()
+        self._looks.forget()
         self._set.clear()
 
     def _close(self, reason: Sentence, now: float, spacing: float) -> None:
@@ -500,7 +452,7 @@ class Cia402Session(Session):
         if standing.watching:
             standing.sampled(raws, now)
         self.interlock.status(raws[0], now)
-        self._look_at_state(now)
+        self._looks.look(now)
         self.control_changed(now)
         self.interlock.measured(raws)
         self._homing.sampled(raws[0], raws, now)
@@ -557,76 +509,17 @@ class Cia402Session(Session):
         self._transactor.abandon(now)
         self._channel.advance(now)
 
-    # -- what follows from the state --------------------------------------------------------------
-
-    def _look_at_state(self, now: float) -> None:
-        """Ask for what the status word does not say, where something depends on it."""
-        state, control = self._rules.state, self._machine
-        if state is not ServoState.OPERATION_ENABLED:
-            self._mode_shown = None
-        if not control.pending:
-            self._error_code = None
-        if self._looking:
-            return
-        if self._standing.watching and not self._standing.holds:
-            self._looking = True
-            self._channel.run(self._look_at_axis(), self._looked, now)
-        elif self.stage is not Stage.RUNNING:
-            return      # at the end nothing else is asked
-        elif state is ServoState.OPERATION_ENABLED and self._mode_shown != self._mode and (
-                not control.stopping and not self._homing.under_way):
-            self._looking = True
-            self._channel.run(self._look_at_mode(), self._looked, now)
-        elif control.pending and self._error_code is None and (
-                now > control.due - 0.5 * self.configuration.control_timeout):
-            self._looking = True
-            self._channel.run(self._look_at_error(), self._looked, now)
-
-    def _looked(self, _: None) -> None:
-        self._looking = False
-
-    def _look_at_mode(self) -> Generator[Transfer, TransferResult, None]:
-        """Read 6061h until it shows the mode."""
-        while self._rules.state is ServoState.OPERATION_ENABLED:
-            reply = yield Transfer(states.MODE_SHOWN)
-            if reply.abort in sdo.ABSENT:
-                self._bring_up.tell(sentences.mode_not_shown())
-                self._mode_shown = self._mode       # nothing says otherwise
-            elif reply.data:
-                self._mode_shown = int.from_bytes(reply.data[:1], 'little', signed=True)
-            if self._mode_shown == self._mode:
-                if not self._machine.stopping:      # the status is older than what was sent
-                    self._machine.status_received(self._rules.status, self._channel.now)
-                    self.control_changed(self._channel.now)
-                return
-            yield Transfer(pause=LOOK_PERIOD)
-
-    def _look_at_axis(self) -> Generator[Transfer, TransferResult, None]:
-        """Read what samples do not say as long as it is to be known whether the axis stands."""
-        while self._standing.watching and not self._standing.holds:
-            yield from self._standing.look(self._channel)
-            yield Transfer(pause=LOOK_PERIOD)
-
-    def _look_at_error(self) -> Generator[Transfer, TransferResult, None]:
-        """Read 603Fh: why the drive is not enabled."""
-        reply = yield Transfer(states.ERROR_CODE)
-        self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')
-
     @property
     def mode_lacking(self) -> Sentence:
         """What the drive lacks to be driven although it reports enabled; '' if nothing."""
-        if self._mode_shown == self._mode or self._rules.state is not ServoState.OPERATION_ENABLED:
-            return NOTHING
-        return sentences.mode_differs(
-            self.configuration.options.mode, self._mode, self._mode_shown)
+        return self._looks.mode_lacking
 
     @property
     def why(self) -> Sentence:
         """What else the drive says of why it is not enabled; '' if nothing."""
-        code, emergency = self._error_code, self._node.emergency
-        known = sentences.error_code(code) if code is not None and code >= 0 else NOTHING
+        emergency = self._node.emergency
         newest = NOTHING if emergency is None else sentences.emergency(emergency.text)
-        return together((self._homing.not_back, self.unready, known, newest))
+        return together((self._homing.not_back, self.unready, self._looks.error, newest))
 
     def request_refusal(self, now: float) -> Failure | None:
         return Failure(FailureKind.OFFLINE, sentences.drive_offline_because(sentences.node_state(
@@ -843,35 +736,8 @@ class Cia402Session(Session):
             self._bring_up.options, self._bring_up.watch.text)}
 
 
-def stops_by(options: dict[int, int], bridge_lost: str) -> str:
-    """
-    Say what quick stop and disable do on a drive, by its 605Ah, 605Bh, 605Ch.
-
-    :param bridge_lost: what stops it when the bridge dies; '': not known yet.
-    """
-    known = [(name, index, meanings) for name, index, meanings in _STOPS if index in options]
-    return '; '.join([
-        f'{name}: {meanings.get(options[index], "as the manual says")} '
-        f'({index:04X}h = {options[index]})' for name, index, meanings in known] + (
-            [f'bridge lost: {bridge_lost}'] if bridge_lost else [])) or 'not known'
-
-
-_HOW = {0: 'power off, it coasts', 1: 'slow-down ramp', 2: 'quick-stop ramp', 3: 'current limit',
-        4: 'voltage limit', 5: 'slow-down ramp, then holds', 6: 'quick-stop ramp, then holds',
-        7: 'current limit, then holds', 8: 'voltage limit, then holds'}
-_RAMP_OR_NOT = {0: 'power off, it coasts', 1: 'slow-down ramp, then power off'}
-_STOPS = (('quick stop', states.QUICK_STOP_OPTION, _HOW),
-          ('disable operation', states.DISABLE_OPTION,
-           {**_RAMP_OR_NOT, 1: 'slow-down ramp'}),
-          ('shutdown', states.SHUTDOWN_OPTION, _RAMP_OR_NOT))
-
-
 def make_sessions(drives: Sequence[DriveConfiguration]) -> list[Session]:
     """Make the sessions of one bus, in the same order: one SYNC, and one heartbeat for all."""
-    beat = Beat()
-    interval = smallest([drive.options.bridge_heartbeat for drive in drives])
-    heartbeat = BridgeHeartbeat(
-        next(drive.options.bridge_node for drive in drives if drive.options.bridge_heartbeat > 0),
-        interval) if interval else None
+    beat, heartbeat = Beat(), common_heartbeat(drives)
     return [Cia402Session(drive, beat, heartbeat if drive.options.bridge_heartbeat > 0 else None)
             for drive in drives]
