@@ -27,7 +27,7 @@ setpoints again after ``refresh_interval``. The status word counts from the mome
 before its round is complete.
 """
 
-from collections.abc import Collection, Generator, Sequence
+from collections.abc import Collection
 import math
 
 from drive_can_bridge.core import sentences
@@ -40,7 +40,6 @@ from drive_can_bridge.core.events import ForeignMasterSeen, Noted
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.outbox import Left
-from drive_can_bridge.core.process_image import status_word
 from drive_can_bridge.core.requests import Failure, FailureKind
 from drive_can_bridge.core.roles import Roles
 from drive_can_bridge.core.session import Session, Stage
@@ -50,13 +49,12 @@ from drive_can_bridge.protocols.canopen import masters, network, sdo
 from drive_can_bridge.protocols.canopen.heard import Heard
 from drive_can_bridge.protocols.canopen.network import NmtCommand, NmtState
 from drive_can_bridge.protocols.canopen.node import (
-    NodeChange, START_PERIOD, START_SPACING, WatchedNode)
+    HeartbeatWatch, NodeChange, START_PERIOD, START_SPACING, WatchedNode)
 from drive_can_bridge.protocols.canopen_pkw import addresses, pkw, procedures
-from drive_can_bridge.protocols.canopen_pkw.addresses import (
-    instead_of, Placement, round_plan, round_spans, Span)
-from drive_can_bridge.protocols.canopen_pkw.pkw import Address, PkwLayout, PkwMessage
+from drive_can_bridge.protocols.canopen_pkw.pkw import PkwLayout, PkwMessage
+from drive_can_bridge.protocols.canopen_pkw.rounds import Rounds
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    MailboxChannel, MailboxTransactor, Procedure, Refused, RegisterRead, Reply, Silence, Step)
+    MailboxChannel, MailboxTransactor, Procedure)
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.channel import Priority
 from drive_can_bridge.protocols.life import Life, Script
@@ -64,106 +62,6 @@ from drive_can_bridge.protocols.polled_exchange import PolledExchange, Raws
 
 #: what a node sends beside the answers of its mailbox; plus its number
 _NODE_SAYS = network.HEARTBEAT_BASE, network.EMERGENCY_BASE
-
-
-class Rounds:
-    """
-    The rounds of one drive.
-
-    :param writers: write setpoints between two reads: commands do not wait for slow rounds.
-    :ivar blank: there is no status to be read.
-    :ivar gap: what the last one asked for in vain, though others were answered, in words.
-    :ivar refusals: the names of what the drive refuses, and why, by what was read.
-    """
-
-    def __init__(self, session: Session, channel: MailboxChannel,
-                 writers: Writers) -> None:
-        drive = self._drive = session.configuration
-        self._session = session
-        self._channel = channel
-        self._writers = writers
-        self._placement = Placement.of(drive)
-        self._spans = [self._placement.span(parameter) for parameter in drive.cyclic_response]
-        status = status_word(drive)
-        self._status = None if status is None else (status, self._placement.span(status))
-        self.blank = status is None
-        self.gap = NOTHING
-        self.refusals: dict[Span, Sentence] = {}
-        self._words: dict[Address, int] = {}    # those of refused registers are missing
-        self._plan: list[Span] = []
-        self.start_over()
-
-    def start_over(self) -> None:
-        """Forget what was refused."""
-        self.gap = NOTHING
-        self.refusals.clear()
-        self._plan = round_plan(self._drive)
-
-    def read(self) -> Generator[Step, Reply, Raws | None]:
-        """Read everything once, each in one attempt; return None if something went unanswered."""
-        self._words = {}
-        pending = list(self._plan)
-        while pending:
-            span = pending.pop(0)
-            if self._words and self._session.online:
-                self._writers.write_setpoints(self._channel.now)
-            reply = yield RegisterRead(span.address, span.count, attempts=1)
-            if isinstance(reply, Silence):
-                self.gap = NOTHING if not self._words else sentences.one_read_unanswered(
-                    self._names(span))
-                return None
-            if isinstance(reply, Refused):
-                pending[:0] = self._instead(span, reply)
-                continue
-            self.refusals.pop(span, None)
-            found = dict(zip(span.addresses, reply.words))
-            self._words.update(found)
-            if self._session.online:
-                self._take_status(found)
-        return [self._placement.raw_among(parameter, span, self._words)
-                for parameter, span in zip(self._drive.cyclic_response, self._spans)]
-
-    def ended(self, now: float, *, found: bool) -> None:
-        """Take the status of a drive that was found by this round."""
-        if found:
-            self._take_status(self._words)
-        elif self._status is not None and self._status_among(self._words) is None:
-            self._session.interlock.status(None, now)
-            self._session.control_changed(now)
-
-    def _take_status(self, words: dict[Address, int]) -> None:
-        now, interlock = self._channel.now, self._session.interlock
-        raw = self._status_among(words)
-        if raw is not None:
-            interlock.status(raw, now)
-        interlock.follow()
-        self._writers.write_control(now, known=self.blank or raw is not None)
-
-    def _status_among(self, words: dict[Address, int]) -> int | None:
-        return None if self._status is None else self._placement.raw_among(*self._status, words)
-
-    def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
-        """Take a refusal: two parameters that share a read are read alone from now on."""
-        parts = instead_of(span, round_spans(self._drive))
-        if parts:
-            place = self._plan.index(span)
-            self._plan[place:place + 1] = parts
-            return parts
-        names = self._names(span)
-        if span not in self.refusals:
-            self._session.report.warn(sentences.read_refused(names, refused.text))
-        self.refusals[span] = sentences.write_refused(names, refused.text)
-        return parts
-
-    def _names(self, span: Span) -> str:
-        """Name what a read is for."""
-        return ', '.join(parameter.name for parameter, own in zip(
-            self._drive.cyclic_response, self._spans)
-            if set(own.addresses) <= set(span.addresses)) or str(span.address)
-
-    def warnings(self) -> list[Sentence]:
-        """Say what the drive refuses, and what to do."""
-        return [sentences.poll_refused(text) for text in self.refusals.values()]
 
 
 class PkwSession(Session):
@@ -192,7 +90,8 @@ class PkwSession(Session):
         self.services = DriveServices(
             self, procedures.RegisterAccess(self._channel, self.retry, placement))
         self._course = Life(self._channel)
-        self.look_after(channel=self._channel)
+        self.look_after(
+            self._course, HeartbeatWatch(self, self._node), channel=self._channel)
 
     # -- life cycle -------------------------------------------------------------------------------
 
@@ -202,6 +101,7 @@ class PkwSession(Session):
             owes or self.ever_online and now >= self._node.free_at)
 
     def begin_stop(self, now: float) -> bool:
+        self._course.end()
         self._exchange.stop()
         self._channel.drop(now)
         self._writers.stop(now)
@@ -225,8 +125,7 @@ class PkwSession(Session):
         self._stop_if_owed(now)
 
     def fall_silent(self) -> None:
-        self._course.stop()
-        self._channel.clear()
+        super().fall_silent()
         self._exchange.stop()
         self._rounds.refusals.clear()
 
@@ -333,6 +232,10 @@ class PkwSession(Session):
             self._channel.clear()
             self._stop_if_owed(now)
 
+    def heartbeat_lost(self, now: float) -> None:
+        """Handle a node whose heartbeats have ceased."""
+        self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
+
     def _silent(self, reason: Sentence, now: float) -> None:
         """Handle a drive that does not answer, or whose heartbeats have ceased."""
         was_online = self.online
@@ -433,17 +336,9 @@ class PkwSession(Session):
     # -- timer ------------------------------------------------------------------------------------
 
     def handle_timer(self, now: float) -> None:
-        if self.stage is Stage.RUNNING:
-            self._course.handle_timer(now)
-            if self._node.handle_timer(now) is NodeChange.HEARTBEAT_LOST:
-                self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
-            if self.control is not None and now >= self.control.due:
-                self.control.handle_timer(now)
-                self.control_changed(now)
-            self.neutral_stop.handle_timer(now)
-            if self._writers.expire(now):
-                self._writers.write_setpoints(now)
-        self._channel.advance(now)
+        if self._writers.expire(now):
+            self._writers.write_setpoints(now)
+        super().handle_timer(now)
         if now >= self._round_due:
             self._writers.round_begins()
             if self.control is not None and self.control.stopping:
@@ -459,13 +354,7 @@ class PkwSession(Session):
         return math.inf if self._exchange.reading else self._exchange.timer.due
 
     def next_timer(self) -> float:
-        soonest = self._channel.due
-        if self.stage is not Stage.RUNNING:
-            return soonest
-        soonest = min(soonest, self._round_due, self._course.due,
-                      self._node.due, self.setpoints.expires_at,
-                      self.neutral_stop.due)
-        return soonest if self.control is None else min(soonest, self.control.due)
+        return min(self._round_due, self.setpoints.expires_at, super().next_timer())
 
     def control_refusal(self, action: ControlAction, refusal: Sentence, *,
                         offline: bool) -> Sentence:
