@@ -10,9 +10,12 @@ import ast
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+import re
 import sys
 from typing import NamedTuple
 from xml.etree import ElementTree
+
+from drive_can_bridge.protocols.families import FAMILIES
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'drive_can_bridge'
@@ -242,6 +245,38 @@ def test_no_part_of_a_family_needs_its_row_of_the_table() -> None:
         and any(part == 'family' or part.endswith('_family') for part in found.name.split('.')[3:])
     ]
     assert not wrong, '\n'.join(wrong)
+
+
+#: where families are named beside their folders, and why that is no question to ask a family
+NAMED = {
+    'protocols/families.py': 'the table', 'simulation/simulation.py': 'the table of their drives',
+    'protocols/storing.py': 'said behind a write, which does not wait until families are read',
+    'core/complaints.py': 'advice to people, and what they call families'}
+
+
+def test_families_are_named_in_their_tables_only() -> None:
+    # whoever needs to know something of one asks it: see protocols/family.py
+    folders = {name: family.__class__.__module__.split('.')[2]
+               for name, family in FAMILIES.items()}
+    named = re.compile(rf'\b({"|".join(folders)})\b')
+    found = set()
+    for source in SOURCES:
+        inside = source.relative_to(PACKAGE).as_posix()
+        if inside.startswith(tuple(f'{layer}/{folder}' for folder in folders.values()
+                                   for layer in ('protocols', 'simulation'))):
+            continue
+        prose = {id(node.body[0].value) for node in nodes_of(source)     # docstrings
+                 if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
+                 and node.body and isinstance(node.body[0], ast.Expr)}
+        found |= {(inside, node.value) for node in nodes_of(source)
+                  if isinstance(node, ast.Constant) and isinstance(node.value, str)
+                  and id(node) not in prose and named.search(node.value)}
+        if LAYERS[source] != 'simulation':
+            found |= {(inside, each.name) for each in imports_of(source)
+                      if each.name.split('.')[1:2] == ['protocols']
+                      and each.name.split('.')[2:3] and each.name.split('.')[2] in {
+                          *folders.values()}}
+    assert {place for place, _ in found} == NAMED.keys(), found
 
 
 def test_tables_have_no_cycle() -> None:
