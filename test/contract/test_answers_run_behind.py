@@ -19,6 +19,7 @@ from builders import (
 from drives import ExtendedDrive, ServoDrive
 from extent import some
 import pytest
+from stops import UNANSWERED_CYCLES
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -280,7 +281,8 @@ def test_one_that_hears_nothing_gets_up_to_three_more(kind: str) -> None:
     bus.stop()
     cycles = '400' if 'group' in kind else '002' if 'cannord' in kind else '003FFFF0'
     cycles = '201' if kind == 'cia402' else cycles
-    assert len([each for _, each in bus.sent if str(each).startswith(f'{cycles}#')]) == 6
+    assert len([
+        each for _, each in bus.sent if str(each).startswith(f'{cycles}#')]) == UNANSWERED_CYCLES
 
 
 @pytest.mark.parametrize('members', [2, 4])

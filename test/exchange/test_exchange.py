@@ -12,6 +12,7 @@ from exchange_builders import all_routes, Bench, BusNotes
 from jumping import JumpingClock
 import pytest
 from saying import says
+from stops import STOP_CYCLES, UNANSWERED_CYCLES
 from waiting import wait_for
 import world
 
@@ -434,7 +435,7 @@ def test_a_stop_that_somebody_else_has_begun_is_waited_for() -> None:
         bench.exchange._begin_stop(bench.now)
     assert not bench.exchange.active
     assert stop_all([bench.exchange], HandClock(bench.clock)) == {}
-    assert bench.link.take() == [NEUTRAL] * 6   # nobody answers; and not begun anew
+    assert bench.link.take() == [NEUTRAL] * UNANSWERED_CYCLES   # and not begun anew
     assert stop_all([bench.exchange], HandClock(bench.clock)) == {}
     assert bench.link.take() == []
 
@@ -460,7 +461,8 @@ def test_buses_are_stopped_though_no_more_threads_can_be_started(
         threading.Thread.start(thread)
     monkeypatch.setattr(SystemThread, 'start', start)
     assert stop_all([bench.exchange for bench in benches], clock) == {'two': 'the bus blocks'}
-    assert [bench.link.take() for bench in benches] == [[NEUTRAL] * 6, [], [NEUTRAL] * 6]
+    assert [bench.link.take() for bench in benches] == [
+        [NEUTRAL] * UNANSWERED_CYCLES, [], [NEUTRAL] * UNANSWERED_CYCLES]
     assert active and not any(active)
 
 
@@ -496,7 +498,7 @@ def test_a_process_that_stands_still_during_a_stop_ends_it_all_the_same(
         bench.now += stalls.pop(0) if stalls else 0.0
     monkeypatch.setattr(time, 'sleep', sleep)
     assert bench.exchange.deactivate() is True
-    assert bench.link.take() == [NEUTRAL] * 6   # nobody answers
+    assert bench.link.take() == [NEUTRAL] * UNANSWERED_CYCLES
     assert not stalls
 
 
@@ -687,7 +689,7 @@ def test_defect_in_the_timer_thread_is_told_not_swallowed(clock: JumpingClock) -
     # the lock is free, and the drives are stopped all the same
     bench.link.take()
     assert bench.exchange.deactivate() is True
-    assert bench.link.take() == [NEUTRAL] * 3
+    assert bench.link.take() == [NEUTRAL] * STOP_CYCLES
     bench.exchange.close()
 
 
@@ -708,8 +710,10 @@ def test_a_session_that_fails_keeps_no_other_from_its_stop(
     # where it cannot be said that all of them were stopped, whoever asked is told
     assert bench.exchange.deactivate() is stopped
     sent = bench.link.take()
-    assert [text for text in sent if text.startswith('005')] == [f'005FFFF0#{ZEROS}'] * 3
-    assert [text for text in sent if text.startswith('003')] == [NEUTRAL] * 3 * stopped
+    assert [text for text in sent if text.startswith('005')] == [
+        f'005FFFF0#{ZEROS}'] * STOP_CYCLES
+    assert [text for text in sent if text.startswith('003')] == [
+        NEUTRAL] * STOP_CYCLES * stopped
     assert bench.sessions[1].stopped
     assert bench.exchange.bus_reason == ('' if stopped else f'first: {DEFECT}')
 

@@ -12,6 +12,7 @@ from cannord_session_builders import (
 from conversation import Conversation
 import pytest
 from saying import says, status_word
+from stops import STOP_CYCLES, UNANSWERED_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import (
@@ -364,7 +365,7 @@ def test_stop_of_a_drive_that_is_not_there() -> None:
     assert talk.until(11.021) == [(11.02, READY_FRAME)]
     talk.hears(READY, 11.022)       # now it is
     assert talk.events(StationFound, ProcessDataReceived) == []
-    assert [text for _, text in talk.until(12.0)] == [READY_FRAME] * 2
+    assert [text for _, text in talk.until(12.0)] == [READY_FRAME] * (STOP_CYCLES - 1)
     assert talk.session.stopped
 
 
@@ -376,4 +377,4 @@ def test_additional_frames_go_with_the_stop() -> None:
     assert talk.until(10.041)[1] == (10.04, '002#0000002000')
     talk.deactivate(10.05)
     assert [text for _, text in talk.until(11.0)] == [
-        '002#7E04000000000000', '002#0000000000'] * 6    # nobody answers
+        '002#7E04000000000000', '002#0000000000'] * UNANSWERED_CYCLES

@@ -12,6 +12,7 @@ from cannord_session_builders import (
 )
 import pytest
 from saying import says
+from stops import STOP_CYCLES
 
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.control import ControlAction, ControlCompleted, ControlRequest
@@ -571,7 +572,7 @@ def test_member_that_falls_silent_together_with_the_stop(
     del bus.answers[station]
     bus.ends(*order)
     sent = bus.live(0.1)
-    assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    assert [text for _, text in sent if text.startswith('400')] == ['400#7E040000'] * STOP_CYCLES
     bus.live(1.0)
     assert all(session.stopped for session in bus.sessions)
     assert worries(bus) == [
@@ -805,7 +806,7 @@ def test_stop_reaches_everybody() -> None:
     bus.ends()
     assert not any(session.stopped for session in bus.sessions)
     sent = [text for _, text in bus.live(1.0)]
-    assert [text for text in sent if text.startswith('400')] == ['400#7E040000'] * 3
+    assert [text for text in sent if text.startswith('400')] == ['400#7E040000'] * STOP_CYCLES
     assert {text[:3] for text in sent} == {'400', '002', '004', '006', '008', '00A', '00C', '00E'}
     assert all(session.stopped for session in bus.sessions)
     assert all(session.next_timer() == math.inf for session in bus.sessions)

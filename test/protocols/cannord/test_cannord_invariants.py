@@ -17,6 +17,7 @@ from cannord_session_builders import (
 from hypothesis import given, strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
+from stops import MORE_CYCLES, STOP_CYCLES
 
 from drive_can_bridge.core.control import ControlAction, ControlCompleted
 from drive_can_bridge.core.errors import ValueRefused
@@ -58,7 +59,8 @@ class CannordObserver(Observer):
         online = self.online
         self.doubt()
         self.online = online
-        self.last_cycles = 0 if session.stopped else 3 + 3 * session.duty.unshown
+        self.last_cycles = 0 if session.stopped else (
+            STOP_CYCLES + MORE_CYCLES * session.duty.unshown)
         self.asked = None
 
     def sees(self, sent: Frame, now: float) -> None:

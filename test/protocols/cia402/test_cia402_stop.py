@@ -8,6 +8,7 @@ from conversation import Conversation
 import pytest
 from saying import says
 from servo_builders import Axis, servo, TABLE
+from stops import UNANSWERED_CYCLES
 
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
 from drive_can_bridge.core.frame import Frame
@@ -86,7 +87,7 @@ class TestTheEnd:
         axis = running()
         axis.mute = True
         sent = end(axis)
-        assert sent.count('205#070000000000') == 6
+        assert sent.count('205#070000000000') == UNANSWERED_CYCLES
         assert WATCH_OFF not in sent
         assert doubts(axis)
 

@@ -6,6 +6,7 @@ from typing import Any
 from drives import ServoDrive
 import pytest
 from servo_builders import Axis, OBJECTS, servo
+from stops import STOP_CYCLES, UNANSWERED_CYCLES
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -192,9 +193,9 @@ class TestRounds:
         one.live(1.0)
         assert all(session.stopped for session in one.sessions)
         syncs = [at for at, text in one.log if text == '080#']
-        assert len(syncs) == 3
+        assert len(syncs) == STOP_CYCLES
         assert max(later - at for at, later in zip(syncs, syncs[1:])) <= 0.1 + 1e-6
-        assert one.rounds() == [['201', '202', '080']] * 3
+        assert one.rounds() == [['201', '202', '080']] * STOP_CYCLES
 
     @pytest.mark.parametrize('period', [0.01, 0.5, 2.0])
     def test_drives_that_fall_silent_together_get_theirs_as_soon(self, period: float) -> None:
@@ -216,7 +217,8 @@ class TestRounds:
             session.deactivate(one.now)
             one.pump(place)
         one.live(0.9)
-        assert [each for each in one.rounds() if each != ['080']] == [['201', '202', '080']] * 6
+        assert [each for each in one.rounds() if each != ['080']] == [
+            ['201', '202', '080']] * UNANSWERED_CYCLES
         one.live(1.5)       # NMT may have stopped them: they are told pre-operational, and again
         assert all(session.stopped for session in one.sessions)
         assert [sum(getattr(event, 'danger', False) for event in events)
@@ -277,12 +279,14 @@ class TestRounds:
         assert one.sessions[place].stopped
         assert one.drives[place + 1].state == ServoDrive.READY
         syncs = [at for at, text in one.log if text == '080#']
-        assert max(later - at for at, later in zip(syncs[:3], syncs[1:3])) <= 0.1 + 1e-6
+        assert max(later - at for at, later in zip(
+            syncs[:STOP_CYCLES], syncs[1:STOP_CYCLES])) <= 0.1 + 1e-6
         rounds = one.rounds()
-        assert [sorted(each) for each in rounds[:3]] == [['080', '201', '202', '203']] * 3
+        assert [sorted(each) for each in rounds[:STOP_CYCLES]] == [
+            ['080', '201', '202', '203']] * STOP_CYCLES
         rest = [each for number, each in enumerate(('201', '202', '203')) if number != place]
         one.live(3.0)
-        assert [*rounds[3:], *one.rounds()] == [[*rest, '080']] * 7
+        assert [*rounds[STOP_CYCLES:], *one.rounds()] == [[*rest, '080']] * 7
         assert all(session.statistics.missed == 0 for session in one.sessions)
         assert all(session.statistics.period_error.maximum < 0.001 for session in one.sessions)
 
@@ -430,7 +434,7 @@ class TestTheFirst:
             session.deactivate(one.now)
             one.pump(place)
         one.live(1.0)
-        assert one.rounds() == [['201', '202', '203', '080']] * 3
+        assert one.rounds() == [['201', '202', '203', '080']] * STOP_CYCLES
 
 
 class TestEvent:

@@ -12,6 +12,7 @@ from builders import ACTUAL, CONTROL, drive, INT16, parameter, RAM, RO, STATUS, 
 from conversation import Conversation
 import pytest
 from saying import says
+from stops import UNANSWERED_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
@@ -245,7 +246,8 @@ def test_without_control_it_is_latched_from_the_beginning() -> None:
     talk.hears('103FFFF0#0044000100000000', 10.062)
     talk.deactivate(10.07)
     # nobody answers
-    assert [text for _, text in talk.until(11.0)] == ['003FFFF0#0048000000000000'] * 6
+    assert [text for _, text in talk.until(11.0)] == [
+        '003FFFF0#0048000000000000'] * UNANSWERED_CYCLES
 
 
 @pytest.mark.parametrize('mapping', ['verify', 'assume'])

@@ -18,6 +18,7 @@ from drives import ExtendedDrive
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 import pytest
+from stops import MORE_CYCLES, STOP_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import ValueRefused
@@ -58,7 +59,8 @@ class ExtendedObserver(Observer):
 
     def deactivated(self, session: Any) -> None:
         self.disarm()
-        self.last_cycles = 0 if session.stopped else 3 + 3 * session.duty.unshown
+        self.last_cycles = 0 if session.stopped else (
+            STOP_CYCLES + MORE_CYCLES * session.duty.unshown)
         self.asked = None
 
     def activated(self) -> None:

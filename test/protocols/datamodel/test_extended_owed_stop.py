@@ -18,6 +18,7 @@ from extended_builders import (
 )
 import pytest
 from saying import may_run, says
+from stops import last_cycles, STOP_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import DriveState, Noted, StationLost
@@ -150,7 +151,7 @@ def response_map_differs() -> Conversation:
 def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
     talk = response_map_differs()
     assert talk.session.state is DriveState.MAPPING_DIFFERS
-    assert talk.until(11.9) == [(11.02, NEUTRAL), (11.04, NEUTRAL), (11.06, NEUTRAL)]
+    assert talk.until(11.9) == last_cycles(NEUTRAL, 11.02)
     assert not talk.session.duty.owed
     # what is answered by another map is not understood
     talk.events()
@@ -166,8 +167,8 @@ def test_response_map_that_differs_ends_with_neutral_cycles() -> None:
 def answered_neutral_cycles(request_map: str) -> Conversation:
     """Return a drive whose response map differs, and what it says to the look after, at 12.02."""
     talk = response_map_differs()
-    for at in (11.02, 11.04, 11.06):
-        assert talk.until(at + TICK) == [(at, NEUTRAL)]
+    for at, text in last_cycles(NEUTRAL, 11.02):
+        assert talk.until(at + TICK) == [(at, text)]
         talk.hears(ANSWER, at + 0.002)
     assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
     assert talk.hears(request_map, 12.02) == [ASK_RESPONSE_MAP]
@@ -189,7 +190,7 @@ def test_neutral_cycles_that_went_elsewhere_are_followed_by_writes() -> None:
 
 def test_response_map_that_differs_and_neutral_cycles_that_were_lost() -> None:
     talk = response_map_differs()
-    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * STOP_CYCLES
     assert talk.until(12.01) == [(12.004, ASK_REQUEST_MAP)]
     assert talk.hears(REQUEST_MAP, 12.02) == [ASK_RESPONSE_MAP]
     assert stopped_by_number(talk, talk.hears(OTHER_RESPONSE, 12.03)) == []
@@ -208,7 +209,7 @@ def test_cycle_that_another_map_would_answer_is_neither_answered_nor_missed() ->
     talk.hears(ANSWER, 11.022)
     assert talk.events() == []
     assert (talk.session.statistics.missed, talk.session.statistics.exchanges) == before
-    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * 3
+    assert [text for _, text in talk.until(11.9)] == [NEUTRAL] * STOP_CYCLES
 
 
 def enabled_at_a_look(talk: Conversation) -> Conversation:
@@ -308,7 +309,7 @@ def test_drive_that_was_deaf_comes_back_with_another_map() -> None:
     """It has heard none of the last neutral cycles, and goes on at the speed that it was told."""
     talk = running()
     last = [text for _, text in talk.until(12.0)]
-    assert last.count(NEUTRAL) == 3
+    assert last.count(NEUTRAL) == STOP_CYCLES
     assert last[-1] == ASK_REQUEST_MAP
     assert talk.session.duty.owed
     assert talk.hears(OTHER_REQUEST, 12.001) == [ASK_RESPONSE_MAP]
@@ -340,7 +341,8 @@ def test_maps_are_not_looked_at_again_before_the_last_cycles_have_left() -> None
     talk.refusing = lambda text: text == NEUTRAL
     assert [text for _, text in talk.until(14.0)].count(ASK_REQUEST_MAP) == 1
     talk.refusing = lambda text: False
-    assert [text for _, text in talk.until(14.3)][:4] == [*[NEUTRAL] * 3, SPEED_ZERO]
+    assert [text for _, text in talk.until(14.3)][:STOP_CYCLES + 1] == [
+        *[NEUTRAL] * STOP_CYCLES, SPEED_ZERO]
 
 
 def test_word_that_was_refused_confirms_nothing() -> None:

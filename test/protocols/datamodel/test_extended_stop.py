@@ -11,6 +11,7 @@ from extended_builders import (
 )
 import pytest
 from saying import may_run, says
+from stops import last_cycles, STOP_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.events import MappingDiffered, Noted
@@ -34,14 +35,13 @@ def test_first_neutral_cycle_is_brought_forward(asked: float, first: float) -> N
     # not under 5 ms after the last one
     talk = online(period=5.0)
     talk.deactivate(asked)
-    assert talk.until(16.0) == [
-        (first, NEUTRAL), (round(first + 0.1, 6), NEUTRAL), (round(first + 0.2, 6), NEUTRAL)]
+    assert talk.until(16.0) == last_cycles(NEUTRAL, first, 0.1)
 
 
 def test_drive_that_never_answered_is_stopped_too() -> None:
     talk = cycling()
     talk.deactivate(10.0)
-    assert talk.until(11.0) == [(10.0, NEUTRAL), (10.02, NEUTRAL), (10.04, NEUTRAL)]
+    assert talk.until(11.0) == last_cycles(NEUTRAL, 10.0)
 
 
 def test_nothing_is_sent_to_a_drive_whose_maps_are_not_known() -> None:
@@ -60,7 +60,7 @@ def test_stop_while_the_drive_is_being_left() -> None:
     talk.until(10.08 + TICK)
     assert not talk.session.online
     talk.deactivate(10.09)
-    assert talk.until(11.0) == [(10.1, NEUTRAL), (10.12, NEUTRAL), (10.14, NEUTRAL)]
+    assert talk.until(11.0) == last_cycles(NEUTRAL, 10.1)
     silent(talk, 11.0)
 
 
@@ -73,7 +73,7 @@ def test_look_that_is_under_way_when_the_stop_begins(request_map: str) -> None:
     assert talk.hears(ANSWER, 11.001) == [ASK_REQUEST_MAP]
     talk.deactivate(11.002)
     assert talk.hears(request_map, 11.003) == []
-    assert talk.until(12.0) == [(11.005, NEUTRAL), (11.105, NEUTRAL), (11.205, NEUTRAL)]
+    assert talk.until(12.0) == last_cycles(NEUTRAL, 11.005, 0.1)
     assert talk.events(MappingDiffered) == []
     silent(talk, 12.0)
 
@@ -171,7 +171,7 @@ def test_control_word_in_an_eeprom_keeps_the_pace(period: float, gap: float) -> 
     asked = [now for now, text in found if text == ASK_WORD]
     assert all(b - a >= min(gap, 0.025) - TICK for a, b in zip(times, asked, strict=True))
     cycles = [now for now, text in found if text == NEUTRAL]
-    assert len(cycles) == 3
+    assert len(cycles) == STOP_CYCLES
     assert all(b - a >= period - TICK for a, b in zip(cycles, cycles[1:]))
     assert found[-1][0] < 10.5
     silent(talk, 13.0)
@@ -185,7 +185,7 @@ def test_disable_is_written_at_once_and_read_back(status: int, state: str, off: 
     assert [text for _, text in talk.until(now + 0.001 + TICK)] == [NEUTRAL, ASK_WORD]
     talk.hears(f'103FFFF0#000000000{status:03X}0000', now + 0.002)
     talk.hears('10200341#0000000000000000', now + 0.003)
-    assert [text for _, text in talk.until(now + 5.0)] == [NEUTRAL, NEUTRAL]
+    assert [text for _, text in talk.until(now + 5.0)] == [NEUTRAL] * (STOP_CYCLES - 1)
     silent(talk, now + 6.0)
     assert warnings(talk) == []
     assert talk.session.control is not None
@@ -201,14 +201,14 @@ def test_status_without_slot_is_read_after_the_last_cycle(
     assert talk.until(10.003) == [(10.002, '00200D31#0000000000000000')]
     assert talk.hears('10200D31#0003000000000000', 10.004) == []
     talk.deactivate(10.01)
-    assert exchange(talk, 10.02) == NEUTRAL
-    assert exchange(talk, 10.04) == NEUTRAL
-    assert talk.until(10.0605) == [(10.06, NEUTRAL), (10.06, '00200D31#0000000000000000')]
+    *before, (last, _) = last_cycles(NEUTRAL, 10.02)
+    assert [exchange(talk, now) for now, _ in before] == [NEUTRAL] * len(before)
+    assert talk.until(last + TICK) == [(last, NEUTRAL), (last, '00200D31#0000000000000000')]
     assert not talk.session.stopped
     if answer:
-        assert talk.hears(answer, 10.062) == []
+        assert talk.hears(answer, last + 0.002) == []
     else:
-        assert talk.until(10.161) == [], 'it is waited for 0.1 s'
-    silent(talk, 10.17)
+        assert talk.until(last + 0.101) == [], 'it is waited for 0.1 s'
+    silent(talk, last + 0.11)
     assert talk.session.control is not None
     assert (talk.session.control.state, talk.session.control.off) == (state, off)

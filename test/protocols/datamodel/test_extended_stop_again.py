@@ -7,6 +7,7 @@ from extended_builders import (
     NEUTRAL, online, REQUEST_MAP, RESPONSE_MAP, RUNNING, SPEED_IS_ZERO, SPEED_ZERO,
 )
 from saying import says
+from stops import STOP_CYCLES
 
 from drive_can_bridge.core.events import Noted
 
@@ -19,7 +20,7 @@ def silent() -> Conversation:
     talk.commands(0, 100.0, 10.003)
     assert exchange(talk, 10.02) == RUNNING
     sent = [text for _, text in talk.until(12.0)]
-    assert sent.count(NEUTRAL) == 3
+    assert sent.count(NEUTRAL) == STOP_CYCLES
     assert not talk.session.online
     talk.events()
     return talk
