@@ -63,10 +63,11 @@ def run(args: Namespace) -> int:
     must_be_answerable(yes=args.yes, otherwise='nothing was moved', yes_means=_YES_MEANS)
     try:
         from drive_can_bridge.client.jog import find_target
+        from drive_can_bridge.ros.client.calls import ClientNode
         from drive_can_bridge.ros.client.search import Graph
     except ImportError as error:
         raise DriveCanError(what_is_missing('drive_can jog', error)) from error
-    graph = Graph(args.clock)
+    graph = Graph(args.clock, ClientNode('jog'))
     try:
         with waiting('looking for the drive'):
             target = find_target(graph, args.namespace, drive, name, value)

@@ -969,6 +969,16 @@ stop_frames_not_sent = Text(
 commands_discarded = Text(
     '{count} commands thrown away: {why}',
     do='see what held the bridge up; publish again')
+asked_on_host = Text(
+    '{action}, asked by {whom}', '{action}, asked on this host',
+    do='nothing; it shows who has asked this of the drive by drive_can, past ROS')
+asked_through_ros = Text(
+    '{action}, asked through ROS',
+    do='nothing; it shows that a node, a command or the panel has called this service of the '
+       'drive')
+armed_by = Text(
+    '{name} armed, commanded by {who:, }', '{name} armed',
+    do='nothing; commands of these nodes reach the drive from now on')
 command_while_disabled = Text(
     'command {name} has no effect: disabled, {enable}',
     do='enable it, or stop what commands it')

@@ -10,6 +10,7 @@ the processor's time that all of them together get.
 from collections import deque
 from collections.abc import Callable, Sequence
 import os
+import pwd
 import select
 import socket
 import threading
@@ -17,7 +18,7 @@ import threading
 from drive_can_bridge import host_texts
 from drive_can_bridge.clock import Clock, Worker
 from drive_can_bridge.process.local_way import (
-    ASKED_MAX, END, Inbound, NO, PACKET, packets_of, PATIENCE, Rubbish, trusted_users, user_of,
+    ASKED_MAX, END, Inbound, NO, PACKET, packets_of, PATIENCE, peer_of, Rubbish, trusted_users,
     VERSION)
 
 #: callers that the kernel keeps until they are taken
@@ -41,14 +42,16 @@ class LocalRequest:
     :ivar action: its action.
     :ivar words: the rest.
     :ivar trusted: the caller is root, or our user.
+    :ivar whom: the caller for people: user and process.
     """
 
     def __init__(self, caller: '_Caller', action: str, words: list[str], *,
-                 trusted: bool = True) -> None:
+                 trusted: bool = True, whom: str = '') -> None:
         self._caller = caller
         self.action = action
         self.words = words
         self.trusted = trusted
+        self.whom = whom
 
     def answer(self, *message: str) -> None:
         """Send a message. From any thread; without waiting."""
@@ -71,10 +74,10 @@ class _Caller:
     :ivar busy: the action that is being answered; '': none.
     """
 
-    def __init__(self, connection: socket.socket, user: int, now: Callable[[], float],
+    def __init__(self, connection: socket.socket, now: Callable[[], float],
                  wake: Callable[[], None]) -> None:
         self.socket = connection
-        self.user = user
+        self.process, self.user = peer_of(connection)
         self.inbound = Inbound(ASKED_MAX)
         self.busy = ''
         self.gone = self.has_asked = False
@@ -153,6 +156,8 @@ class LocalServer:
         self._serve = serve
         self._open_to_all = open_to_all
         self._trusted = trusted_users()
+        # looked up now: where the names are on the network, that may take long
+        self._names = {user: user_name(user) for user in self._trusted}
         self._report = report
         self._prepare_thread = prepare_thread
         self._keep_share = keep_share
@@ -240,7 +245,7 @@ class LocalServer:
                 self._make_room(None)
                 return
             connection.setblocking(False)
-            caller = _Caller(connection, user_of(connection), self._clock.now, self._ring)
+            caller = _Caller(connection, self._clock.now, self._ring)
             if self._may_stay(caller):
                 self._callers[connection.fileno()] = caller
                 if not self._is_strange(caller):
@@ -293,7 +298,8 @@ class LocalServer:
     def _begin(self, caller: _Caller, message: list[str]) -> None:
         version, action, words = message[0], ''.join(message[1:2]), message[2:]
         caller.busy, caller.has_asked = action or '?', True
-        asked = LocalRequest(caller, action, words, trusted=not self._is_strange(caller))
+        asked = LocalRequest(caller, action, words, trusted=not self._is_strange(caller),
+                             whom=self._whom(caller))
         if version != VERSION:
             asked.refuse(host_texts.version_differs.format(version=VERSION))
         elif action not in STOPPING and not asked.trusted:
@@ -307,9 +313,21 @@ class LocalServer:
         else:
             self._serve(asked)
 
+    def _whom(self, caller: _Caller) -> str:
+        user = self._names.get(caller.user, f'user {caller.user}')
+        return f'{user}, process {caller.process}' if caller.process else user
+
     def _hang_up(self, caller: _Caller) -> None:
         self._callers.pop(caller.socket.fileno(), None)
         caller.close()
+
+
+def user_name(user: int) -> str:
+    """Return a user for people: by the name that this host has for the number, if any."""
+    try:
+        return f'user {pwd.getpwuid(user).pw_name}'
+    except (KeyError, OverflowError):
+        return f'user {user}'
 
 
 def _patience(caller: _Caller) -> float:

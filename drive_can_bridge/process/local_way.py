@@ -154,10 +154,19 @@ def value_of(text: str) -> object:
         raise Rubbish from None
 
 
+def peer_of(peer: socket.socket) -> tuple[int, int]:
+    """
+    Return process and user at the other end, as the kernel knew them when it connected.
+
+    Process 0: one of another name space.
+    """
+    found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS)
+    return int.from_bytes(found[:4], sys.byteorder), int.from_bytes(found[4:8], sys.byteorder)
+
+
 def user_of(peer: socket.socket) -> int:
     """Return the user at the other end, as the kernel recorded it when it began to listen."""
-    found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS)
-    return int.from_bytes(found[4:8], sys.byteorder)
+    return peer_of(peer)[1]
 
 
 def trusted_users() -> tuple[int, int]:

@@ -9,7 +9,7 @@ the take of as many as can wait (:mod:`.polled_topics`). The subscriptions stand
 group that no executor ever runs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 import json
 from typing import NamedTuple
@@ -45,14 +45,17 @@ class CommandIntake:
 
     :param warn: logs (topic of the warning, text); limits repetitions itself.
     :param inform: logs what needs no action.
+    :param armed: handles the name of a setpoint that a command has armed.
     """
 
     def __init__(self, node: Node, drive: DriveConfiguration, session: Session,
-                 clock: Clock, warn: Warn, inform: Callable[[str], None]) -> None:
+                 clock: Clock, warn: Warn, inform: Callable[[str], None],
+                 armed: Callable[[str], None]) -> None:
         self._node = node
         self._session = session
         self._warn = warn
         self._inform = inform
+        self._armed = armed
         self._told: set[str] = set()
         self._joint = joint = drive.joint
         self._topics = PolledTopics(node, clock, warn, self.refuse)
@@ -112,10 +115,16 @@ class CommandIntake:
 
         :param joint_commands: the topic with the commands for all joints of the bridge.
         """
-        topics = [*self._topics.names, *((joint_commands,) if self._joint_targets else ())]
-        return sorted(f'{each.node_namespace.rstrip("/")}/{each.node_name} {topic}'
-                      for topic in topics
-                      for each in self._node.get_publishers_info_by_topic(topic))
+        return sorted(f'{node} {topic}' for node, topic in self._publishers([joint_commands]))
+
+    def commanding_nodes(self, joint_commands: Iterable[str]) -> list[str]:
+        """Return the full names of the nodes that publish them."""
+        return sorted({node for node, _ in self._publishers(joint_commands)})
+
+    def _publishers(self, joint_commands: Iterable[str]) -> Iterator[tuple[str, str]]:
+        for topic in (*self._topics.names, *(joint_commands if self._joint_targets else ())):
+            for each in self._node.get_publishers_info_by_topic(topic):
+                yield f'{each.node_namespace.rstrip("/")}/{each.node_name}', topic
 
     # -- inside -----------------------------------------------------------------------------------
 
@@ -127,7 +136,9 @@ class CommandIntake:
             name = session.setpoints.items[index].parameter.name
             self._warn(f'refused {name}', sentences.command_refused(name, str(error)))
             return
-        if outcome is CommandOutcome.DISABLED and session.active:
+        if outcome is CommandOutcome.ARMED:
+            self._armed(session.setpoints.items[index].parameter.name)
+        elif outcome is CommandOutcome.DISABLED and session.active:
             name = session.setpoints.items[index].parameter.name
             self._warn('disabled', sentences.command_while_disabled(
                 name=name, enable=how_to_enable(session, self._node)), once=True)

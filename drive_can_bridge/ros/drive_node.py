@@ -50,6 +50,8 @@ from drive_can_bridge.ros.threads import ExecutorThread, ServiceThread
 Completed = Callable[[Any], None]
 #: reads in a row that failed, after which the drive is left alone
 FAILURES_MAX = 2
+#: s between two looks who has armed a setpoint; nodes that are named
+_TELL_ARMED, _COMMANDERS_SHOWN = 0.2, 4
 
 
 class DriveNode(DriveListener):
@@ -90,7 +92,8 @@ class DriveNode(DriveListener):
             tell=identified, warn=lambda text: self.warn(text, text))
         self.times_lost = 0
         self.lost_at = 0
-        self._stamp = clock.stamp
+        self._stamp, self._now = clock.stamp, clock.now
+        self._tell_armed_at = dict[str, float]()
         self.lost_for: Sentence = NOTHING
         self.rejected_text: Sentence = NOTHING
         self._may_run = False   # and nothing has arrived from it since
@@ -107,7 +110,7 @@ class DriveNode(DriveListener):
                                  *quality_overrides(bridge)])
         try:
             self.commands = CommandIntake(self.node, drive, session, clock, self.warn,
-                                          self._log.info)
+                                          self._log.info, self._armed)
             try:
                 self._populate(stamps, family, control_thread, parameter_thread)
             except BaseException:
@@ -137,6 +140,10 @@ class DriveNode(DriveListener):
 
         def submit(request: Any) -> Awaited[Any]:
             return Awaited(partial(self._submit, request))
+
+        def ask(request: ControlRequest) -> Awaited[ControlCompleted]:
+            return Awaited(partial(self._ask, request, sentences.asked_through_ros(
+                action=_in_words(request.action))))
         self._parameters = ParameterServices(
             self.node, parameter_thread, directory, stamps, submit=submit,
             write_refusal=session.services.write_refusal, role=session.roles.role,
@@ -145,7 +152,7 @@ class DriveNode(DriveListener):
         self._control_thread, self._parameter_thread = control_thread, parameter_thread
         self._services.append(self._parameters)
         self._services.append(control_services(
-            self.node, control_thread, submit, controlled=session.control is not None,
+            self.node, control_thread, ask, controlled=session.control is not None,
             homing=getattr(drive.options, 'homing', False)))
 
     @property
@@ -356,9 +363,36 @@ class DriveNode(DriveListener):
         return action is ControlAction.QUICK_STOP or self.session.control is not None
 
     def command(self, action: ControlAction,
-                completed: Callable[[ControlCompleted], None]) -> None:
-        """Run a control action for a caller by the local way. From any thread."""
-        self._control_thread.begin(partial(self._submit, ControlRequest(action), completed))
+                completed: Callable[[ControlCompleted], None], *, whom: str = '') -> None:
+        """
+        Run a control action for a caller by the local way. From any thread.
+
+        :param whom: the caller, for the log.
+        """
+        self._control_thread.begin(partial(
+            self._ask, ControlRequest(action),
+            sentences.asked_on_host(action=_in_words(action), whom=whom), completed))
+
+    def _ask(self, request: ControlRequest, asked: Sentence, completed: Completed) -> None:
+        """Submit a control action of a user, and log who asked for it."""
+        self._submit(request, completed)    # a stop does not wait for the line
+        self._log.info(asked, topic=f'asked {request.action.value}')
+
+    def _armed(self, name: str) -> None:
+        """Have the executor log who has armed a setpoint: asking the graph takes a moment."""
+        now = self._now()
+        if now >= self._tell_armed_at.get(name, now):
+            self._tell_armed_at[name] = now + _TELL_ARMED
+            self._spinner.later(self._tell_armed, name)
+
+    def _tell_armed(self, name: str) -> None:
+        joints = self.joint_commands
+        try:
+            who = self.commands.commanding_nodes([] if joints is None else joints.names)
+        except GONE:
+            return
+        self._log.info(sentences.armed_by(name=name, who=who[:_COMMANDERS_SHOWN]),
+                       topic=f'armed {name}')
 
     def tell_condition(self, answer: Callable[[dict[str, str]], None]) -> None:
         """Answer with its state, as diagnostics show it; {}: its bus hangs. From any thread."""
@@ -403,6 +437,10 @@ class DriveNode(DriveListener):
         self.requests_refused += uncounted
         self.session.statistics.last_request_error = text
         self.warn(f'parameter {text}', text)
+
+
+def _in_words(action: ControlAction) -> str:
+    return action.value.replace('_', ' ')
 
 
 def control_state(session: Session) -> str:

@@ -165,7 +165,7 @@ class LocalWayServer:
                 asked.answer('unoffered', name)
                 done()
             else:
-                drive.command(action, partial(completed, name, drive))
+                drive.command(action, partial(completed, name, drive), whom=asked.whom)
         if introduce:
             self._introduce(asked)      # takes a moment: drives come first
         done()

@@ -140,9 +140,13 @@ class Speaker:
         #: when what is held is to be summed up
         self.due = math.inf
 
-    def info(self, text: str) -> None:
-        """Log what is as it should be."""
-        self._say(LogLevel.INFO, text)
+    def info(self, text: str, *, topic: str = '') -> None:
+        """
+        Log what is as it should be.
+
+        :param topic: of lines that vary; of those that repeat the newest is logged.
+        """
+        self._say(LogLevel.INFO, text, topic=topic)
 
     def warning(self, text: str, *, urgent: bool = False) -> None:
         """

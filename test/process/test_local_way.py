@@ -4,6 +4,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 import os
+import pwd
 import socket
 import subprocess
 import sys
@@ -166,6 +167,21 @@ def test_question_and_answer_on_one_connection(host: Host) -> None:
         line.ask(*words)
         assert answers(line) == [words, ['end']]
     line.close()
+
+
+def test_a_bridge_knows_whose_process_asks(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(host.server, '_serve', lambda each: (asked.append(each.whom), each.end()))
+    ask(host, 'stop')
+    monkeypatch.setattr(local_server, 'peer_of', lambda _: (0, 4321))   # another name space
+    ask(host, 'stop')
+    name = pwd.getpwuid(os.geteuid()).pw_name
+    assert asked == [f'user {name}, process {os.getpid()}', 'user 4321']
+
+
+def test_a_user_without_a_name_has_a_number() -> None:
+    assert local_server.user_name(0) == 'user root'
+    assert local_server.user_name(4_000_000_000) == 'user 4000000000'
 
 
 def test_whoever_asks_nothing_or_rubbish_is_hung_up_on(

@@ -69,7 +69,8 @@ class Line:
             caller: Any = self
             runtime: Any = self._bridge.node._runtime
             runtime.local_way.serve(LocalRequest(
-                caller, message[1], message[2:], trusted=self._trusted))
+                caller, message[1], message[2:], trusted=self._trusted,
+                whom='user robot, process 4321'))
 
     def say(self, message: Sequence[str], *, last: bool = False) -> None:
         """Take what the bridge says."""

@@ -9,7 +9,9 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import clock
 
 from drive_can_bridge.core import sentences
+from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.ros.log import FEW
 
 DRIVE = 'drive_can_bridge: drive lift'
 FAULT = '7 overcurrent'
@@ -60,6 +62,28 @@ def test_a_fault_says_which_it_is(bridge: StartBridge, client: Client) -> None:
     one.played['lift'].fault('ok')
     assert trigger(client, 'reset_fault')[0]
     client.diagnostics(DRIVE, lambda drive: drive['fault_code'] == '')
+
+
+def test_the_log_says_what_was_asked_through_ros(bridge: StartBridge, client: Client) -> None:
+    bridge(parameters(lift=LIFT)).online()
+    assert enable(client)[0] and enable(client, False)[0]
+    assert trigger(client, 'quick_stop')[0] and trigger(client, 'reset_fault')[0]
+    for action in ('enable', 'disable', 'quick stop', 'reset fault'):
+        said = client.wait_logged(f'lift: {sentences.asked_through_ros(action=action)}')
+        assert said not in client.logged()
+
+
+def test_a_flood_of_questions_is_no_flood_of_lines(bridge: StartBridge, client: Client) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    client.listen()
+    for number in range(50):
+        one.node.drives['lift'].command(
+            ControlAction.QUICK_STOP, lambda _: None, whom=f'process {number}')
+    assert trigger(client, 'quick_stop')[0]
+    assert enable(client)[0]
+    client.wait_logged(sentences.asked_through_ros(action='enable'))
+    assert sum('quick stop, asked' in line for line in client.logged(0)) == FEW
 
 
 def test_quick_stop_without_a_control_word(bridge: StartBridge, client: Client) -> None:

@@ -72,6 +72,13 @@ def test_no_line_is_empty_before_the_first_values(
     assert len(lines) > 1 and all('actual_speed' in line for line in lines[:-1])
 
 
+def test_the_log_says_who_armed_it(bridge: StartBridge, client: Client, run: Run) -> None:
+    enabled(bridge, run)
+    assert run('jog', 'lift', '300', '--yes', '--for', '1')[0] == 0
+    told = client.wait_logged('lift: speed_setpoint armed, commanded by /_drive_can_jog_')
+    assert told not in client.logged()
+
+
 def test_its_end_is_no_warning(bridge: StartBridge, client: Client, run: Run) -> None:
     enabled(bridge, run)
     assert run('jog', 'lift', '300', '--yes', '--for', '1')[0] == 0

@@ -9,10 +9,11 @@ from typing import Any
 
 from bridges import LIFT, parameters, StartBridge
 from by_hand import Lines, no_ros, Run
-from clients import wait_until
+from clients import Client, wait_until
 import pytest
 
 from drive_can_bridge.cli import control
+from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.process.presence import Presence
@@ -50,6 +51,19 @@ def test_ros_is_not_needed_where_all_are_here(
     assert run('stop', 'crane', 'hoist') == (1, [
         'crane: NOT STOPPED: no such drive; there are: a/lift, a/hoist, b/lift',
         'a/hoist: ready'], '')
+
+
+def test_the_log_says_whose_process_asked_for_what(
+        bridge: StartBridge, client: Client, run: Run, locally: Lines) -> None:
+    one = bridge(parameters(lift=LIFT))
+    one.online()
+    locally(one)
+    for command, action in (('enable', 'enable'), ('stop', 'quick stop'),
+                            ('disable', 'disable'), ('reset', 'reset fault')):
+        assert run(command, 'lift')[0] == 0
+        said = client.wait_logged(sentences.asked_on_host(
+            action=action, whom='user robot, process 4321'))
+        assert said.startswith('lift: ') and said not in client.logged()
 
 
 @pytest.mark.usefixtures('alone')
