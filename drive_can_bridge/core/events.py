@@ -10,7 +10,7 @@ from enum import Enum
 from typing import NamedTuple, Union
 
 from drive_can_bridge.core.control import ControlCompleted
-from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.requests import Outcome, Request
 
 
@@ -96,9 +96,17 @@ class FrameRejected:
 
 @dataclass(frozen=True)
 class AnswerLate:
-    """Answers come after their time-out; ``seconds``: by how much the last one did."""
+    """
+    Answers come after their time-out.
+
+    :param seconds: by how much the last one did.
+    :param would_hold: what to set instead; '': that is not known, or was reported before.
+    :param taken: it counts for its exchange all the same: nothing is lost.
+    """
 
     seconds: float
+    would_hold: Sentence = NOTHING
+    taken: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ What a session reports: events, in order, and what is missing while its drive is
 It is the counterpart of the outbox: frames go to the drive, this goes to people.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
 import math
 
@@ -84,12 +84,16 @@ class Reporter:
         self._statistics.rejected += 1
         self.events.append(FrameRejected(text))
 
-    def unasked(self, text: Sentence, late: float | None, now: float) -> None:
+    def unasked(self, text: Sentence, late: float | None, now: float, *,
+                would_hold: Callable[[float], Sentence] | None = None,
+                taken: bool = False) -> None:
         """
         Count and report an answer without an open request: rejected, or late.
 
         :param late: by how many s it came too late; 0: its request was dropped; None: it
             answers nothing that was asked.
+        :param would_hold: returns what to set instead, for one that is so late.
+        :param taken: it counts for its exchange all the same.
         """
         if late is None:
             self.reject(text)
@@ -98,7 +102,8 @@ class Reporter:
             self._statistics.late_by = late
             if now >= self._tell_late_at:   # once in a while
                 self._tell_late_at = now + TELL_LATE
-                self.events.append(AnswerLate(late))
+                self.events.append(AnswerLate(
+                    late, would_hold(late) if would_hold is not None else NOTHING, taken))
 
     def found(self) -> None:
         """Report that the drive exchanges process data."""

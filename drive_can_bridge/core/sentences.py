@@ -885,7 +885,8 @@ more_missed_would_hold = Text(
     'then)',
     do='raise missed_limit, or see what else the computer does')
 longer_period_would_hold = Text(
-    'it answered {late:.2g} s after its period: period: {period:g} would have held',
+    'period: {period:g} would have held',
+    fields='late period',
     do='raise period, or see what else the computer does')
 longer_timeout_would_hold = Text(
     'its heartbeat is back, {gap:.2g} s after the last: if the computer or the adapter is slow, '

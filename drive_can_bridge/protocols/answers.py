@@ -71,11 +71,10 @@ class CycleAnswers:
             return True
         late = self.book.late(received_at)
         if late is not None or not self.book.take_stale():
-            self.session.report.unasked(sentences.unasked(what), late, now)
+            self.session.report.unasked(
+                sentences.unasked(what), late, now, would_hold=self._would_hold)
         if self.slack.since < math.inf:
             self.slack.came(received_at)
-        elif late and self.session.online:
-            self.slack.late(late)
         self._heed()
         return False
 
@@ -88,10 +87,12 @@ class CycleAnswers:
         if self.slack.since < math.inf:
             self.slack.came(received_at)
         if missed:
-            self.session.report.unasked(NOTHING, book.overdue, received_at)
-            if book.overdue > 0.0 and self.session.online:
-                self.slack.late(book.overdue)
+            self.session.report.unasked(
+                NOTHING, book.overdue, received_at, would_hold=self._would_hold, taken=True)
         self._heed()
+
+    def _would_hold(self, late: float) -> Sentence:
+        return self.slack.late(late) if self.session.online else NOTHING
 
     @property
     def wanted(self) -> bool:

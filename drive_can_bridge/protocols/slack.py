@@ -12,7 +12,7 @@ import math
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
-from drive_can_bridge.core.messages import Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.core.reporter import Reporter
 
 #: s without an answer beyond which no computer is merely slow
@@ -60,11 +60,13 @@ class Slack:
             self.tell('missed_limit', sentences.more_missed_would_hold(
                 gap=gap, limit=limit, seconds=limit * drive.period))
 
-    def late(self, seconds: float) -> None:
-        """Take an answer that came so many s after its period."""
+    def late(self, seconds: float) -> Sentence:
+        """Return what would have held for an answer so many s after its period: once."""
         period = enough(self._drive.period + seconds)
-        if period <= self._period_max:
-            self.tell('period', sentences.longer_period_would_hold(late=seconds, period=period))
+        if period > self._period_max or 'period' in self._told:
+            return NOTHING
+        self._told.add('period')
+        return sentences.longer_period_would_hold(late=seconds, period=period)
 
     def heartbeat(self, gap: float) -> None:
         """Take a heartbeat of a drive that is lost for want of it, so many s after the last."""

@@ -24,7 +24,7 @@ from drive_can_bridge.core.events import (
     AnswerLate, DriveFailed, Event, ForeignMasterSeen, FrameRejected, MappingDiffered,
     MappingWritten, Noted, ProcessDataReceived, RequestCompleted, SetpointsExpired, StationFound,
     StationLost)
-from drive_can_bridge.core.messages import NOTHING, Sentence
+from drive_can_bridge.core.messages import NOTHING, Sentence, together
 from drive_can_bridge.core.profile import Profile
 from drive_can_bridge.core.requests import (
     Failure, FailureKind, Outcome, ReadRequest, ReadValue, Request)
@@ -283,7 +283,11 @@ class DriveNode(DriveListener):
             self.rejected_text = event.text
             self.warn('rejected', sentences.frame_rejected(what=event.text))
         elif isinstance(event, AnswerLate):
-            self._log.warning(sentences.answer_late(event.seconds))
+            text = together((sentences.answer_late(event.seconds), event.would_hold))
+            if event.taken:
+                self._log.info(text)
+            else:
+                self._log.warning(text)
         elif isinstance(event, ForeignMasterSeen):
             self.foreign_text = event.text
             self.warn('foreign master', event.text)

@@ -146,7 +146,7 @@ def test_what_nobody_waits_for() -> None:
     talk.answer(10.041)
     talk.answer(10.042)
     assert talk.session.take_events() == [
-        AnswerLate(pytest.approx(0.001)), Noted(says('longer_period_would_hold'), warning=True),
+        AnswerLate(pytest.approx(0.001), says('longer_period_would_hold')),
     ], 'one of them was late'
 
 
@@ -279,5 +279,19 @@ def test_a_longer_period_would_have_held_for_what_is_late() -> None:
     for at in (10.049, 10.0491):
         talk.answer(at)
     late = says('longer_period_would_hold', late=pytest.approx(0.009), period=0.032)
-    assert [event for event in talk.session.take_events() if isinstance(event, Noted)] == [
-        Noted(late, warning=True)]
+    assert talk.session.take_events() == [AnswerLate(pytest.approx(0.009), late)]
+    assert talk.session.answers.slack.late(0.009) == '', 'that is known by now'
+
+
+def test_an_answer_that_is_late_and_taken_all_the_same_loses_nothing() -> None:
+    """Of a group each drive has its turn: what comes before the next one is its answer."""
+    talk = Talk()
+    talk.session.answers.in_turn = True
+    talk.at(10.0)
+    talk.answer(10.001)
+    talk.at(10.02)
+    talk.session.answers.settle(10.04)
+    talk.session.take_events()
+    talk.answer(10.049)
+    assert talk.session.take_events() == [AnswerLate(
+        pytest.approx(0.009), says('longer_period_would_hold'), taken=True)]

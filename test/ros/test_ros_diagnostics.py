@@ -15,6 +15,7 @@ from waiting import clock
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.adapter import AdapterTraits
 from drive_can_bridge.core.errors import BusUnavailable
+from drive_can_bridge.core.events import AnswerLate
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.ros import diagnostics
 from drive_can_bridge.ros.diagnostics import BusReporter, DriveReporter
@@ -207,7 +208,14 @@ def test_late_answers_are_no_second_station(bridge: StartBridge, client: Client)
     drive, = one.node.drives.values()
     with drive.exchange.lock:
         drive.session.report.unasked(NOTHING, 0.004, math.inf)
-    client.wait_logged('conveyor: answer 4 ms after its period')
+    assert client.wait_logged('answer 4 ms after its period') in client.logged()
+    with drive.exchange.lock:
+        drive.session.report.note(AnswerLate(0.0004, taken=True))
+        drive.session.report.note(AnswerLate(
+            0.0005, sentences.longer_period_would_hold(late=0.0005, period=0.023)))
+    assert client.wait_logged('answer 0.4 ms after its period') not in client.logged()
+    assert client.wait_logged('answer 0.5 ms after its period') == (
+        f'conveyor: {sentences.answer_late(0.0005)}; period: 0.023 would have held')
     status = client.diagnostics(DRIVE, lambda drive: int(drive['late_answers']) >= 1)
     assert int(status['frames_rejected']) == 0
 
