@@ -147,10 +147,27 @@ def _value(parameter: Parameter, text: str) -> Value | None:
     return value if isinstance(value, int) else None
 
 
-def _shown(parameter: Parameter | None, text: str) -> Value | str:
-    """Return what was to be written as a program takes it; the text where it is no value."""
+def _shown(drive: Drive, outcome: WriteOutcome, text: str) -> Value | str:
+    """
+    Return what the drive holds, or was to hold, as a program takes it.
+
+    :return: the text where it is no value.
+    """
+    parameter = outcome.parameter
     value = None if parameter is None else _value(parameter, text)
-    return text if value is None else value
+    if parameter is None or value is None:
+        return text
+    return drive.rounded(parameter, value) if outcome.ok else value
+
+
+def _cell(drive: Drive, outcome: WriteOutcome, text: str) -> str:
+    """Return the value for people: as it was typed, unless the drive holds another one."""
+    parameter = outcome.parameter
+    value = None if parameter is None or not outcome.ok else _value(parameter, text)
+    if parameter is None or value is None or not parameter.listed:
+        return text
+    held = parameter.text(drive.rounded(parameter, value))
+    return text if held == parameter.text(value) else held
 
 
 def _expected(parameter: Parameter) -> str:
@@ -167,13 +184,15 @@ def _show(args: Namespace, drives: Drives, wanted: dict[str, str],
         if args.json:
             from drive_can_bridge.core.codes import code_of     # takes its time
             print_json({'drive': drive.name, 'name': outcome.name,
-                        'value': _shown(parameter, wanted[outcome.name]), 'ok': outcome.ok,
+                        'value': _shown(drive, outcome, wanted[outcome.name]),
+                        'ok': outcome.ok,
                         'reason': outcome.reason, 'code': code_of(outcome.reason)})
             continue
         result = outcome.reason or 'written'
         refused = not outcome.ok and outcome.trouble is None
         rows.append((
-            drive.name if len(drives) > 1 else '', outcome.name, wanted[outcome.name],
+            drive.name if len(drives) > 1 else '', outcome.name,
+            _cell(drive, outcome, wanted[outcome.name]),
             parameter.unit if parameter else '', parameter.address if parameter else '',
             parameter.storage.value if parameter and parameter.storage else '',
             f'not written: {result}' if refused else result))

@@ -231,6 +231,14 @@ class Drive(ABC):
             return str(error)
         return ''
 
+    def rounded(self, parameter: Parameter, value: Value) -> Value:
+        """
+        Return the value that the drive holds once a value is written: that of the nearest raw step.
+
+        :raises ValueRefused: :meth:`check` says why.
+        """
+        return parameter.value_from_raw(self._directory.raw_from_user(parameter, value))
+
     def contradicted(self, values: Mapping[str, Value]) -> dict[str, str]:
         """
         Return which values cannot be written together, and why: two for one parameter.

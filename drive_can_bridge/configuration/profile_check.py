@@ -15,7 +15,7 @@ from typing import Any
 from drive_can_bridge.configuration.problems import Path, Problem, Tree
 from drive_can_bridge.configuration.schema import check_schema, checked_profile
 from drive_can_bridge.core import complaints
-from drive_can_bridge.core.complaints import suggestion
+from drive_can_bridge.core.complaints import suggestion, suggestion_of_profile
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.messages import NOTHING
 from drive_can_bridge.core.parameters import (
@@ -75,7 +75,8 @@ def look_up(tree: Tree, path: Path, name: str | None, parameters: dict[str, Para
     One with problems of its own is known.
     """
     if name is not None and name not in names and not tree.is_damaged(('parameters',)):
-        tree.wrong(path, complaints.unknown(name=name, hint=suggestion(name, names)), at=at)
+        tree.wrong(path, complaints.unknown(name=name, hint=suggestion_of_profile(name, names)),
+                   at=at)
     return parameters.get(name or '')
 
 
@@ -457,14 +458,17 @@ def _check_limit(tree: Tree, path: Path, parameter: Parameter, entry: dict[str, 
 
 def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[str, ...]) -> None:
     """Check that ``neutral_from`` names actual values that a setpoint can be compared with."""
-    for parameter in list(parameters.values()):
+    known = dict(parameters)
+    for parameter in known.values():
         name, path = parameter.neutral_from, ('parameters', parameter.name, 'neutral_from')
         measured = parameters.get(name)
         if not name or (measured is None and name in names):     # wrong itself
             continue
         message = NOTHING
         if measured is None:
-            message = complaints.not_in_profile(name=name, hint=suggestion(name, names))
+            message = complaints.not_in_profile(name=name, hint=suggestion_of_profile(
+                name, [each for each in names if each not in known
+                       or _fits(known[each], parameter)] or names))
         elif measured is parameter or not measured.readable:
             message = complaints.no_actual_value(name=name)
         elif measured.type is ParameterType.BOOL:
@@ -476,6 +480,12 @@ def _check_measured(tree: Tree, parameters: dict[str, Parameter], names: tuple[s
         if message:
             tree.wrong(path, message)
             del parameters[parameter.name]
+
+
+def _fits(measured: Parameter, setpoint: Parameter) -> bool:
+    """Return whether a setpoint may stay at what is measured."""
+    return (measured is not setpoint and measured.readable and not measured.writable
+            and measured.type is not ParameterType.BOOL and measured.unit == setpoint.unit)
 
 
 def _unit_text(parameter: Parameter) -> str:

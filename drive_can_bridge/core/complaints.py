@@ -27,6 +27,9 @@ allowed = Text('allowed: {words}', do='write one of these')
 some_allowed = Text(
     'allowed are for example {words}; all: drive_can profile show {profile}',
     do='write a name that the profile has')
+some_allowed_here = Text(
+    'allowed are for example {words}; all stand below parameters in this file',
+    do='write a name that stands below parameters')
 nothing_allowed = Text('nothing is allowed here', do='leave it out')
 allowed_below = Text(
     'allowed is {entry} below it',
@@ -772,10 +775,16 @@ def suggestion(word: str, known: Iterable[str]) -> Sentence:
     return allowed(words=', '.join(words[:_WORDS_MAX]) + more)
 
 
-def suggestion_of_profile(word: str, known: Iterable[str], profile: str) -> Sentence:
-    """Return the same about a name that a profile lacks, where there may be hundreds."""
+def suggestion_of_profile(word: str, known: Iterable[str], profile: str = '') -> Sentence:
+    """
+    Return the same about a name that a profile lacks, where there may be hundreds.
+
+    :param profile: what it is called; '': the file that has the word.
+    """
     words = list(known)
     if len(words) <= _NAMES_MAX or _meant(word, words) is not None:
         return suggestion(word, words)
-    few = difflib.get_close_matches(word, words, n=_NAMES_NEAREST, cutoff=0.0)
-    return some_allowed(words=', '.join(few), profile=shlex.quote(profile))
+    few = ', '.join(difflib.get_close_matches(word, words, n=_NAMES_NEAREST, cutoff=0.0))
+    # drive_can profile shows nothing of a profile with problems
+    return (some_allowed(words=few, profile=shlex.quote(profile)) if profile
+            else some_allowed_here(words=few))

@@ -22,7 +22,8 @@ def below(capsys: pytest.CaptureFixture[str], written: Any, *, ok: bool = True,
           protocol: str = 'cia402', json: bool = False, params_file: Path | None = None,
           namespace: str | None = None) -> list[str]:
     """Return what is printed behind the row of one value."""
-    drive: Any = SimpleNamespace(name='axis', facts=SimpleNamespace(protocol=protocol))
+    drive: Any = SimpleNamespace(name='axis', facts=SimpleNamespace(protocol=protocol),
+                                 rounded=lambda _, value: value)
     args: Any = SimpleNamespace(json=json, params_file=params_file, namespace=namespace)
     _show(args, [drive], {written.name: '1'},  # type: ignore[arg-type]
           [(drive, WriteOutcome(written.name, ok, written, '' if ok else 'no answer'))])

@@ -6,6 +6,10 @@ from pathlib import Path
 from configuration_builders import at, changed, FILE, load, problems, PROFILE
 import pytest
 from saying import says
+import yaml
+
+from drive_can_bridge.profiles.catalogue import check
+from drive_can_bridge.resources import profiles_directory
 
 HELD = changed(PROFILE, 'type: int16, unit: deg}', 'type: int16, unit: rev, minimum: 10, '
                'neutral_from: position, arming_tolerance: 2}')
@@ -46,6 +50,22 @@ PROFILES = [
 def test_problem_of_a_profile(tmp_path: Path, old: str, new: str, expected: list[str]) -> None:
     assert [line for line in problems(tmp_path, AXIS, changed(HELD, old, new))
             if line.startswith('table')] == expected
+
+
+def test_of_a_large_profile_only_what_fits_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    servo = (profiles_directory() / 'cia402_servo.yaml').read_text(encoding='utf-8')
+    path.write_text(servo.replace('neutral_from: actual_position', 'neutral_from: zz'))
+    names = yaml.safe_load(servo)['parameters']
+    hints = [problem.message.fields['hint'] for problem in check(path).problems]
+    assert len(hints) == 2 and all(each == says('allowed') for each in hints)
+    assert {name for each in hints for name in each.fields['words'].split(', ')} == {
+        name for name, entry in names.items() if entry.get('unit') == 'rev'
+        and entry.get('access') == 'ro'}
+    path.write_text(servo.replace('parameter: fault_code', 'parameter: zz'))
+    problem, = check(path).problems
+    assert problem.message == says('unknown', hint=says('some_allowed_here'))
+    assert len(problem.message.fields['hint'].fields['words'].split(', ')) < 8 < len(names)
 
 
 def test_limits_do_not_bound_it(tmp_path: Path) -> None:
