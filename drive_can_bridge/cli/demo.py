@@ -25,6 +25,7 @@ from drive_can_bridge.clock import Clock
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.configuration import BridgeConfiguration
 from drive_can_bridge.core.errors import DriveCanError, ValueRefused
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.demo.child import Child
 from drive_can_bridge.process import environment
 from drive_can_bridge.process.signals import NOT_SUSPENDED, SignalWatcher
@@ -265,7 +266,7 @@ class Demo:
         if self._live and frame_log is not None:
             with frame_log.open('rb') as file:
                 count = sum(1 for _ in file)
-            print(f'{count} frames in {frame_log}')
+            print(f'{counted(count, "frame")} in {frame_log}')
 
     # -- inside -----------------------------------------------------------------------------------
 

@@ -68,7 +68,7 @@ def define(parser: ArgumentParser) -> None:
         'Say what a code of diagnostics, log or --json means: its text, and what to do about it. '
         'A line of the log, or words of one, will do, too.')
     parser.epilog = (
-        'Exit code 0: it is known. 1: it is not; the nearest ones are named. --json: code, about, '
+        'Exit code 0: all is known. 1: something is not; the nearest are named. --json: code, about, '
         'texts (what changes in <brackets>), do.')
     parser.add_argument('code', metavar='CODE', nargs='+', help=(  # type: ignore[attr-defined]
         'such as not_armed; several, one after the other; or a text')).completer = (
@@ -79,8 +79,13 @@ def define(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Show the rows of a code (one of drives, one of files, or both), or those of a text."""
     text = ' '.join(args.code)
-    named = _named(text)
+    named, unknown = _named(text), list[str]()
     rows = named or _told(text)
+    if not rows:    # a list of codes, of which some are none; mostly other words: a text
+        words = text.split()
+        unknown = [word for word in words if not _rows_of_code(word)]
+        if len(unknown) <= len(words) / 2:
+            named = rows = _named(' '.join(word for word in words if word not in unknown))
     shown = rows if named else rows[:_NEAREST]
     for about, row in shown:
         if args.json:
@@ -92,12 +97,12 @@ def run(args: Namespace) -> int:
             say(f'  what to do: {row.do}')
     if rows[len(shown):]:
         complain(f'and {len(rows) - len(shown)} more: give more words')
-    if not rows:
-        near = difflib.get_close_matches(
-            text, _codes(), _NEAREST)
-        complain(f'drive_can explain: {printable(text)}: no such code' + (
+    missing = unknown if rows else [text]
+    for word in missing:
+        near = difflib.get_close_matches(word, _codes(), _NEAREST)
+        complain(f'drive_can explain: {printable(word)}: no such code' + (
             f', did you mean {" or ".join(near)}?' if near else '; docs/messages.md has them all'))
-    return 0 if rows else FAILED
+    return FAILED if missing else 0
 
 
 def rows_of(text: str) -> list[tuple[str, Text]]:
@@ -113,15 +118,19 @@ def _named(text: str) -> list[tuple[str, Text]]:
     """Return the rows of codes, one after the other; none where a word is no code."""
     found: dict[tuple[str, str], tuple[str, Text]] = {}
     for word in text.split():
-        # as the page, and links to it, write it
-        anchor = word.strip('`').rpartition('#')[2]
-        code = anchor.removeprefix(_OF_FILES)
-        of_word = {(about, code): (about, rows[code]) for about, rows in CODES.items()
-                   if code in rows and (about == 'files' or code == anchor)}
+        of_word = _rows_of_code(word)
         if not of_word:
             return []
         found.update(of_word)
     return list(found.values())
+
+
+def _rows_of_code(word: str) -> dict[tuple[str, str], tuple[str, Text]]:
+    """Return the rows of one code, as the page, and links to it, write it."""
+    anchor = word.strip('`').rpartition('#')[2]
+    code = anchor.removeprefix(_OF_FILES)
+    return {(about, code): (about, rows[code]) for about, rows in CODES.items()
+            if code in rows and (about == 'files' or code == anchor)}
 
 
 def _codes() -> list[str]:

@@ -17,6 +17,7 @@ from drive_can_bridge.configuration.problems import Problem
 from drive_can_bridge.configuration.yaml_nodes import read_regular
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.profiles.catalogue import (
     available, build_profile, Built, check, Checked, description, find, ImportFailed,
     VERIFIED_WORDS)
@@ -307,7 +308,8 @@ def _protocols(text: str) -> tuple[str, ...]:
 
 
 def _counted(built: Built) -> str:
-    text = f'{len(built.names)} of {built.entries} entries of the file'
+    entries = counted(built.entries, 'entry', 'entries')
+    text = f'{len(built.names)} of {entries} of the file'
     if built.left_out:
         text += f', {len(built.left_out)} left out (see above)'
     if built.remarks:

@@ -233,7 +233,7 @@ class Drive(ABC):
 
     def rounded(self, parameter: Parameter, value: Value) -> Value:
         """
-        Return the value that the drive holds once a value is written: that of the nearest raw step.
+        Return the value that the drive holds once one is written: that of the nearest raw step.
 
         :raises ValueRefused: :meth:`check` says why.
         """

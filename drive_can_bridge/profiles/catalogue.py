@@ -23,6 +23,7 @@ from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import DriveCanError
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.profile import Profile
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.profiles.names import name_of, unique
 from drive_can_bridge.profiles.yaml_text import block, comment, entry_lines, one_line, scalar
 from drive_can_bridge.protocols.families import FAMILIES
@@ -478,7 +479,8 @@ def _carriers(named: dict[str, Draft], profile: Profile, said: tuple[str, ...],
 def _text(named: dict[str, Draft], found: FileContent, sections: dict[str, Any], source: str,
           description: str, protocols: Sequence[str], *, guessed: bool = False) -> str:
     lines = comment(f'Made from {source} by "drive_can profile import": {len(named)} of '
-                    f'{len(found.drafts) + len(found.left_out)} entries, sorted by address. '
+                    f'{counted(len(found.drafts) + len(found.left_out), "entry", "entries")}, '
+                    'sorted by address. '
                     'Compare what you use with the manual: the file may be wrong, and so may '
                     'what was made of it.')
     for protocol in protocols:

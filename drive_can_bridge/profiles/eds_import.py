@@ -23,6 +23,7 @@ from typing import Any
 
 from drive_can_bridge.core import command_sentences
 from drive_can_bridge.core.parameters import ParameterType
+from drive_can_bridge.core.text import counted
 from drive_can_bridge.profiles.catalogue import (
     check, Checked, Draft, FileContent, ImportFailed, LeftOut)
 from drive_can_bridge.profiles.csv_import import access_of
@@ -299,8 +300,9 @@ class _ObjectReader:
             except Unusable as error:
                 self._lose(place, error)
         if counts:
-            self._found.notes.append(f'{counts} sub-indices 0 left out: they hold the number of '
-                                     'entries')
+            number = counted(counts, 'sub-index 0', 'sub-indices 0')
+            self._found.notes.append(
+                f'{number} left out, which {"holds" if counts == 1 else "hold"} a number of entries')
 
     def _grouped(self) -> dict[int, dict[int, list[EdsSection]]]:
         """Return the sections by index and sub-index; -1: the head."""
@@ -320,7 +322,7 @@ class _ObjectReader:
             number = int(match[2], 16) if match[2] else -1
             grouped.setdefault(index, {}).setdefault(number, []).append(section)
         if others:
-            self._found.notes.append(f'{others} sections of other axes left out')
+            self._found.notes.append(f'{counted(others, "section")} of other axes left out')
         return grouped
 
     def _places(self, index: int, subs: dict[int, list[EdsSection]]) -> Iterator[_Place]:
@@ -686,13 +688,14 @@ def _standardise(found: FileContent, sections: Mapping[str, EdsSection], shift: 
            if not _complete(draft, shipped, units, names, turning)]
     standard = [draft.name for draft in raw if draft.name]
     others = sum(not draft.name and draft.entry['index'] not in _COMMUNICATION for draft in raw)
-    found.notes.append(f'CiA 402: {len(names - {""})} standard objects have the names of the '
-                       f'profile {profile}; control word and status word are built in')
+    found.notes.append(f'CiA 402: {counted(len(names - {""}), "standard object")} by the names of '
+                       f'the profile {profile}; control word and status word are built in')
     if standard:
         found.notes.append(f'raw, because their unit is the maker\'s own: {", ".join(standard)}; '
                            'scale and unit stand in the manual')
     if others:
-        found.notes.append(f'{others} objects of the maker have no unit in the file: they are raw')
+        found.notes.append('without a unit in the file, so raw: '
+                           f'{counted(others, "object")} of the maker')
     data = shipped.loaded.tree.data
     found.sections = {section: data[section] for section, name in (
         ('restore', 'store_parameters'), ('fault', 'fault_code')) if name in names}

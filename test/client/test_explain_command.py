@@ -162,3 +162,19 @@ def test_an_unknown_one(word: str, told: str, capsys: pytest.CaptureFixture[str]
     assert main(['explain', word]) == 1
     shown = capsys.readouterr()
     assert shown.out == '' and told in shown.err and shown.err.count('\n') == 1
+
+
+@pytest.mark.parametrize(('words', 'found', 'unknown'), [
+    (['not_armed', 'bus_upp'], ['not_armed'], ['bus_upp: no such code, did you mean bus_up']),
+    (['bus_upp not_armed'], ['not_armed'], ['bus_upp: no such code, did you mean bus_up']),
+    (['#bus_up', 'x9', '`not_armed`', 'no_answr'], ['bus_up', 'not_armed'],
+     ['x9: no such code', 'no_answr: no such code, did you mean no_answer'])])
+def test_those_that_are_known_are_explained_beside_one_that_is_not(
+        words: list[str], found: list[str], unknown: list[str],
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['explain', '--json', *words]) == 1
+    shown = capsys.readouterr()
+    assert [json.loads(line)['code'] for line in shown.out.splitlines()] == found
+    lines = shown.err.splitlines()
+    assert len(lines) == len(unknown)
+    assert all(text in line for text, line in zip(unknown, lines))
