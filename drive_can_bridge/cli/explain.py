@@ -68,8 +68,8 @@ def define(parser: ArgumentParser) -> None:
         'Say what a code of diagnostics, log or --json means: its text, and what to do about it. '
         'A line of the log, or words of one, will do, too.')
     parser.epilog = (
-        'Exit code 0: all is known. 1: something is not; the nearest are named. --json: code, about, '
-        'texts (what changes in <brackets>), do.')
+        'Exit code 0: all is known. 1: something is not; the nearest are named. --json: code, '
+        'about, texts (what changes in <brackets>), do.')
     parser.add_argument('code', metavar='CODE', nargs='+', help=(  # type: ignore[attr-defined]
         'such as not_armed; several, one after the other; or a text')).completer = (
         lambda **_: _codes())

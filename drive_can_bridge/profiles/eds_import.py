@@ -302,7 +302,8 @@ class _ObjectReader:
         if counts:
             number = counted(counts, 'sub-index 0', 'sub-indices 0')
             self._found.notes.append(
-                f'{number} left out, which {"holds" if counts == 1 else "hold"} a number of entries')
+                f'{number} left out: {"it holds" if counts == 1 else "they hold"} the number of '
+                'entries')
 
     def _grouped(self) -> dict[int, dict[int, list[EdsSection]]]:
         """Return the sections by index and sub-index; -1: the head."""
