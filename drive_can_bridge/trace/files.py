@@ -261,6 +261,14 @@ class Database(can.SqliteWriter):
             self._failure = error
 
 
+class VectorWriter(can.ASCWriter):
+    """A writer whose milliseconds have their zeros in front: python-can makes .7 s of .007 s."""
+
+    def _format_header_datetime(self, dt: datetime) -> str:
+        # 4.3 has no such method, and keeps them
+        return dt.strftime(self.FORMAT_DATE.format(f'{dt.microsecond // 1000:03d}'))
+
+
 #: suffixes of candump's texts, and of PEAK's; everything else is python-can's
 _CANDUMP = ('.log', '.txt', '.candump')
 _PEAK = '.trc'
@@ -270,7 +278,7 @@ _TEXT_READERS: dict[str, Any] = {
 _FIRST = {'.asc': 1}
 _BINARY_READERS = ('.blf', '.db', '.mf4', '.pcap', '.pcapng')
 _WRITERS: dict[str, Callable[[Path], Any]] = {
-    '.asc': lambda path: can.ASCWriter(open_text(path)),
+    '.asc': lambda path: VectorWriter(open_text(path)),
     '.blf': lambda path: can.BLFWriter(open_binary(path)),
     '.csv': lambda path: can.CSVWriter(open_text(path)),
     '.db': Database,

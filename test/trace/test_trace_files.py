@@ -8,6 +8,7 @@ from errno import EIO, ENOSPC
 import gzip
 import io
 from pathlib import Path
+import re
 import sqlite3
 import subprocess
 import sys
@@ -287,6 +288,18 @@ def test_times_of_vector_that_are_told_from_the_last_line(told: str, tmp_path: P
     found = [record.time for record in read_records(path, complaints.append)]
     assert found == pytest.approx([0.01, 0.0305])
     assert complaints == ['line 7: no entry of a .asc trace', 'passed over: Statistic (1)']
+
+
+@pytest.mark.parametrize('behind', [0.007, 0.05, 0.7])
+def test_the_date_of_a_trace_for_vector_has_its_milliseconds(
+        behind: float, tmp_path: Path) -> None:
+    """Where they are fewer than 100, python-can's writer leaves out the zeros in front."""
+    path = tmp_path / 'trace.asc'
+    writer = TraceWriter(path, ['can0'])
+    writer.write(TRACE[0]._replace(time=1_700_000_000 + behind))
+    writer.close()
+    date, = re.findall(r'Begin Triggerblock .*:\d\d(\.\d+) ', path.read_text())
+    assert float(date) == pytest.approx(behind, abs=0.001)
 
 
 def test_the_first_frame_of_vector_may_follow_the_base(tmp_path: Path) -> None:
