@@ -24,18 +24,20 @@ PACKAGE = CHECKOUT / 'drive_can_bridge'
 #: ``ros.client`` is a client of bridges, no part of one: it knows none of them.
 INTERNAL: dict[str, set[str]] = {
     '': set(),
+    # what the compiler is told, for everybody whose classes it may compile
+    'compiled': {''},
     'resources': {''},
     'clock': {'', 'memory'},
     'memory': {''},
     # mere texts: for who may import no catalogue, and for the catalogue
     'host_texts': {''},
     'process': {'', 'clock', 'host_texts'},
-    'core': {'', 'host_texts'},
-    'protocols': {'', 'core'},
+    'core': {'', 'compiled', 'host_texts'},
+    'protocols': {'', 'compiled', 'core'},
     'configuration': {'', 'core', 'protocols', 'resources'},
     'profiles': {'', 'core', 'configuration', 'protocols', 'resources'},
-    'transport': {'', 'clock', 'core'},
-    'exchange': {'', 'clock', 'core', 'process', 'protocols', 'transport'},
+    'transport': {'', 'clock', 'compiled', 'core'},
+    'exchange': {'', 'clock', 'compiled', 'core', 'process', 'protocols', 'transport'},
     'trace': {'', 'clock', 'core', 'protocols', 'transport'},
     'simulation': {'', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport'},
     'ros': {
@@ -82,6 +84,8 @@ ROS_PACKAGES = {
 
 #: Layer: what it may import from outside, besides the standard library.
 EXTERNAL: dict[str, set[str]] = {
+    # for its types only
+    'compiled': {'mypy_extensions'},
     'resources': {'ament_index_python'},
     'configuration': {'jsonschema', 'yaml'},
     # canopen: an optional extra, for EDS files

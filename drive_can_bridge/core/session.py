@@ -31,6 +31,7 @@ from enum import Enum
 import math
 from typing import Any, Protocol
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.command_interlock import CommandInterlock
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -95,6 +96,7 @@ class Stage(Enum):
     STOPPING = 'stopping'
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Session(ABC):
     """
     What all families share: the life cycle, and the parts that do everything else.

@@ -26,7 +26,7 @@ what stops it.
 arrives, and is red when a single row is changed.
 """
 
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
@@ -118,7 +118,7 @@ RUNNING = (_OWED, _RUNS, _RUNS_UNHEARD)
 #: what stopped it has not been shown to have arrived
 UNSHOWN = (_RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
 #: what concerns the command that was sent last
-OF_THE_LAST = (Happened.ANSWERED, Happened.UNANSWERED)
+OF_THE_LAST: Collection[Happened] = (Happened.ANSWERED, Happened.UNANSWERED)
 _ANY = (_OWED, _RUNS, _RUNS_UNHEARD, _STOP_SENT, _UNHEARD)
 
 _WHATEVER = 'Whatever was told to run is told to stop'

@@ -230,7 +230,7 @@ class BusExchange:
         self._last_pass = 0.0
         self._tell_at = 0.0
         self._closing = False
-        self._thread = clock.worker(self._run, f'exchange {bus.name}')
+        self._timer_thread = clock.worker(self._run, f'exchange {bus.name}')
         self.active = self.hung = False
         self.bus_state = 'opening'
         self.bus_reason = ''
@@ -255,7 +255,7 @@ class BusExchange:
         """Start both threads; the bus opens in the background. Nothing is sent."""
         self._last_pass = self._meant_at = self._clock()
         self.link.start()
-        self._thread.start()
+        self._timer_thread.start()
 
     def activate(self) -> None:
         """Start the exchange with every drive."""
@@ -307,7 +307,7 @@ class BusExchange:
             if now > end:
                 self._give_up()
                 return False
-            if not self._thread.is_alive():  # the neutral frames go out all the same
+            if not self._timer_thread.is_alive():  # the neutral frames go out all the same
                 self._pass_to_stop()
                 now = self._clock()
             self._sleep(now + 0.002)
@@ -337,7 +337,7 @@ class BusExchange:
         """End both threads, and close the bus."""
         self._closing = True
         self._wake.ring()
-        self._thread.join(2.0)
+        self._timer_thread.join(2.0)
         self.link.stop()
 
     @property

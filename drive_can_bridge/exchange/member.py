@@ -12,6 +12,7 @@ from functools import partial
 import math
 from typing import Protocol
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.events import DriveFailed, Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.messages import Sentence
@@ -26,6 +27,7 @@ PAUSE = 1.0
 RETRY_AFTER = 0.01
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class DriveListener:
     """
     The callbacks of an exchange for the owner of a drive; all do nothing by default.

@@ -20,6 +20,7 @@ from functools import partial
 import math
 from typing import Generic, Protocol, TypeVar
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
 from drive_can_bridge.core.stop_duty import CYCLE, Happened
@@ -55,6 +56,7 @@ class Teller(Protocol[TelegramT]):
         """Handle the last cycle before silence; that of a stop was answered or waited for."""
 
 
+@mypyc_attr(native_class=False)
 @dataclass(frozen=True)
 class Cycle(Generic[TelegramT]):
     """

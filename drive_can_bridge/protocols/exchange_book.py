@@ -22,6 +22,7 @@ from collections import deque
 import math
 from typing import NamedTuple
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.statistics import DriveStatistics
 
@@ -38,6 +39,7 @@ def stop_spacing(period: float) -> float:
     return min(period, STOP_SPACING_MAX)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CycleTimer:
     """
     When the next cycle is due.

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from operator import add, sub
 from typing import NamedTuple
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.transport.error_frames import BusError, ERROR_ACTIVE
 
@@ -34,6 +35,7 @@ class Counts(NamedTuple):
         return Counts(*map(sub, self, other))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class EndPoint(ABC):
     """
     One open bus. Whatever an end point has no means to count stays 0.

@@ -22,6 +22,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from drive_can_bridge.clock import Clock
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.core import bus_sentences
 from drive_can_bridge.core.configuration import BusConfiguration
 from drive_can_bridge.core.errors import BusMisconfigured, BusUnavailable, TransportError
@@ -114,6 +115,7 @@ class _Attempt:
         return port
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Link:
     """
     Keeps one bus open.
@@ -155,7 +157,7 @@ class Link:
         self._reported = ''
         self._told: set[str] = set()
         self._end, self._first_attempt = clock.wake_event(), clock.wake_event()
-        self._thread = clock.worker(self._run, f'bus {bus.name}')
+        self._reader_thread = clock.worker(self._run, f'bus {bus.name}')
         self.frames_sent = 0
         self.frames_received = 0
         self.send_failures = 0
@@ -169,7 +171,7 @@ class Link:
 
     def start(self) -> None:
         """Start to open the bus and to read."""
-        self._thread.start()
+        self._reader_thread.start()
 
     def wait_first_attempt(self, timeout: float) -> bool:
         """Wait until the bus was tried once; return False after ``timeout`` s."""
@@ -184,7 +186,7 @@ class Link:
         attempt = self._attempt
         if attempt is not None:
             attempt.ended.ring()
-        self._thread.join(5.0)
+        self._reader_thread.join(5.0)
 
     def send(self, frame: Frame) -> bool:
         """

@@ -13,13 +13,15 @@ from drive_can_bridge.core.events import Event, ProcessDataReceived
 from drive_can_bridge.core.frame import Frame, Route
 from drive_can_bridge.core.session import Session
 from drive_can_bridge.exchange.exchange import BusExchange
+from drive_can_bridge.exchange.member import DriveListener
 from drive_can_bridge.protocols.families import FAMILIES, make_sessions
+from drive_can_bridge.transport.link import Link
 
 
-class FakeLink:
+class FakeLink(Link):
     """Keeps the frames."""
 
-    def __init__(self) -> None:
+    def __init__(self) -> None:     # nothing is opened
         self.sent: list[str] = []
         self.refusing = False
         self.started = self.stopped = False
@@ -45,7 +47,7 @@ class FakeLink:
         return sent
 
 
-class DriveNotes:
+class DriveNotes(DriveListener):
     """A drive's listener that keeps what it is told, and hands over commands."""
 
     def __init__(self, session: Session) -> None:
@@ -115,7 +117,7 @@ class Bench:
             clock or HandClock(self.clock),
             overheard=[FAMILIES[entry.protocol].overheard(entry) for entry in drives])
         self.link = FakeLink()
-        self.exchange.link = self.link  # type: ignore[assignment]
+        self.exchange.link = self.link
         self.notes = [DriveNotes(session) for session in self.sessions]
         for session, notes in zip(self.sessions, self.notes):
             self.exchange.attach(session, notes)

@@ -96,7 +96,7 @@ class ExtendedSession(Session):
         if not self._rewrites:
             self.remedy = sentences.maps_to_correct
         self.encode_cycle = self._codec.encode_request
-        self._answers = CycleAnswers(self, silence='no cyclic response')
+        self._answers: CycleAnswers = CycleAnswers(self, silence='no cyclic response')
         self._exchange = CyclicExchange(self._answers, self, slot=self._side.control_slot)
         self._answers.heeded = not self._verify      # otherwise the maps tell who has heard it
         self._course = Life(self._channel)
