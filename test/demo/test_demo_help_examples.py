@@ -12,7 +12,7 @@ import signal
 import help_examples
 import pytest
 from running import Running
-from waiting import wait_for
+from waiting import DEADLINE, wait_for
 
 pytest.importorskip('rclpy')
 pytestmark = pytest.mark.real
@@ -27,8 +27,8 @@ FILE = """\
              profile: datamodel_control_example, cyclic_request: [control_word, speed_setpoint],
              cyclic_response: [status_word, actual_speed]}
 """
-#: the bridge of the others
-DEMOS = ('demo --drive --duration 60', 'demo')
+#: the bridge of the others, and one that ends by itself
+DEMOS = ('demo', 'demo --drive --duration 60')
 #: what the first words of others show of it; the last ones show nothing before their end
 SHOWS = {'monitor --json': '"drive"', 'monitor': 'conveyor online', 'panel': '^operator: http',
          'read': 'ramp_time', 'simulate': '^bus main', 'decode': '', 'record': ''}
@@ -65,15 +65,9 @@ def listens(one: Running) -> bool:
     return bool(caught >> signal.SIGHUP - 1 & 1)
 
 
-def needs_no_bridge(example: str) -> bool:
-    """Tell whether an example has its own bus."""
-    return '-p robot.yaml' in example
-
-
+@pytest.mark.timeout(5 * DEADLINE)   # each of them has a deadline of its own
 def test_all_of_them_beside_a_demo(type_it: Start, tmp_path: Path) -> None:
-    # first those that look at the demo, which ends by itself
-    others = [each for each in sorted(help_examples.ENDLESS, key=needs_no_bridge)
-              if each not in DEMOS
+    others = [each for each in help_examples.ENDLESS if each not in DEMOS
               and (find_spec('nicegui') is not None or not each.startswith('panel'))]
     demo = type_it(DEMOS[0])
     demo.line('conveyor online')
@@ -87,9 +81,7 @@ def test_all_of_them_beside_a_demo(type_it: Start, tmp_path: Path) -> None:
         wait_for(partial(listens, one), f'{example} to look after signals')
         assert one.end(signal.SIGINT) == 0, (example, one.errors)
         assert 'Traceback' not in one.errors, example
-    if demo.process.poll() is None:
-        assert demo.end(signal.SIGINT) == 0, demo.errors
-    assert demo.process.wait() == 0
+    assert demo.end(signal.SIGINT) == 0, demo.errors
 
 
 def test_the_demo_alone(type_it: Start) -> None:
