@@ -7,8 +7,9 @@ what DDS does, signals, buses of the kernel, threads that wait for a time of thi
 Where that follows from what a test uses, its fixtures (:data:`FIXTURES`) or its mark ``socketcan``
 say so; otherwise the test has the mark ``real``. They run one after the other: in ``make test``
 those of :data:`CHOSEN`, each executable and each fact about the machine once; in ``.ci/run`` the
-others, too, which have the mark ``ci``. As a program it prints the files of all; with the
-word ``executables`` the stories of those.
+others, too, which have the mark ``ci``: there those of :data:`FIXTURES`, which are about what
+commands show, beside all others. As a program it prints the files of all; with the word
+``commands`` of those, with ``rest`` of the others, with ``executables`` the stories of those.
 """
 
 from pathlib import Path
@@ -94,5 +95,13 @@ def files(everything: bool) -> list[str]:
     return sorted({*FIXTURES, *marked})
 
 
+def part(word: str) -> list[str]:
+    """Return what the program prints."""
+    if word == 'executables':
+        return list(EXECUTABLES)
+    return [file for file in files(everything=True)
+            if word not in ('commands', 'rest') or (file in FIXTURES) == (word == 'commands')]
+
+
 if __name__ == '__main__':
-    print(*(EXECUTABLES if 'executables' in sys.argv else files(everything=True)), sep='\n')
+    print(*part(''.join(sys.argv[1:])), sep='\n')

@@ -5,7 +5,7 @@ import ast
 from pathlib import Path
 
 import pytest
-from real import CHOSEN, FIXTURES
+from real import CHOSEN, files, FIXTURES, part
 
 ROOT = Path(__file__).parents[1]
 
@@ -22,3 +22,9 @@ def test_what_is_chosen_is_there(chosen: str) -> None:
 def test_what_is_chosen_is_short() -> None:
     assert len(CHOSEN) <= 25
     assert all((ROOT / directory).is_dir() for directory in FIXTURES)
+
+
+def test_none_is_lost_between_the_two_parts() -> None:
+    commands, rest = part('commands'), part('rest')
+    assert sorted(commands + rest) == files(everything=True) == part('')
+    assert commands and not any(file.startswith(tuple(commands)) for file in rest)
