@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BANNED = {r'\banew\b': 'again, restart', r'\bwhoever\b': 'each … that',
           r'\bfor who\b': 'for those who'}
 #: words that no docstring begins with: those that do
-HEADS = {'Tell': 'Return (whether), Report'}
+HEADS = {'Tell': 'Return (whether), Report', 'Take': 'Handle, Record', 'Say': 'Return, Report'}
 PAGES = sorted({ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.rst',
                 *(ROOT / 'docs').glob('*.md')} - {ROOT / 'docs' / 'messages.md'})
 

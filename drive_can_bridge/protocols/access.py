@@ -107,7 +107,7 @@ Found = Union[tuple[int, ...], Failure]
 
 
 def read_back(parameter: Parameter, found: int, wanted: int) -> Failure:
-    """Say that a drive has another raw integer than the one that was written."""
+    """Return that a drive has another raw integer than the one that was written."""
     return Failure(FailureKind.REFUSED, sentences.read_back_differs(
         value_text(parameter.value_from_raw(found)), value_text(parameter.value_from_raw(wanted))))
 
@@ -166,7 +166,7 @@ class ParameterAccess(ABC, Generic[SpanT, StepT, ReplyT]):
 
     @abstractmethod
     def misfit(self, items: Sequence[Item]) -> Sentence:
-        """Say why several parameters do not fit one frame; '' if they do."""
+        """Return why several parameters do not fit one frame; '' if they do."""
 
     def aside(self, parameter: Parameter, *, write: bool) -> Outcome | None:
         """Return the outcome for a parameter that no frame can reach; None: one can."""

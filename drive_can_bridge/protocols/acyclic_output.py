@@ -157,7 +157,7 @@ class AcyclicOutput:
         return self._written[index]
 
     def order_word(self, *, first: bool) -> None:
-        """Let the control word go before all others, if it is due, or behind them."""
+        """Move the control word before all others, if it is due, or behind them."""
         if self._slot is not None and self._slot in self._due:
             self._due.remove(self._slot)
             self._due.insert(0 if first else len(self._due), self._slot)
@@ -185,7 +185,7 @@ class AcyclicOutput:
         self._written[index] = None
 
     def doubt(self, since: float, *, but: Container[int | None] = ()) -> bool:
-        """Let what was written since then, ``but`` these, be due again; tell if there was any."""
+        """Mark what was written since then, ``but`` these, as due; return if there was any."""
         found = [index for index, at in enumerate(self._written_at)
                  if at > since and index not in but]
         for index in found:
@@ -193,7 +193,7 @@ class AcyclicOutput:
         return bool(found)
 
     def write_all(self, *, but: Container[int] = ()) -> None:
-        """Let everything be due at the next look, ``but`` these, whether it has changed or not."""
+        """Mark everything ``but`` these as due at the next look, whether it has changed or not."""
         for index in range(len(self._written)):
             if index not in but:
                 self.failed(index)
@@ -218,7 +218,7 @@ class AcyclicOutput:
         return bool(self._lacking)
 
     def start_over(self) -> None:
-        """Let what was written not count: whether the drive was there to hear it, nobody knows."""
+        """Forget what was written: whether the drive was there to hear it, nobody knows."""
         self._lacking = None
 
     def has(self, index: int) -> bool:
@@ -263,7 +263,7 @@ class AcyclicOutput:
         return True
 
     def word_unanswered(self, now: float) -> None:
-        """Let the control word be written again, later, if the drive takes no notice."""
+        """Schedule the control word once more, later, if the drive takes no notice."""
         self._repeat_at = now + min(REPEAT_FIRST * 2 ** min(self._repeats, 10), REPEAT_LAST)
 
     def word_refused(self, word: int, again_at: float) -> None:

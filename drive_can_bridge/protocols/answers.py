@@ -137,7 +137,7 @@ class CycleAnswers:
                     now)
 
     def forget(self) -> None:
-        """Count anew what is missed."""
+        """Count what is missed from 0 again."""
         self.book.missed_in_row = 0
 
     def lose(self, reason: Sentence, now: float) -> None:

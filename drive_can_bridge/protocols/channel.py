@@ -20,8 +20,7 @@ may have their turn between its attempts.
 *Quarantine* (:class:`Quarantine`). After a step that nobody answered, nothing is asked that the
 late answer could be mistaken for, for as long as such an answer may come. The attempts at one step
 do not wait for each other where answers say what they answer: the late one is as good. Where they
-do not, nothing at all is asked, and whatever arrives meanwhile begins the silence
-anew.
+do not, nothing at all is asked, and whatever arrives meanwhile restarts the silence.
 
 *Stops* wait for no quarantine where answers say what they answer. One to the same question may
 still be on its way then, and proves nothing of the stop. So as many answers as may be late ones
@@ -93,7 +92,7 @@ class Quarantine:
 
     def holds(self, key: Hashable, now: float, late: float) -> bool:
         """
-        Say whether to listen on although it is time to ask.
+        Return whether to listen on although it is time to ask.
 
         :param late: s since it was time to ask.
         """
@@ -223,7 +222,7 @@ class Channel(Generic[StepT, ReplyT]):
     def late(self, received_at: float,
              answers: Callable[[StepT], bool] = lambda step: True) -> float | None:
         """
-        Take an answer that nobody waits for.
+        Record an answer that nobody waits for.
 
         :param answers: tells whether it may be that to a step.
         :return: how many s ago the step was given up that it answers; None: there is none.
@@ -285,7 +284,7 @@ class Channel(Generic[StepT, ReplyT]):
         self._hurried = self._awake = False
 
     def make_room(self, now: float) -> None:
-        """Let a stop follow soon: the answer under way is waited for a moment only."""
+        """Make room for a stop: the answer under way is waited for a moment only."""
         if self._transactor.busy and not self._hurried:
             self._hurried = True
             self._transactor.abandon(now + STOP_PATIENCE)
@@ -310,7 +309,7 @@ class Channel(Generic[StepT, ReplyT]):
 
     def receive(self, answer: Any, now: float) -> bool:
         """
-        Take an answer, in the form that the transactor wants; False: nobody asked for it.
+        Handle an answer, in the form that the transactor wants; False: nobody asked for it.
 
         :raises RemoteProtocolError: malformed, or not the answer to what is under way.
         """

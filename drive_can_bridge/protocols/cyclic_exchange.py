@@ -175,7 +175,7 @@ class CyclicExchange(Generic[TelegramT]):
         self._teller.send_cycle(cycle.telegram, now)
 
     def _expire(self, now: float) -> bool:
-        """Let setpoints go neutral that no fresh command keeps; tell whether there were any."""
+        """Make setpoints neutral that no fresh command keeps; return whether there were any."""
         expired = self._session.interlock.expire(now)
         if expired:
             self._session.commands_expired(now)
@@ -187,7 +187,7 @@ class CyclicExchange(Generic[TelegramT]):
 
     def start(self, now: float, *, in_turn: bool = False) -> None:
         """
-        Let the first cycle follow, a period after the last one at least.
+        Schedule the first cycle, a period after the last one at least.
 
         :param in_turn: it waits for the turn of this drive, if it has one.
         """
@@ -307,7 +307,7 @@ class CyclicExchange(Generic[TelegramT]):
         return (STOP_CYCLES + MORE_CYCLES) * self.timer.stop_spacing + 2 * LAST_ANSWER
 
     def stop_soon(self, now: float) -> None:
-        """Let the last cycles before silence follow soon."""
+        """Schedule the last cycles before silence, soon."""
         soon = max(now, self.timer.began_at + self.timer.stop_spacing)
         if self.timer.due < math.inf:
             self._plan(STOP_CYCLES)
@@ -335,7 +335,7 @@ class CyclicExchange(Generic[TelegramT]):
             self._teller.last_cycle_left(now)
 
     def _insist(self, now: float) -> None:
-        """Begin with more cycles for who has not shown to have heard one."""
+        """Send more cycles to those that have not acknowledged one; end it, if there are none."""
         if self.insisting or not self._unheard:
             self._end(now)
             return

@@ -213,7 +213,7 @@ class ExchangeBook:
 
     def late(self, received_at: float) -> float | None:
         """
-        Take an answer that nobody waits for.
+        Record an answer that nobody waits for.
 
         :return: by how many s answers are late: this one, or that before it, which was taken for
             that to a later cycle; 0: it is in time, but not wanted any more; None: no cycle is
@@ -282,7 +282,7 @@ class ExchangeBook:
         self.awaiting = False
 
     def take_stale(self) -> bool:
-        """Take a frame beside the answers that nobody waits for; tell whether it may come."""
+        """Count a frame that nobody waits for; return whether it may come beside the answers."""
         if not self.stale:
             return False
         self.stale -= 1

@@ -6,7 +6,7 @@ A family writes it down as one generator. It yields a procedure of the acyclic c
 what that returned; or the time until which it waits, and is sent the time when it goes on. What
 has to be fast (cycles, answers, the control word) goes on beside it.
 
-Found, lost, bus back, a stall: whatever makes the conversation begin anew *starts* a life, which
+Found, lost, bus back, a stall: whatever makes the conversation restart *starts* a life, which
 ends the one before where it stands. So a position in the sequence is a line of the generator, and
 never a flag.
 """

@@ -59,7 +59,7 @@ class CyclicWatch:
         self._cycle = now
 
     def ask(self, now: float, *, begins_cycle: bool = True) -> None:
-        """Take a request; the one before is missed if it was not answered."""
+        """Record a request; the one before is missed if it was not answered."""
         if self._asked == self._asked:      # not NaN
             self._miss(now)
         if begins_cycle:
@@ -122,14 +122,14 @@ class AnswerWatch:
         observer.watches.append(self)
 
     def ask(self, now: float) -> None:
-        """Take a request; the one before is lost if it was not answered."""
+        """Record a request; the one before is lost if it was not answered."""
         if self._asked == self._asked:      # not NaN
             self._lose(now)
         self._asked = now
         self._observer.due(now + self._timeout)
 
     def answer(self, now: float) -> float:
-        """Take an answer; return s since the request (NaN: there was none)."""
+        """Record an answer; return s since the request (NaN: there was none)."""
         latency, self._asked = now - self._asked, math.nan
         return latency
 
@@ -190,7 +190,7 @@ class PendingRequests(Generic[Key]):
             words: Sequence[int] | None = None, *, title: str = '', wrong: str = '',
             futile: bool = False) -> None:
         """
-        Take a request; one that is repeated waits anew.
+        Record a request; one that is repeated waits from now on.
 
         :param key: what its answer will say; None: there is none to be expected.
         :param words: what is written; None: it is a read.
@@ -217,7 +217,7 @@ class PendingRequests(Generic[Key]):
                refusal: str = '', wrong: str = '', remark: str = '',
                parts: Sequence[Hashable] = ()) -> None:
         """
-        Take an answer.
+        Count an answer, and report it.
 
         :param asked: what it is about.
         :param words: what it holds; None: nothing.
@@ -299,7 +299,7 @@ class RoundWatch:
         self._incomplete = False
 
     def asked(self, span: Hashable, now: float) -> bool:
-        """Take a read; tell whether it belongs to a round."""
+        """Record a read; return whether it belongs to a round."""
         began, self.prelude = self.prelude, math.nan
         if not self.plan:
             return False
@@ -319,7 +319,7 @@ class RoundWatch:
     def answered(self, span: Hashable, now: float, *, refused: bool = False,
                  parts: Sequence[Hashable] = ()) -> None:
         """
-        Take the answer to a read.
+        Record the answer to a read.
 
         :param refused: by a refusal; the round goes on, but brings no complete sample.
         :param parts: what is read instead, from now on.
@@ -352,7 +352,7 @@ class WriteGap:
         self._last = -math.inf
 
     def written(self, now: float) -> str:
-        """Take an EEPROM write; return what is wrong with its time, '' nothing."""
+        """Record an EEPROM write; return what is wrong with its time, '' nothing."""
         distance, self._last = now - self._last, now
         if distance >= self._gap - STAMP_TOLERANCE:
             return ''

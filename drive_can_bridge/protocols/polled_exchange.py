@@ -105,7 +105,7 @@ class Polled(Protocol):
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:
         """
-        Take a round before it becomes a sample.
+        Handle a round before it becomes a sample.
 
         :param found: the drive was found by it.
         """
@@ -143,13 +143,13 @@ class PolledExchange:
         self._channel.run(self._rounds.read_round(), self._ended, now)
 
     def wait(self, now: float, patience: float) -> None:
-        """Let a period pass: the round under way has not ended, and has so many s for it."""
+        """Count a period in which the round under way has not ended; it has so many s."""
         self.timer.begun(now)
         if now - self._book.began_at > patience:
             self._miss(now)
 
     def forget(self) -> None:
-        """Count anew what is missed."""
+        """Count what is missed from 0 again."""
         self._book.missed_in_row = 0
 
     def disregard(self) -> None:

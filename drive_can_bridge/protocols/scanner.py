@@ -79,7 +79,7 @@ class Scanner(ABC):
 
     @abstractmethod
     def hear(self, frame: Frame, now: float) -> None:
-        """Take a frame from the bus (not one of our own)."""
+        """Handle a frame from the bus (not one of our own)."""
 
     @abstractmethod
     def begin(self) -> None:

@@ -52,7 +52,7 @@ class Slack:
         self.since = math.inf
 
     def came(self, at: float) -> None:
-        """Take the first answer of a drive that was lost."""
+        """Report by the first answer of a drive that was lost what would have held."""
         gap, self.since = at - self.since, math.inf
         drive = self._drive
         if 0.0 < gap <= GAP_MAX:
@@ -69,7 +69,7 @@ class Slack:
         return sentences.longer_period_would_hold(late=seconds, period=period)
 
     def heartbeat(self, gap: float) -> None:
-        """Take a heartbeat of a drive that is lost for want of it, so many s after the last."""
+        """Report what would have held by a heartbeat that came so many s after the last."""
         if 0.0 < gap <= GAP_MAX:
             self.tell('heartbeat_timeout', sentences.longer_timeout_would_hold(
                 gap=gap, timeout=enough(gap)))

@@ -62,7 +62,7 @@ class Transactor(ABC, Generic[StepT, ReplyT]):
     @abstractmethod
     def receive(self, answer: Any, now: float) -> ReplyT | bool:
         """
-        Take an answer, in the form that the family gives it.
+        Match an answer, in the form that the family gives it.
 
         :return: the reply that ends the exchange under way; True: it goes on; False: nobody
             asked for this answer.

@@ -62,7 +62,7 @@ def make_control(*, parameter_set: int, timeout: float,
 
 
 def hint(status: int) -> Sentence:
-    """Say what a status word tells about why an inverter does not go on; '' for nothing."""
+    """Return why an inverter does not go on, by its status word; '': it does not say."""
     if is_faulted(status):
         return NOTHING
     if not status & _VOLTAGE_ENABLED:

@@ -85,7 +85,7 @@ class Group:
         self._sessions: list[Session] = []
 
     def join(self, member: GroupMember) -> None:
-        """Take an inverter in."""
+        """Add an inverter."""
         session = member.session
         if not self._members:
             self.exchange = CyclicExchange(member.answers, self, slot=0)
@@ -184,12 +184,12 @@ class Group:
         self.control.withdraw(reason, now, lost=False)
 
     def status(self, session: Session, word: int, now: float) -> None:
-        """Take the status word of an inverter."""
+        """Handle the status word of an inverter."""
         self.control.status_received(word, now, '' if self.alone else session.configuration.name)
         self._leader.control_changed(now)
 
     def _unheard(self) -> Sentence:
-        """Say which inverters were told to run, and have not answered since they were stopped."""
+        """Return which inverters were commanded, and have not answered since they were stopped."""
         names = [session.configuration.name for session in self._sessions
                  if session.unshown and not session.online]
         return sentences.members_may_run(names) if names else NOTHING
@@ -199,7 +199,7 @@ class Group:
     def control_refusal(self, session: Session, action: ControlAction,
                         refusal: Sentence, *, offline: bool) -> Sentence:
         """
-        Say why a control action cannot be asked for; '' if it can.
+        Return why a control action cannot be asked for; '' if it can.
 
         :param refusal: what would be said of an inverter alone.
         :param offline: that is that it is offline.
@@ -232,11 +232,11 @@ class Group:
         return others
 
     def cyclic_refusal(self, parameter: Parameter) -> Sentence:
-        """Say why a setpoint of an inverter that is led is not written by request."""
+        """Return why a setpoint of an inverter that is led is not written by request."""
         return sentences.sent_by_group(parameter.name, self.leads)
 
     def facts(self, session: Session) -> dict[str, str]:
-        """Say who leads whom."""
+        """Return who leads whom, for diagnostics."""
         if self.alone:
             return {}
         if session is not self._leader:

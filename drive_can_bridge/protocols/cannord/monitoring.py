@@ -46,7 +46,7 @@ def timeout_parameter(profile: Profile) -> Parameter | None:
 
 def timeout_warning(parameter: Parameter, timeout: float, period: float) -> Sentence:
     """
-    Say that the inverter's time-out is too tight for the period; '' if it is not.
+    Return that the inverter's time-out is too tight for the period; '' if it is not.
 
     :param timeout: s; 0 or less: not monitored.
     :param period: s between two process frames.

@@ -220,5 +220,5 @@ class ParameterLayout:
 
 
 def error_text(number: int) -> str:
-    """Say what an error number means: ``error 2: limit exceeded``."""
+    """Return what an error number means: ``error 2: limit exceeded``."""
     return f'error {number}: {ERRORS.get(number, "unknown")}'

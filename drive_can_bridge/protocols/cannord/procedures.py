@@ -37,7 +37,7 @@ def signed_cells(parameters: Iterable[Parameter]) -> Cells:
 
 
 def write_refusal(parameter: Parameter) -> Sentence:
-    """Say why no task writes a parameter; '' if one can."""
+    """Return why no task writes a parameter; '' if one can."""
     return PROCESS_DATA_ONLY if parameter.number is None else NOTHING
 
 
@@ -118,7 +118,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
     def _carry_out(self, parameter: Parameter, task: Task, value: int = 0,
                    attempts: int | None = None,
                    ) -> Generator[ParameterTask, TaskResult, ParameterFrame | Failure]:
-        """Have a task done; return the response, or why there is none that does."""
+        """Send a task; return the response, or why there is none that counts."""
         reply = yield ParameterTask(task, parameter.number or 0, parameter.subindex or 0, value)
         if reply.response is not None:
             if reply.response.identifier != ResponseId.REFUSED:
@@ -136,7 +136,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
 
 def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[ParameterTask,
                                                                           TaskResult, Failure]:
-    """Say why the drive refused; where an element does not exist, also how many there are."""
+    """Return why the drive refused; where an element does not exist, also how many there are."""
     text = error_text(response.word)
     if response.word == WRONG_INDEX and parameter.subindex is not None:
         reply = yield ParameterTask(Task.READ_ELEMENTS, parameter.number or 0)

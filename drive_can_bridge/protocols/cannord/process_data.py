@@ -180,7 +180,7 @@ class Samples:
     def take(self, word: int, values: tuple[int, ...], received_at: float, *,
              asked: bool) -> bool:
         """
-        Take a main frame; tell whether it has all the values that are wanted of it.
+        Handle a main frame; return whether it has all the values that are wanted of it.
 
         :param asked: it answers the exchange under way.
         """
@@ -201,7 +201,7 @@ class Samples:
         return complete
 
     def take_extra(self, data: bytes) -> None:
-        """Take the additional frame of the exchange under way."""
+        """Handle the additional frame of the exchange under way."""
         self.awaiting = False
         held, self._held = self._held, None
         if held is not None:    # else: nobody wants them, or what they belong to did not come

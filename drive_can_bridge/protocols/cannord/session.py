@@ -189,7 +189,7 @@ class CannordSession(Session):
             self.report.reject(sentences.malformed(error.sentence))
 
     def _receive_main(self, data: bytes, now: float, received_at: float) -> None:
-        """Take status word and actual values. The fast path of the reader."""
+        """Handle status word and actual values. The fast path of the reader."""
         word, values = decode_main(data, swap=self._swap)
         self._faulted = is_faulted(word)
         answers = self._answers
@@ -218,7 +218,7 @@ class CannordSession(Session):
             self.statistics.short += 1
 
     def _receive_extra(self, data: bytes) -> None:
-        """Take actual values 4 and 5."""
+        """Handle actual values 4 and 5."""
         if self._samples.awaiting:
             self._samples.take_extra(data)
         elif not self._answers.book.take_stale():

@@ -31,7 +31,7 @@ def sdo_route(node: int) -> Route:
 
 
 def nmt_command(frame: Frame, node: int) -> Sentence:
-    """Say what another master orders by NMT; '' where it is not about this node."""
+    """Return what another master orders by NMT; '' where it is not about this node."""
     try:
         number, addressed = network.decode_nmt(frame.data)
         command = NmtCommand(number)
@@ -45,7 +45,7 @@ def nmt_command(frame: Frame, node: int) -> Sentence:
 
 
 def sdo_request(frame: Frame, node: int) -> Sentence:
-    """Say what another master asks of the SDO server of a node."""
+    """Return what another master asks of the SDO server of a node."""
     try:
         asked = sdo.decode(Direction.REQUEST, frame.data)
     except RemoteProtocolError:

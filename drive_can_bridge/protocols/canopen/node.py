@@ -66,7 +66,7 @@ class WatchedNode:
     :ivar heartbeat_lost: a heartbeat is overdue.
     :ivar silent_for: s that a heartbeat was overdue and more, when it has come at last; 0: it was
         not, or the device has restarted.
-    :ivar pdo_at: when it sent a PDO last, for who looks at them.
+    :ivar pdo_at: when it sent a PDO last, for those who look at them.
     :ivar heard_at: when it said anything else last, likewise.
     """
 
@@ -100,7 +100,7 @@ class WatchedNode:
     # -- input ------------------------------------------------------------------------------------
 
     def receive_heartbeat(self, state: NmtState, now: float) -> NodeChange:
-        """Take a boot-up frame or heartbeat."""
+        """Handle a boot-up frame or heartbeat."""
         was_blocked, interval = self._blocked(now), now - self._heartbeat_at
         recovered, self.heartbeat_lost = self.heartbeat_lost, False
         self.silent_for = (
@@ -127,7 +127,7 @@ class WatchedNode:
         return NodeChange.STILL_NOT if was_blocked else NodeChange.NOT_OPERATIONAL
 
     def take_empty_heartbeat(self, report: Reporter, now: float) -> None:
-        """Take a heartbeat without content, and tell the first."""
+        """Handle a heartbeat without content, and report the first."""
         self.heard_at = now
         if not self.without_content:
             self.without_content = True
@@ -135,7 +135,7 @@ class WatchedNode:
 
     def receive_emergency(self, emergency: Emergency) -> Sentence:
         """
-        Take an emergency message.
+        Record an emergency message.
 
         :return: what is new about it, in words; '': nothing.
         """
@@ -149,7 +149,7 @@ class WatchedNode:
 
     def take_emergency(self, data: bytes, report: Reporter) -> None:
         """
-        Take the data of an emergency message, and tell what is new about it.
+        Handle the data of an emergency message, and report what is new about it.
 
         :raises RemoteProtocolError: it is malformed.
         """
@@ -176,7 +176,7 @@ class WatchedNode:
     # -- state ------------------------------------------------------------------------------------
 
     def refusal(self, now: float) -> Sentence:
-        """Say why no PDO can be sent for a while; '' if it can."""
+        """Return why no PDO can be sent for a while; '' if it can."""
         if not self._blocked(now) or self.state is None:
             return NOTHING
         return sentences.node_state(self.state.text)

@@ -20,7 +20,7 @@ _COMMANDS = {command.value: command.name.lower().replace('_', ' ')
 def hear_node(observer: DriveObserver, node: int, booted: Callable[[], None],
               timeout: float) -> None:
     """
-    Have heartbeats, answers to node guarding and emergency messages of a node told.
+    Report heartbeats, answers to node guarding and emergency messages of a node.
 
     :param booted: called when the node has started.
     :param timeout: s that an answer to node guarding may take.

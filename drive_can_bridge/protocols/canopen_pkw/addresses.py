@@ -262,7 +262,7 @@ def keys(parameter: Parameter) -> frozenset[Key]:
 
 
 def half_refusal(parameter: Parameter, profile: Profile) -> Sentence:
-    """Say why an unlisted parameter is not written that is one half of a listed one; else ''."""
+    """Return why no unlisted half of a listed parameter is written; '' if it is none."""
     if parameter.listed:
         return NOTHING
     mine = keys(parameter)

@@ -74,7 +74,7 @@ class Rounds:
                 for parameter, span in zip(self._drive.cyclic_response, self._spans)]
 
     def ended(self, now: float, *, found: bool) -> None:
-        """Take the status of a drive that was found by this round."""
+        """Hand on the status of a drive that was found by this round."""
         if found:
             self._take_status(self._words)
         elif self._status is not None and self._status_among(self._words) is None:
@@ -93,7 +93,7 @@ class Rounds:
         return None if self._status is None else self._placement.raw_among(*self._status, words)
 
     def _instead(self, span: Span, refused: Refused) -> Sequence[Span]:
-        """Take a refusal: two parameters that share a read are read alone from now on."""
+        """Handle a refusal: two parameters that share a read are read alone from now on."""
         parts = instead_of(span, round_spans(self._drive))
         if parts:
             place = self._plan.index(span)
@@ -112,5 +112,5 @@ class Rounds:
             if set(own.addresses) <= set(span.addresses)) or str(span.address)
 
     def warnings(self) -> list[Sentence]:
-        """Say what the drive refuses, and what to do."""
+        """Return what the drive refuses, and what to do."""
         return [sentences.poll_refused(text) for text in self.refusals.values()]

@@ -16,8 +16,8 @@ Whatever the reason: the control word goes back to ``disable``, setpoints go neu
 re-arming. A drive that was told to run is told to stand still at once, whatever is known of the
 node: what is only silent may still be listening.
 
-How it is looked for is one script (:meth:`PkwSession._life`), begun anew at the start, when the
-bus is back, after a stall, when the node has started anew or says that it takes no PDOs, when the
+How it is looked for is one script (:meth:`PkwSession._life`), begun at the start, when the
+bus is back, after a stall, when the node has restarted or says that it takes no PDOs, when the
 drive is lost; it ends when the drive is found. NMT *start* goes out when the bridge starts, after
 a boot-up frame, when a heartbeat says that the node is not operational, and once a second; never
 more than ten times a second, however often the node asks for it: then it is put off, not left out.
@@ -173,7 +173,7 @@ class PkwSession(Session):
 
     def _life(self, now: float, start_at: float) -> Script:
         """
-        Have the node take PDOs, until the drive is found.
+        Start the node again and again, until the drive is found.
 
         :param start_at: when it is started next.
         """
@@ -184,13 +184,13 @@ class PkwSession(Session):
             self.outbox.put(start)
             self._started_at, start_at = now, now + START_PERIOD
 
-    def _look_for_it(self, now: float, start_at: float, *, anew: bool = True) -> None:
+    def _look_for_it(self, now: float, start_at: float, *, needed: bool = True) -> None:
         """
-        Begin the life anew.
+        Restart the life.
 
-        :param anew: the node is started because it needs that: a moment later it takes PDOs.
+        :param needed: the node has to be started: a moment later it takes PDOs.
         """
-        if anew and self.configuration.options.nmt_start:
+        if needed and self.configuration.options.nmt_start:
             self._node.started(start_at)
         self._course.start(self._life(now, start_at), now)
 
@@ -207,7 +207,7 @@ class PkwSession(Session):
             return
         self._exchange.slack.heartbeat(self._node.silent_for)
         if change is NodeChange.OPERATIONAL:
-            self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
+            self._look_for_it(now, self._started_at + START_PERIOD, needed=False)
         else:       # before a stop: the node hears that only when it was started
             self._look_for_it(now, max(now, self._started_at + START_SPACING))
         if change is NodeChange.RESTARTED:
@@ -227,7 +227,7 @@ class PkwSession(Session):
         """Handle a node that takes no PDOs: none that was sent is answered any more."""
         self.lose(reason, now)
         self.services.fail_all(failure)
-        # a stop takes its course: however often a node starts anew, they do not pile up
+        # a stop takes its course: however often a node restarts, they do not pile up
         if self._channel.is_idle(Priority.STOP):
             self._channel.clear()
             self._stop_if_owed(now)
@@ -242,7 +242,7 @@ class PkwSession(Session):
         self.lose(reason, now)
         if was_online:
             self._writers.stop(now)     # it may be listening
-            self._look_for_it(now, self._started_at + START_PERIOD, anew=False)
+            self._look_for_it(now, self._started_at + START_PERIOD, needed=False)
 
     def request_refusal(self, now: float) -> Failure | None:
         """Return why nothing can be asked by PDOs for a while; None: it can."""
@@ -251,7 +251,7 @@ class PkwSession(Session):
                 None)
 
     def _node_says(self, identifier: int, data: bytes, now: float) -> bool:
-        """Take a frame; tell whether it was the node's heartbeat or emergency message."""
+        """Handle a heartbeat or emergency message of the node; return whether it was one."""
         base = identifier - self._node.number
         if base == network.HEARTBEAT_BASE and not data:
             self._node.take_empty_heartbeat(self.report, now)
@@ -264,7 +264,7 @@ class PkwSession(Session):
         return True
 
     def _stop_if_owed(self, now: float) -> None:
-        """Have a drive stand still of which nobody knows whether it listens."""
+        """Stop a drive of which nobody knows whether it listens, if its stop is pending."""
         if self.duty.happened(Happened.STARTED) is Do.STOP:
             self._writers.stop(now)
 

@@ -302,7 +302,7 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._send(request, self._left)
 
     def _prepared(self, request: PkwMessage, step: Step, now: float) -> Reply | bool:
-        """Take the answer to what was asked before the step."""
+        """Handle the answer to what was asked before the step."""
         self._synchronised = True
         if self._abandoned:
             self.finish()
@@ -339,14 +339,14 @@ class MailboxTransactor(Transactor[Step, Reply]):
         self._prepare(pkw.read_request(Address(word), 1, self._toggle), now)
 
     def _writes_since(self, answer: PkwMessage) -> list[PkwMessage]:
-        """Take an answer: it is to the oldest write that it fits. Return that and those since."""
+        """Return the oldest write that an answer fits, and those since; forget up to that one."""
         found = list(dropwhile(lambda each: not pkw.answers(answer, each), self._open))
         if found:
             self._open = deque(found[1:], maxlen=OPEN_MAX)
         return found
 
     def _take_late(self, answer: PkwMessage, now: float) -> float | None:
-        """Take an answer; return until when it might be that to a write that was given up."""
+        """Record an answer; return until when it might be that to a write that was given up."""
         found = next(
             (each for each in self._still_late(now) if pkw.answers(answer, each[1])), None)
         if found is not None:

@@ -133,7 +133,7 @@ class Writers:
 
     def expire(self, now: float) -> bool:
         """
-        Let setpoints go neutral that are too old, before any of them is handed out.
+        Make setpoints neutral that are too old, before any of them is handed out.
 
         Others make room for those, once a round: a slow drive has to be read, too.
         """
@@ -337,7 +337,7 @@ class Writers:
         self._session.control_changed(now)
 
     def _tell_silence(self, parameter: Parameter, word: int) -> None:
-        """Say that a word that stops the drive is not acknowledged, once until one is."""
+        """Warn that a word that stops the drive is not acknowledged, once until one is."""
         text = sentences.write_unanswered(f'{parameter.name} {word:04X}h')
         if text != self._word_refusal:
             self._session.report.warn(
@@ -382,7 +382,7 @@ class Writers:
     # -- what the drive refuses -------------------------------------------------------------------
 
     def control_refusal(self, action: ControlAction, refusal: Sentence) -> Sentence:
-        """Say why a control action cannot be asked for, besides the usual."""
+        """Return why a control action cannot be asked for, besides the usual."""
         if action is ControlAction.ENABLE:
             for setpoint in self._setpoints.held:  # the drive has another position
                 failed = self._failures.get(setpoint.parameter.name)
@@ -391,7 +391,7 @@ class Writers:
         return refusal
 
     def warnings(self) -> list[Sentence]:
-        """Say what the drive refuses, and what to do."""
+        """Return what the drive refuses, and what to do."""
         texts = [sentences.setpoint_not_taken(text) for text in self._failures.values()]
         if self._word_refusal:
             texts.append(sentences.word_not_taken(self._word_refusal))

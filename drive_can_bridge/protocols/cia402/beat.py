@@ -161,7 +161,7 @@ class Beat:
         return due
 
     def agree(self) -> None:
-        """Have all that have begun this round due together, however late each of them was."""
+        """Make all that have begun this round due together, however late each of them was."""
         begun = [turn for turn in self.turns if turn.begun_round and turn.running]
         soonest = min(turn.due for turn in begun)
         for turn in begun:
@@ -169,7 +169,7 @@ class Beat:
                 CycleTimer.start(turn, soonest)
 
     def bring_forward(self, at: float) -> None:
-        """Have a whole round begin then, unless it is due before."""
+        """Schedule a whole round for then, unless it is due before."""
         for turn in self.turns:
             if turn.running and turn.due > at:
                 turn.follow(at)
@@ -248,7 +248,7 @@ class Beat:
         outbox.put(network.encode_sync())
 
     def before_start(self, now: float) -> float:
-        """Have SYNC around an NMT start; return in how many s that may be sent."""
+        """Schedule SYNC around an NMT start; return in how many s that may be sent."""
         flows = self.by_rounds or self.due < math.inf
         self._around_until = now + BEFORE_START + BEHIND_START
         if flows:

@@ -9,7 +9,7 @@ What is done with a drive before its first PDO, as one sequence.
         ─► where axes are that stay there ─► 6041h as above ─► PDOs flow
 
 All that may take minutes, and others may have enabled the drive meanwhile: so it is asked for its
-state once more before the first PDO, and disabled. Whatever nobody answers ends it; it begins anew
+state once more before the first PDO, and disabled. Whatever nobody answers ends it; it restarts
 then. What differs from the configuration, and cannot be made to fit, is told in words, and the
 drive is not cycled.
 """
@@ -194,7 +194,7 @@ class BringUp:
         return raw
 
     def _tell_blindly(self, attempts: int | None = None) -> Procedure:
-        """Have a drive stand still whose state nobody knows, before SYNC begins."""
+        """Stop a drive whose state nobody knows, before SYNC begins."""
         if self._beat is not None and not self._beat.opened and self._stopped_at == math.inf:
             self._stopped_at = self._channel.now
             word = DISABLE_WORDS[self._options.disable_word].to_bytes(2, 'little')
@@ -226,7 +226,7 @@ class BringUp:
             return
 
     def _heartbeat(self) -> Procedure:
-        """Have the drive produce heartbeats."""
+        """Set up the heartbeats of the drive."""
         node, interval = self._node, round(1000 * self._options.heartbeat_producer)
         node.heartbeat_timeout = self._options.heartbeat_timeout
         if not interval:
@@ -257,7 +257,7 @@ class BringUp:
                 yield Transfer(pause=LOOK_PERIOD)
 
     def _start(self) -> Procedure:
-        """Have the node take PDOs, or wait until somebody else does."""
+        """Start the node, or wait until somebody else does."""
         if self._beat is not None:
             yield from self._sync_begins(self._beat)
         if self._options.nmt_start:
@@ -306,7 +306,7 @@ class BringUp:
         return self._node.state not in (None, NmtState.OPERATIONAL)
 
     def wake(self, now: float) -> None:
-        """Have a node that answers nothing become pre-operational, if that is our business."""
+        """Send a node that answers nothing to pre-operational, if NMT is our business."""
         self.nmt_at = now
         if self._options.nmt_start:
             self._nmt(NmtCommand.ENTER_PRE_OPERATIONAL)

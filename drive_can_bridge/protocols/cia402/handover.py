@@ -48,7 +48,7 @@ class Handover:
         self._settling = 0                  # status words until bit 12 is none of a cut edge
 
     def look(self, status: int, now: float) -> None:
-        """Take a status word, before the next control word is chosen."""
+        """Go on by a status word, before the next control word is chosen."""
         rules, setpoint = self._rules, self._setpoint
         if state_of(status) is not ServoState.OPERATION_ENABLED:
             self._handed, self._rising, self._settling = None, False, 0

@@ -97,7 +97,7 @@ class Homing:
         return self._step is not HomingStep.NONE
 
     def refusal(self) -> Sentence:
-        """Say why it cannot begin now; '' if it can."""
+        """Return why it cannot begin now; '' if it can."""
         if self.under_way:
             return sentences.homing_under_way()
         if not self._machine.operating:
@@ -136,7 +136,7 @@ class Homing:
             self._finish()
 
     def sampled(self, status: int, raws: Sequence[int], now: float) -> None:
-        """Take a sample, after its status word and what follows from that."""
+        """Go on by a sample, after its status word and what follows from that."""
         step, self._now = self._step, now
         if step is HomingStep.NONE:
             return
@@ -201,7 +201,7 @@ class Homing:
         self._go(HomingStep.RUNNING)
 
     def _end(self, failure: Sentence) -> None:
-        """Come to the end of the motion: bit 4 falls, and the position is latched anew."""
+        """Come to the end of the motion: bit 4 falls, and the position is latched again."""
         drive, self._failure = self._session.configuration, failure
         self.due = self._now + max(   # it may have to brake first
             drive.control_timeout + LONG, _LATCHING_PERIODS * drive.period)
@@ -211,7 +211,7 @@ class Homing:
         self._go(HomingStep.LATCHING)
 
     def _latch(self, raws: Sequence[int], behind: bool) -> None:
-        """Take where the axis is, as soon as it stands: unless it is homed, it has to brake."""
+        """Latch where the axis is, as soon as it stands: unless it is homed, it has to brake."""
         setpoints = self._session.setpoints
         setpoints.measure(raws, driven=False)
         if not setpoints.known:     # a sample that was cut short says nothing
@@ -300,7 +300,7 @@ class Homing:
         self._channel.run(look(), then, self._now)
 
     def _answer_stopped(self) -> None:
-        """Say how far it came; the watch for faults adds which one it was that stopped it."""
+        """Answer how far it came; the watch for faults adds which one it was that stopped it."""
         step = self._step.value
         self._answer(False, sentences.fault_while_homing(step) if self._machine.fault else
                      sentences.homing_stopped(step), by_fault=self._machine.fault)

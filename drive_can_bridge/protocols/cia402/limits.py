@@ -74,7 +74,7 @@ class LimitCheck:
 
     def found(self, words: dict[Parameter, int]) -> Sentence:
         """
-        Take what was read before anything is sent.
+        Record what was read before anything is sent.
 
         :return: which limit was without effect, and still has the same value; '': none.
         """

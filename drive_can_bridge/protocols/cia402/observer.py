@@ -48,7 +48,7 @@ class EventWatch:
         self._last = math.nan
 
     def complete(self, now: float) -> float:
-        """Take a complete set; return when the next one is missed."""
+        """Count a complete set; return when the next one is missed."""
         if self._last == self._last:    # not NaN
             self._observed.period.add(now - self._last)
         self._last = now
@@ -106,7 +106,7 @@ class Cia402Observer(DriveObserver):
     # -- process data -----------------------------------------------------------------------------
 
     def synchronise(self, now: float) -> None:
-        """Take a SYNC: it asks a drive that was told something."""
+        """Handle SYNC: it asks a drive that was sent RPDOs."""
         if self._cycle is not None and self._told:
             self._told = False
             self._arrived.clear()
@@ -170,7 +170,7 @@ class Cia402Observer(DriveObserver):
             refusal=sdo.describe(answer.number) if answer.kind is Said.ABORT else '')
 
     def _take_segment_request(self, request: SdoMessage, now: float) -> None:
-        """Take the next segment, or the wish for it: the transfer was told."""
+        """Handle the next segment, or the request for it; the transfer was reported."""
         if self._transfer is None:
             return
         self._segments.ask(now)

@@ -42,7 +42,7 @@ def cells(parameter: Parameter) -> Cells:
 
 
 def refused(code: int) -> Failure:
-    """Say that a drive refused a transfer."""
+    """Return that a drive refused a transfer."""
     return requests.refused(code, sentences.refused_by_drive(code, sdo.describe(code)))
 
 

@@ -97,7 +97,7 @@ class SdoStop:
 
     def _wake(self, word: Transfer, attempts: int) -> Generator[Transfer, TransferResult,
                                                                 tuple[TransferResult, int]]:
-        """Have the node answer SDO, and write the control word right behind, until it answers."""
+        """Send NMT so that the node answers SDO, and the control word behind it, till it does."""
         until = self._channel.now + NMT_TIME - 0.5 * NMT_SPACING
         command = network.encode_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node.number)
         reply = SILENT

@@ -3,9 +3,9 @@
 The conversation with one drive of CiA 402.
 
 Before the first PDO a drive is set up by SDO (:mod:`.bring_up`), and so it is after every loss:
-a node that has started anew has forgotten what was written. That it has power is not needed.
+a node that has restarted has forgotten what was written. That it has power is not needed.
 That, again and again until it is ready to be cycled, is its life (:meth:`Cia402Session._life`).
-A drive that is lost while it is online gets three neutral cycles more before it begins anew.
+A drive that is lost while it is online gets three neutral cycles more before it restarts.
 
 Whatever was told to run is told to stop: by cycles while PDOs flow, otherwise by SDO, which no
 mapping can misroute. At the end, stop cycles go on until the drive says that it is disabled, or
@@ -297,7 +297,7 @@ class Cia402Session(Session):
             self._silent(sentences.no_heartbeat(self._node.heartbeat_timeout), now)
 
     def _silent(self, reason: Sentence, now: float) -> None:
-        """Have a drive that is lost stand still: it may be listening."""
+        """Handle a drive that is silent; one that is lost by it is stopped: it may listen."""
         self._answers.forget()
         if not self.online:
             self.exchange.stop()
@@ -412,7 +412,7 @@ class Cia402Session(Session):
             self.report.advice, self._node, self._channel.now)
 
     def _receive_pdo(self, place: int, data: bytes, now: float, received_at: float) -> None:
-        """Take one PDO of a set. The fast path of the reader."""
+        """Handle one PDO of a set. The fast path of the reader."""
         exchange, answers, count = self.exchange, self._answers, len(self._responses)
         self._node.pdo_at = now
         if not exchange.cycling:
@@ -496,7 +496,7 @@ class Cia402Session(Session):
             and frame.data[1] == self.configuration.station)
 
     def _no_pdos_at_the_end(self, state: NmtState, now: float) -> None:
-        """Have a node told by SDO, at the end, that takes no PDOs any more."""
+        """Stop a node by SDO, at the end, that takes no PDOs any more."""
         if self.exchange.cycling and self.unshown and state is not NmtState.OPERATIONAL:
             self.exchange.doubt_the_end()
             self.exchange.stop()

@@ -70,7 +70,7 @@ class Band:
         self._last: int | None = None
 
     def take(self, position: int, now: float) -> None:
-        """Take a position."""
+        """Record a position."""
         before, self._last, self.seen_at = self._last, position, now
         if before is None:
             self._come_in(position, now)
@@ -149,7 +149,7 @@ class Standing:
     # -- what is seen -----------------------------------------------------------------------------
 
     def status(self, raw: int, now: float) -> None:
-        """Take a status word: in *quick stop active* the axis is watched."""
+        """Record a status word: in *quick stop active* the axis is watched."""
         self._now, state = now, state_of(raw)
         if state is not self._state:
             self._state = state
@@ -163,7 +163,7 @@ class Standing:
             self._seen_low, self._in_a_row = True, 0
 
     def sampled(self, raws: Sequence[int | None], now: float) -> None:
-        """Take a sample, its status word first."""
+        """Record a sample, its status word first."""
         for index, place in self._places.items():
             raw = raws[place] if place < len(raws) else None
             if raw is None:

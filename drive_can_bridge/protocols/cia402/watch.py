@@ -44,7 +44,7 @@ class BridgeWatch:
         self._unsure = NOTHING      # why nobody knows whether the drive watches
 
     def set_up(self) -> Procedure:
-        """Have the drive stop by itself when the bridge dies."""
+        """Set up what stops the drive when the bridge dies, and learn what does."""
         interval, mapping = self._options.bridge_heartbeat, self._options.mapping
         self._unsure = NOTHING
         if mapping == 'assume':
@@ -78,7 +78,7 @@ class BridgeWatch:
         self._tell(sentences.watch_unknown(why))
 
     def _refused(self, index: int, subindex: int = 0) -> Sentence:
-        """Say why the object that was read last is not known; '' if the drive has none."""
+        """Return why the object that was read last is not known; '' if the drive has none."""
         return NOTHING if self._objects.absent else sentences.object_refused(
             at_object(index, subindex), sdo.describe(self._objects.abort or 0))
 
@@ -144,7 +144,7 @@ class BridgeWatch:
         return None
 
     def release(self, timeout: float) -> Procedure:
-        """Have the drive watch the bridge no more, behind an ordered stop."""
+        """End the watch of the drive for the bridge, behind an ordered stop."""
         slot, self.slot = self.slot, None
         if slot is not None:
             yield Transfer(CONSUMER, slot, bytes(4), attempts=self._attempts, timeout=timeout)

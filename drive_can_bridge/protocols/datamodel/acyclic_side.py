@@ -108,7 +108,7 @@ class AcyclicSide:
     # -- frames from the drive, or its address ----------------------------------------------------
 
     def receive(self, frame: Frame, now: float, age: float = 0.0) -> None:
-        """Take an answer that has waited for ``age``: to the outstanding read, or to nothing."""
+        """Handle an answer that has waited for ``age``: to the outstanding read, or to nothing."""
         session, self.shows_up = self._session, True
         try:
             asked = self.transactor.outstanding

@@ -2,7 +2,7 @@
 """
 The conversation with one DataModel drive that uses 29-bit identifiers.
 
-Its life (:meth:`ExtendedSession._life`) is one sequence, begun anew whenever the drive is lost,
+Its life (:meth:`ExtendedSession._life`) is one sequence, restarted whenever the drive is lost,
 the bus is back, or the process stood still:
 
 .. code-block:: text
@@ -192,7 +192,7 @@ class ExtendedSession(Session):
                 elif (yield from self._find_axes(look_at)):
                     self._start_cycling(self._channel.now)
                 elif self._channel.now < look_at:   # it has not answered, and may have
-                    agreed = False                  # started anew meanwhile, with other maps
+                    agreed = False                  # restarted meanwhile, with other maps
                     self._side.again.heard(self._channel.now, answered=True)
                     continue
             yield look_at
@@ -235,7 +235,7 @@ class ExtendedSession(Session):
 
     def _differ(self, text: str, maps: procedures.Maps, now: float, *, again: bool) -> None:
         """
-        Have a drive stand still that takes our cycles for something else.
+        Stop a drive that takes our cycles for something else.
 
         :param again: the look before found a difference, too.
         """
@@ -362,7 +362,7 @@ class ExtendedSession(Session):
             self._side.receive(frame, now, age)
 
     def _receive_cyclic(self, data: bytes, now: float, received_at: float) -> None:
-        """Take a cyclic response. The fast path of the reader."""
+        """Handle a cyclic response. The fast path of the reader."""
         if not self._answers.expects('cyclic response', now, received_at):
             self._exchange.wait_out(now)
             return

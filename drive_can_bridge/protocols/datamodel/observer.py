@@ -47,7 +47,7 @@ class _Traffic:
                           for parameter in drive.cyclic_request}
 
     def take(self, request: ReadTelegram | WriteTelegram, now: float) -> None:
-        """Take a request; nobody answers a write."""
+        """Record a request; nobody answers a write."""
         if isinstance(request, ReadTelegram):
             chunk = Chunk(request.number, request.count)
             self._requests.ask(chunk, chunk, now)
@@ -61,7 +61,7 @@ class _Traffic:
         self._requests.ask(None, chunk, now, request.words, wrong=wrong)
 
     def answered(self, chunk: Chunk, words: Sequence[int], now: float) -> None:
-        """Take the answer to a read."""
+        """Record the answer to a read."""
         self._requests.answer(chunk, self._requests.about.get(chunk) or RequestContent(chunk),
                               now, words)
 

@@ -172,7 +172,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self.write(step, lambda sent, then: self.end(step, SENT if sent else None, then), now)
 
     def receive(self, answer: Words, now: float) -> Words:
-        """Take the answer of the outstanding read (the caller has matched it)."""
+        """Return the answer of the outstanding read (the caller has matched it)."""
         self.finish()
         if self.anonymous:  # a second answer, if there is one, must not meet the next read
             self.free_at = max(self.free_at, now + SPACING)
@@ -243,7 +243,7 @@ class ParameterTransactor(Transactor[Step, Reply]):
         self._emit(self._codec.encode_write(write.number, write.words), left)
 
     def _wear(self, now: float) -> None:
-        """Have what follows wait for the EEPROM."""
+        """Delay what follows until the EEPROM is free."""
         gap = self._eeprom_gap
         self._eeprom_free_at = max(self._eeprom_free_at, now + gap)
         self._stop_free_at = max(self._stop_free_at, now + min(gap, STOP_EEPROM_WAIT))
