@@ -11,7 +11,7 @@ from saying import says, status_word
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine, RESET_CYCLES
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 
 ENABLE = ControlAction.ENABLE
@@ -952,16 +952,17 @@ def test_pulse_is_the_same_when_the_fault_goes_meanwhile(gone: int) -> None:
     if gone == 0:
         control.status_received(READY, 0.02)
     assert [cycle(control, READY if n >= gone else FAULT, 0.02 + 0.02 * n)
-            for n in range(3)] == [RESET] * 3
+            for n in range(RESET_CYCLES)] == [RESET] * RESET_CYCLES
     assert (control.word, control.take_completed()) == (OFF, [])
-    cycle(control, READY, 0.09)
+    cycle(control, READY, 0.2)
     assert outcomes(control) == [(RESET_FAULT, True, 'ready')]
 
 
 def test_reset_that_does_not_help_fails_and_disables() -> None:
     control = faulted()
     control.request(ControlRequest(RESET_FAULT), 0.0)
-    assert [cycle(control, FAULT, 0.1 * n) for n in range(1, 5)] == [RESET] * 3 + [OFF]
+    assert [cycle(control, FAULT, 0.1 * n) for n in range(1, RESET_CYCLES + 2)] == [
+        *[RESET] * RESET_CYCLES, OFF]
     control.handle_timer(2.0)
     assert outcomes(control) == [
         (RESET_FAULT, False, says('fault_present', status=status_word(FAULT), timeout=2.0))]
@@ -1022,9 +1023,10 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
     control = machine(table)
     control.request(ControlRequest(RESET_FAULT), 0.0)
     assert cycle(control, READY, 0.0) == OFF
-    assert [cycle(control, READY, 0.02 * n) for n in range(1, 4)] == [RESET] * 3
+    assert [cycle(control, READY, 0.02 * n) for n in range(1, RESET_CYCLES + 1)] == [
+        RESET] * RESET_CYCLES
     assert control.take_completed() == []
-    assert cycle(control, READY, 0.08) == OFF
+    assert cycle(control, READY, 0.2) == OFF
     message = 'reset_fault sent; the drive does not report faults'
     assert outcomes(control) == [(RESET_FAULT, True, message)]
     assert (control.word, control.pending) == (OFF, False)
@@ -1033,8 +1035,8 @@ def test_reset_of_a_drive_that_reports_no_faults_is_one_pulse(table: ControlTabl
 def test_reset_of_an_enabled_drive_that_reports_no_faults_disables_it() -> None:
     control = enabled(NO_FAULT)
     control.request(ControlRequest(RESET_FAULT), 1.0)
-    assert [cycle(control, READY, 1.0 + 0.1 * n) for n in range(5)] == [
-        OFF, RESET, RESET, RESET, OFF]
+    assert [cycle(control, READY, 1.0 + 0.1 * n) for n in range(RESET_CYCLES + 2)] == [
+        OFF, *[RESET] * RESET_CYCLES, OFF]
 
 
 def test_reset_replaces_an_enable() -> None:

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from drive_can_bridge.core.control import ControlAction, ControlRequest
-from drive_can_bridge.core.control_machine import ControlMachine
+from drive_can_bridge.core.control_machine import ControlMachine, RESET_CYCLES
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.protocols.acyclic_output import (
     Acknowledged, AcyclicOutput, Judged, Policy,
@@ -238,16 +238,17 @@ def test_a_pulse_leaves_as_often_as_it_has_to() -> None:
     control = machine(FAULT)
     ask(control, ControlAction.RESET_FAULT)
     output = AcyclicOutput(control, JUDGED, 1, slot=0)
-    for now in (10.0, 10.02, 10.04):
+    *_, last = times = [10.0 + 0.02 * number for number in range(RESET_CYCLES)]
+    for now in times:
         assert control.word == RESET
         output.look([RESET], now)
         assert output.next() == 0
         output.written(0, RESET, now)
         assert output.word_left(now, RESET)
         due = output.again_at
-        assert due == (math.inf if now == 10.04 else pytest.approx(now + 0.02))
+        assert due == (math.inf if now == last else pytest.approx(now + 0.02))
         assert not output.handle_timer(now + 0.01)
-        assert output.handle_timer(now + 0.021) is (now < 10.04)
+        assert output.handle_timer(now + 0.021) is (now < last)
     assert control.word == OFF
 
 

@@ -9,6 +9,7 @@ import pytest
 from saying import says, status_word
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control_machine import RESET_CYCLES
 from drive_can_bridge.core.events import DriveState, Noted
 from drive_can_bridge.protocols.cannord.control import hint
 
@@ -120,18 +121,20 @@ def test_reset_waits_for_the_end_of_the_fault_reaction() -> None:
     talk = online(REACTION)
     assert talk.session.state is DriveState.FAULT
     talk.asks(RESET_FAULT, 10.003)
-    assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT, DISABLED, DISABLED, READY) == [
-        '7E04', '7E04', '7E04', 'FE04', 'FE04', 'FE04', '7E04']
+    assert words(talk, 10.02, REACTION, REACTION, FAULT, FAULT,
+                 *[DISABLED] * (RESET_CYCLES - 1), READY) == [
+        *['7E04'] * 3, *['FE04'] * RESET_CYCLES, '7E04']
     assert talk.control_outcomes() == [('reset_fault', True, STANDING)]
 
 
 def test_reset_pulse_hurries_where_the_period_is_long() -> None:
     talk = online(FAULT, period=0.5)
     talk.asks(RESET_FAULT, 10.003)
-    sent = [(now, text[4:8]) for now, text in talk.until(10.74)]
-    assert [word for _, word in sent] == ['FE04', 'FE04', 'FE04', '7E04']
+    sent = [(now, text[4:8]) for now, text in talk.until(10.44 + 0.1 * RESET_CYCLES)]
+    assert [word for _, word in sent] == [*['FE04'] * RESET_CYCLES, '7E04']
     times = [now for now, _ in sent]
-    assert times == pytest.approx([10.5, 10.6, 10.7, 10.705])
+    assert times == pytest.approx([
+        *(10.5 + 0.1 * n for n in range(RESET_CYCLES)), 10.405 + 0.1 * RESET_CYCLES])
 
 
 @pytest.mark.parametrize(('status', 'state'), [(BRAKING, 'quick stop'), (NOT_READY, 'not ready')])
@@ -152,7 +155,8 @@ def test_parameter_set_is_in_every_word() -> None:
     talk.asks(QUICK_STOP, 10.05)
     assert words(talk, 10.06, FAULT, FAULT) == ['7A84', '7E84']
     talk.asks(RESET_FAULT, 10.095)
-    assert words(talk, 10.1, FAULT, READY, READY, READY) == ['FE84', 'FE84', 'FE84', '7E84']
+    assert words(talk, 10.1, FAULT, *[READY] * RESET_CYCLES) == [
+        *['FE84'] * RESET_CYCLES, '7E84']
 
 
 # -- asked again for a stop -----------------------------------------------------------------------

@@ -152,6 +152,17 @@ class TestWhatKeepsItFromEnabling:
         assert axis.asks(ENABLE) == [('enable', True, 'operation enabled')]
 
 
+    def test_a_reset_is_a_rising_edge_of_three_cycles(self) -> None:
+        """Also of a drive that has lost its fault by the first of them."""
+        axis = Axis().online()
+        axis.drive.becomes(axis.drive.FAULT)
+        axis.live(0.1)
+        assert '8000' not in axis.words()
+        axis.asks(ControlAction.RESET_FAULT)
+        words = [text[4:8] for text in axis.take() if text.startswith('205#')]
+        assert words[:3] == ['8000'] * 3
+        assert set(words[3:]) == {'0600'}
+
     def test_one_that_faulted_while_there_was_no_bridge(self) -> None:
         axis = Axis(objects={(0x603F, 0): b'\x30\x81'}, table=(*TABLE, ERROR))
         axis.session.fault_watch = FaultWatch(axis.session, FaultTable('error', (), None))

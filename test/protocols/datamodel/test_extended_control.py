@@ -18,6 +18,7 @@ from saying import says
 from timeline import Timeline
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control_machine import RESET_CYCLES
 from drive_can_bridge.core.events import DriveState, FrameRejected, Noted
 from drive_can_bridge.core.parameters import Parameter
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -226,9 +227,10 @@ def test_drive_that_reports_nothing() -> None:
 def test_reset_pulse_of_a_drive_that_reports_nothing() -> None:
     talk = beside(control=SILENT_CONTROL, period=10.0)
     assert talk.asks(ControlAction.RESET_FAULT, 10.1) == [RESET]
-    sent = talk.until(10.4)
-    assert [text for _, text in sent] == [RESET, RESET, DISABLE]
-    assert [now for now, _ in sent] == pytest.approx([10.2, 10.3, 10.301])
+    sent = talk.until(10.1 + 0.1 * RESET_CYCLES)
+    assert [text for _, text in sent] == [*[RESET] * (RESET_CYCLES - 1), DISABLE]
+    assert [now for now, _ in sent] == pytest.approx([
+        *(10.1 + 0.1 * n for n in range(1, RESET_CYCLES)), 10.001 + 0.1 * RESET_CYCLES])
     assert [done[:2] for done in talk.control_outcomes()] == [('reset_fault', True)]
 
 

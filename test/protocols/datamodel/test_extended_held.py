@@ -15,6 +15,7 @@ from saying import says
 from stops import UNANSWERED_CYCLES
 
 from drive_can_bridge.core.control import ControlAction
+from drive_can_bridge.core.control_machine import RESET_CYCLES
 from drive_can_bridge.core.errors import ValueRefused
 from drive_can_bridge.core.events import Noted
 from drive_can_bridge.core.setpoints import CommandOutcome
@@ -187,13 +188,15 @@ def test_fault_reset_and_enabling_anew() -> None:
     assert cycle(talk, 6, 8, 60) == request(0, 70)
     talk.asks(ControlAction.RESET_FAULT, 10.125)
     assert cycle(talk, 7, 1, 55) == request(0x80, 60)
-    assert cycle(talk, 8, 1, 55) == request(0x80, 55)
-    assert cycle(talk, 9, 1, 55) == request(0x80, 55)
-    assert cycle(talk, 10, 1, 55) == request(0, 55)
-    talk.asks(ControlAction.ENABLE, 10.205)
-    assert cycle(talk, 11, 3, 55) == request(1, 55)
-    assert talk.commands(0, 9.0, 10.223) is CommandOutcome.NOT_ARMED    # left standing
-    assert cycle(talk, 12, 3, 54) == request(1, 55)
+    over = 7 + RESET_CYCLES
+    for number in range(8, over):
+        assert cycle(talk, number, 1, 55) == request(0x80, 55)
+    assert cycle(talk, over, 1, 55) == request(0, 55)
+    talk.asks(ControlAction.ENABLE, talk.now + 0.003)
+    assert cycle(talk, over + 1, 3, 55) == request(1, 55)
+    # left standing
+    assert talk.commands(0, 9.0, talk.now + 0.001) is CommandOutcome.NOT_ARMED
+    assert cycle(talk, over + 2, 3, 54) == request(1, 55)
 
 
 def test_lost_with_control_it_is_read_anew() -> None:
