@@ -59,7 +59,7 @@ Without a row, because they do not exist on Linux: {none}.
 
 An adapter that keeps what it has received makes the answers of *all* drives of its bus late, by
 the same time. Diagnostics say so, and name the timer where there is one. An FTDI chip keeps bytes
-for 16 ms unless told otherwise: fine at a `period` of 20 ms, and 38 % of the answers are late at
+for 16 ms unless set otherwise: fine at a `period` of 20 ms, and 38 % of the answers are late at
 10 ms. For good, by a udev rule:
 
 ```

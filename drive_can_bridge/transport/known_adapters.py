@@ -83,8 +83,8 @@ ROWS: tuple[Row, ...] = (
     # -- the kernel
     Row('socketcan', 'a CAN controller of Linux: on the board, PCI, SPI', 'socketcan', 'can0',
         "bit rate and restart are the interface's, not the file's; stamps are the host's; what "
-        'was sent waits in the kernel until somebody acknowledges it; goes bus-off for good '
-        'unless told to restart',
+        'was sent waits in the kernel until a node acknowledges it; goes bus-off for good '
+        'unless set to restart',
         '`ip link set can0 type can bitrate 500000 restart-ms 100`, `ip link set can0 up`',
         f'{REAL}: vcan, SJA1000 (emulated), the slcan driver',
         listen_only='"ip link set can0 type can listen-only on"'),
@@ -145,7 +145,7 @@ ROWS: tuple[Row, ...] = (
     Row('seeedstudio', 'Seeed USB-CAN Analyzer', 'seeedstudio', '/dev/ttyUSB0',
         'acknowledges nothing and says nothing of errors; receives one kind of identifier only; '
         'receive waits 0.1 s whatever is asked; a torn packet is one rejected frame; unplugged, '
-        'it is told by the name that is gone',
+        'it is recognised by the name that is gone',
         '`frame_type: EXT` for 29-bit drives; `timeout: 0.01`', BYTES,
         options=(('frame_type', 'STD'),), uart=True, line_bits=1.2,
         listen_only='operation_mode: silent', module='pyserial'),
@@ -163,13 +163,13 @@ ROWS: tuple[Row, ...] = (
     # -- the network
     Row('socketcand', 'socketcand: a CAN interface of another computer', 'socketcand', 'can0',
         'stamps of the other computer; no more of an error than its class; a gateway that ends is '
-        'told; the bridge speaks its protocol itself, because python-can waits without a limit',
+        'reported; the bridge speaks its protocol itself, because python-can waits without a limit',
         '`tcp_tune: true` is the default (without it every second frame is 40 ms late)',
         'the protocol by the source of socketcand 6dd5d33; fakes of it, and one over TCP at speed '
         '(bench)', options=(('host', '10.0.0.5'), ('port', 29536))),
     Row('udp_multicast', 'frames in UDP multicast: no hardware', 'udp_multicast', '239.74.163.2',
-        "nobody acknowledges, frames may be lost or doubled; needs the module msgpack; one's own "
-        'frames are told by the address', 'only to try things; never for a motor', SOURCE,
+        'no acknowledgement; frames may be lost or doubled; needs the module msgpack; own frames '
+        'are recognised by the address', 'only to try things; never for a motor', SOURCE,
         module='msgpack'),
     Row('virtual', 'inside one process: no hardware', 'virtual', 'demo',
         'no other process hears it', 'for tests; `drive_can simulate --pty` for two processes',
