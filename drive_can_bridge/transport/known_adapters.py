@@ -163,7 +163,7 @@ ROWS: tuple[Row, ...] = (
     # -- the network
     Row('socketcand', 'socketcand: a CAN interface of another computer', 'socketcand', 'can0',
         'stamps of the other computer; no more of an error than its class; a gateway that ends is '
-        'reported; the bridge speaks its protocol itself, because python-can waits without a limit',
+        'reported; the bridge speaks its protocol itself, since python-can waits without a limit',
         '`tcp_tune: true` is the default (without it every second frame is 40 ms late)',
         'the protocol by the source of socketcand 6dd5d33; fakes of it, and one over TCP at speed '
         '(bench)', options=(('host', '10.0.0.5'), ('port', 29536))),
