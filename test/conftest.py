@@ -57,6 +57,7 @@ import real
 import side_by_side
 from told_again import ToldAgain
 
+from drive_can_bridge.compiled import build
 from drive_can_bridge.configuration import profiles
 from drive_can_bridge.configuration.profile_check import LoadedProfile
 from drive_can_bridge.resources import profiles_directory
@@ -241,8 +242,11 @@ def foreground() -> Iterator[None]:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is real, and let it come first, and last what processes share."""
+    compiled = build() == 'compiled'
     for item in items:
         real.mark(item)
+        if compiled and item.get_closest_marker('interpreted'):
+            item.add_marker(pytest.mark.skip('of a build that is not compiled'))
     # a bench that others share lives to the end of their module, with a clock of its own
     items.sort(key=lambda item: (item.get_closest_marker('real') is None,
                                  side_by_side.turn(item.nodeid.partition('::')[0])))

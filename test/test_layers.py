@@ -71,9 +71,9 @@ INTERNAL: dict[str, set[str]] = {
         'client.bridge', 'client.drive', 'client.local', 'client.ros_way'},
     'backup': {'', 'core', 'configuration', 'protocols', 'client.drive'},
     'cli': {
-        '', 'clock', 'core', 'configuration', 'protocols', 'resources', 'transport', 'exchange',
-        'host_texts', 'process', 'profiles', 'simulation', 'trace', 'monitor', 'view', 'panel',
-        'demo', 'client', 'client.drive', 'client.jog', 'client.local', 'backup', 'ros',
+        '', 'clock', 'compiled', 'core', 'configuration', 'protocols', 'resources', 'transport',
+        'exchange', 'host_texts', 'process', 'profiles', 'simulation', 'trace', 'monitor', 'view',
+        'panel', 'demo', 'client', 'client.drive', 'client.jog', 'client.local', 'backup', 'ros',
         'ros.client', 'ros.monitor', 'ros.demo'},
 }
 

@@ -138,7 +138,7 @@ def test_environment_hooks_put_the_executables_on_the_path(arguments: dict[str, 
 def test_readme_shows_the_version_that_it_installs() -> None:
     readme = (CHECKOUT / 'README.md').read_text(encoding='utf-8')
     told = re.findall(r'^drive_can --version +# (.*)$', readme, re.MULTILINE)
-    assert told == [f'drive_can {drive_can_bridge.__version__}'] * 2
+    assert told == [f'drive_can {drive_can_bridge.__version__} (pure Python)'] * 2
 
 
 @pytest.mark.parametrize(('extra', 'package'), [

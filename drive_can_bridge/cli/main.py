@@ -19,6 +19,7 @@ import sys
 from typing import Any
 
 from drive_can_bridge import __version__
+from drive_can_bridge.compiled import build
 from drive_can_bridge.cli.command import complain, FAILED, Parser, WRONG_USAGE, WrongUsage
 from drive_can_bridge.cli.completion import complete, typed
 from drive_can_bridge.clock import Clock, SteadyClock
@@ -244,7 +245,8 @@ def understood(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
         prog=PROGRAM, usage=f'{PROGRAM} SUBCOMMAND …', formatter_class=Formatter,
         description='Tools of drive_can_bridge, the bridge from motor drives on CAN buses to '
                     f'ROS 2.\n{overview(PROGRAM)}')
-    parser.add_argument('--version', action='version', version=f'{PROGRAM} {__version__}')
+    parser.add_argument('--version', action='version',
+                        version=f'{PROGRAM} {__version__} ({build()})')
     subparsers = parser.add_subparsers(dest='subcommand', metavar='SUBCOMMAND', required=True,
                                        help=argparse.SUPPRESS)
     # what the others understand costs as much time as all else here

@@ -16,7 +16,8 @@ def main() -> int:
     """Run the command; return the exit code."""
     begin()
     if sys.argv[1:] == ['--version']:
-        print(f'drive_can {__version__}')
+        from drive_can_bridge.compiled import build
+        print(f'drive_can {__version__} ({build()})')
         return 0
     if sys.argv[1:2] == ['stop']:
         from drive_can_bridge.process.local_stop import begin as begin_stop

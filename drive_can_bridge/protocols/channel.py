@@ -36,6 +36,7 @@ from enum import Enum
 import math
 from typing import Any, Generic
 
+from drive_can_bridge.compiled import mypyc_attr
 from drive_can_bridge.protocols.transactor import ANYTHING, ReplyT, StepT, Transactor
 
 
@@ -188,6 +189,7 @@ class _Queue(Generic[StepT, ReplyT]):
         self._running = self.step = None
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Channel(Generic[StepT, ReplyT]):
     """
     Runs procedures through a transactor.

@@ -19,6 +19,7 @@ from transcripts import replayed, shown, stories
 
 import drive_can_bridge
 from drive_can_bridge.cli import main as front_end
+from drive_can_bridge.compiled import build
 from drive_can_bridge.process.beginning import SIGNALS
 
 ROOT = Path(drive_can_bridge.__file__).resolve().parents[1]
@@ -99,7 +100,8 @@ def test_wrong_usage(arguments: list[str], program: str) -> None:
 
 
 def test_version_and_help() -> None:
-    assert run('--version').stdout == f'drive_can {drive_can_bridge.__version__}\n'
+    assert run('--version').stdout == (
+        f'drive_can {drive_can_bridge.__version__} ({build()})\n')
     done = run('--help')
     assert done.returncode == 0
     for name in ('validate', 'simulate', 'demo'):

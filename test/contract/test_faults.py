@@ -182,7 +182,7 @@ def test_a_fault_that_comes_again_while_the_last_one_is_asked_for() -> None:
     session.configuration = replace(session.configuration, profile=replace(
         session.configuration.profile, parameters={'fault_code': CODE}))
     seen = SimpleNamespace(
-        configuration=session.configuration, control=object(),
+        configuration=session.configuration, control=session.control,
         interlock=SimpleNamespace(obeyed=SimpleNamespace(fault_text='')),
         report=SimpleNamespace(note=lambda event: None), sample_parameters=(), shows_fault=False,
         services=SimpleNamespace(submit=lambda request, now: asked.append(request)))

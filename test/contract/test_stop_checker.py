@@ -23,6 +23,7 @@ from drive_can_bridge.protocols.safe_stop import SafeStop
 BY_CHANCE = times(3, 20)
 
 
+@pytest.mark.interpreted    # replaces methods
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_motor_runs_on(kind: str) -> None:
     everything = [*all_stories(1)]
@@ -109,6 +110,7 @@ def test_what_is_broken_is_seen(owner: type, name: str, instead: Any, kind: str,
     assert broken(kind, story)
 
 
+@pytest.mark.interpreted    # replaces methods
 def test_the_shortest_story_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(StopDuty, 'channel', _nothing)
     story: Story = (('late', 0.1), ('bus down', 0.013), ('stall', 0.1))

@@ -209,6 +209,9 @@ def raising(times: float, then: Callable[..., Any]) -> Callable[..., Any]:
     return step
 
 
+@pytest.mark.interpreted    # replaces methods
+@pytest.mark.interpreted    # replaces methods
+@pytest.mark.interpreted    # replaces methods
 @pytest.mark.parametrize(('kind', 'place', 'times'), some(product(
     KINDS, [*LISTENER, *STEPS], [1, float('inf')]), 7))
 def test_a_defect_stops_one_drive_and_disturbs_no_other(
@@ -317,6 +320,7 @@ def test_online_again_is_told() -> None:
     assert StationFound() in world.bench.notes[0].events
 
 
+@pytest.mark.interpreted    # replaces methods
 def test_the_same_defect_is_told_again_after_an_activation(
         monkeypatch: pytest.MonkeyPatch) -> None:
     world = World('29 bit')
@@ -359,6 +363,7 @@ def test_a_limit_that_comes_behind_a_defect_is_obeyed(kind: str, pause: float) -
     assert not bench.notes[0].commands
 
 
+@pytest.mark.interpreted    # replaces methods
 def test_a_limit_that_comes_at_the_end_behind_a_defect_is_of_no_activation(
         monkeypatch: pytest.MonkeyPatch) -> None:
     world = World('29 bit', WITH_LIMIT)
@@ -388,6 +393,7 @@ def test_what_waits_for_others_is_not_thrown_away_when_a_drive_begins_anew() -> 
     assert first.discarded == discarded
 
 
+@pytest.mark.interpreted    # replaces methods
 def test_what_comes_just_before_a_drive_begins_anew_is_of_a_drive_that_is_lost(
         monkeypatch: pytest.MonkeyPatch) -> None:
     world = World('29 bit')

@@ -16,6 +16,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from drive_can_bridge import __version__
+from drive_can_bridge.compiled import build
 from drive_can_bridge.process import local_server, presence
 from drive_can_bridge.process.local_server import LocalRequest, LocalServer
 from drive_can_bridge.process.local_way import (
@@ -417,7 +418,7 @@ def test_the_version_needs_no_argparse() -> None:
             'from drive_can_bridge.cli.start import main; assert main() == 0\n'
             'assert not {"argparse", "drive_can_bridge.core"} & (set(sys.modules) - before)')
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
-    assert done.stdout == f'drive_can {__version__}\n'
+    assert done.stdout == f'drive_can {__version__} ({build()})\n'
 
 
 # -- what is imported before a stop is sent -------------------------------------------------------

@@ -5,15 +5,15 @@ from collections.abc import Generator
 import math
 from typing import Any
 
+from drive_can_bridge.protocols.channel import Channel
 from drive_can_bridge.protocols.life import Life, Script
 
 
-class Channel:
+class Procedures(Channel[Any, Any]):
     """Takes procedures, and ends them when it is told to."""
 
-    now = 0.0
-
     def __init__(self) -> None:
+        self.now = 0.0
         self.asked: list[tuple[Any, Any]] = []
 
     def run(self, procedure: Generator[Any, Any, Any], done: Any, now: float) -> None:
@@ -33,9 +33,9 @@ def procedure(step: str) -> Generator[str, Any, Any]:
     return (yield step)
 
 
-def life() -> tuple[Channel, Life]:
-    channel = Channel()
-    return channel, Life(channel)   # type: ignore[arg-type]
+def life() -> tuple[Procedures, Life]:
+    channel = Procedures()
+    return channel, Life(channel)
 
 
 def test_procedures_and_times_come_back() -> None:
