@@ -1,5 +1,5 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
-"""Commands that README and documents show: ``drive_can`` understands them as they stand."""
+"""README and documents: ``drive_can`` understands their commands, and their links lead on."""
 
 from pathlib import Path
 import re
@@ -42,3 +42,35 @@ def test_commands_are_found() -> None:
     page = ('$ drive_can record -o a.log | x\n`drive_can decode …` `drive_can scan`\n'
             '`drive_can scan: bus down`\n')
     assert [command.split() for command in shown(page)] == [['record', '-o', 'a.log']]
+
+
+#: of links: everything but addresses of other hosts
+LINK = re.compile(r'\]\((?!https?:)([^)\s]+)\)')
+TEXTS = {page: page.read_text(encoding='utf-8') for page in [
+    *ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md'), *(ROOT / 'bench').glob('*.md')]}
+
+
+def anchors(text: str) -> set[str]:
+    """Return what links to a page may name: its headings, as GitHub writes them, and its ids."""
+    headings = re.findall('^#+ (.*)$', re.sub('```.*?```', '', text, flags=re.DOTALL),
+                          re.MULTILINE)
+    return {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings} | {
+        *re.findall('id="(.*?)"', text)}
+
+
+@pytest.mark.parametrize('page', TEXTS, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    wrong = []
+    for link in LINK.findall(TEXTS[page]):
+        name, _, anchor = link.partition('#')
+        target = (page.parent / name).resolve() if name else page
+        if not target.exists() or anchor and anchor not in anchors(TEXTS[target]):
+            wrong.append(link)
+    assert wrong == []
+
+
+def test_the_index_has_every_page() -> None:
+    index = ROOT / 'docs' / 'README.md'
+    named = {(index.parent / link.partition('#')[0]).resolve()
+             for link in LINK.findall(TEXTS[index])}
+    assert {*(ROOT / 'docs').glob('*.md')} - {index} <= named
