@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Generator
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
@@ -178,7 +178,10 @@ class Finding(NamedTuple):
     reason: str
 
 
-Conversation = Generator[Question, Frame | None, list[Finding]]
+T = TypeVar('T')
+#: yields questions, is sent each answer, or None, and returns something
+Asking = Generator[Question, Frame | None, T]
+Conversation = Asking[list[Finding]]
 
 
 class Prober(ABC):
@@ -207,7 +210,7 @@ class Prober(ABC):
     def converse(self) -> Conversation:
         """Ask; every question may be asked again where there is no answer."""
 
-    def ask(self, question: Question) -> Generator[Question, Frame | None, bytes | None]:
+    def ask(self, question: Question) -> Asking[bytes | None]:
         """Ask one question; return the data of the answer."""
         frame = yield question
         if frame is None:

@@ -19,6 +19,8 @@ ANYTHING: Hashable = 'anything'
 #: what a procedure wants done, and what it is told of it
 StepT = TypeVar('StepT')
 ReplyT = TypeVar('ReplyT')
+#: and what it returns
+ResultT = TypeVar('ResultT')
 
 
 class Transactor(ABC, Generic[StepT, ReplyT]):

@@ -9,7 +9,6 @@ with error 3; in the other byte FFh means nothing, and element 0 answers. The er
 out in either order, so that neither key needs the other.
 """
 
-from collections.abc import Generator
 from typing import NamedTuple
 
 from drive_can_bridge.core import frame_sentences
@@ -20,7 +19,7 @@ from drive_can_bridge.protocols.cannord.identifiers import (
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ERRORS, NUMBER_MAX, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.scanner import (
-    conclude, Conversation, Finding, Prober, Question, spaced)
+    Asking, conclude, Conversation, Finding, Prober, Question, spaced)
 
 #: what to ask where the profile names no parameter of that kind
 SIMPLE = (514, 513)
@@ -63,7 +62,7 @@ class _Answer(NamedTuple):
         return alone[0] if refused and alone and alone[0] in ERRORS else None
 
 
-_Asking = Generator[Question, Frame | None, _Answer | None]
+_Asking = Asking[_Answer | None]
 
 
 class CannordProber(Prober):
@@ -91,7 +90,7 @@ class CannordProber(Prober):
                     for key, _, _ in findings]
         return findings
 
-    def _value_order(self) -> Generator[Question, Frame | None, Finding]:
+    def _value_order(self) -> Asking[Finding]:
         votes: dict[str, list[str]] = {}
         for number in self._numbers(SIMPLE, arrays=False):
             refusal = yield from self._twice(Task.READ_ARRAY, number)
@@ -110,7 +109,7 @@ class CannordProber(Prober):
         return conclude('value_order', votes, what='answers',
                         missing=frame_sentences.no_refusal_with_number())
 
-    def _index_byte(self) -> Generator[Question, Frame | None, Finding]:
+    def _index_byte(self) -> Asking[Finding]:
         told = frame_sentences.no_array()
         for number in self._numbers(ARRAYS, arrays=True):
             results = {}

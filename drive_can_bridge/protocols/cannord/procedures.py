@@ -5,7 +5,7 @@ Reading and writing parameters of an inverter, in words that users understand.
 Every generator here is for :class:`.transactor.TaskChannel`.
 """
 
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
@@ -17,7 +17,8 @@ from drive_can_bridge.protocols.access import Found, Item, OneByOne, ParameterAc
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     error_text, ParameterFrame, ResponseId, Task, WRITE_TASKS)
 from drive_can_bridge.protocols.cannord.process_data import Samples
-from drive_can_bridge.protocols.cannord.transactor import ParameterTask, TaskChannel, TaskResult
+from drive_can_bridge.protocols.cannord.transactor import (
+    ParameterTask, Procedure, TaskChannel, TaskResult)
 
 WRONG_INDEX = 3
 PROCESS_DATA_ONLY = sentences.process_data_only()
@@ -57,7 +58,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
         self._persist = persist
         self._signed = signed
 
-    def read(self, span: Parameter) -> Generator[ParameterTask, TaskResult, Found]:
+    def read(self, span: Parameter) -> Procedure[Found]:
         answer = yield from self._ask(span)
         if isinstance(answer, Failure):
             return answer
@@ -66,7 +67,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
             return Failure(FailureKind.REFUSED, _width_text(span, double=double))
         return (answer.answered,)
 
-    def write(self, items: Sequence[Item]) -> Generator[ParameterTask, TaskResult, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
@@ -84,8 +85,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _write(self, parameter: Parameter, raw: int) -> Generator[ParameterTask, TaskResult,
-                                                                  Outcome]:
+    def _write(self, parameter: Parameter, raw: int) -> Procedure[Outcome]:
         """
         Write one parameter; the response acknowledges it.
 
@@ -109,15 +109,14 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
             parameter, WRITE_TASKS[array, double, persistent], raw, attempts=1)
         return answer if isinstance(answer, Failure) else Written()
 
-    def _ask(self, parameter: Parameter) -> Generator[ParameterTask, TaskResult,
-                                                      ParameterFrame | Failure]:
+    def _ask(self, parameter: Parameter) -> Procedure[ParameterFrame | Failure]:
         """Read one parameter."""
         return self._carry_out(
             parameter, Task.READ if parameter.subindex is None else Task.READ_ARRAY)
 
     def _carry_out(self, parameter: Parameter, task: Task, value: int = 0,
                    attempts: int | None = None,
-                   ) -> Generator[ParameterTask, TaskResult, ParameterFrame | Failure]:
+                   ) -> Procedure[ParameterFrame | Failure]:
         """Send a task; return the response, or why there is none that counts."""
         reply = yield ParameterTask(task, parameter.number or 0, parameter.subindex or 0, value)
         if reply.response is not None:
@@ -134,8 +133,7 @@ class TaskAccess(ParameterAccess[Parameter, ParameterTask, TaskResult]):
         return self.retry.unanswered(attempts)
 
 
-def _refusal(parameter: Parameter, response: ParameterFrame) -> Generator[ParameterTask,
-                                                                          TaskResult, Failure]:
+def _refusal(parameter: Parameter, response: ParameterFrame) -> Procedure[Failure]:
     """Return why the drive refused; where an element does not exist, also how many there are."""
     text = error_text(response.word)
     if response.word == WRONG_INDEX and parameter.subindex is not None:

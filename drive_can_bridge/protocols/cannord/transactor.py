@@ -13,7 +13,7 @@ answered is left alone until a late response must have come: its value may be ol
 between, and look like the response to that write.
 """
 
-from collections.abc import Hashable
+from collections.abc import Generator, Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from drive_can_bridge.core.requests import RetryPolicy
 from drive_can_bridge.protocols.cannord.parameter_frame import (
     ParameterFrame, ParameterLayout, ResponseId, Task)
 from drive_can_bridge.protocols.channel import Channel
-from drive_can_bridge.protocols.transactor import Transactor
+from drive_can_bridge.protocols.transactor import ResultT, Transactor
 
 
 @dataclass(frozen=True)
@@ -118,6 +118,8 @@ class TaskTransactor(Transactor[ParameterTask, TaskResult]):
 
 
 TaskChannel = Channel[ParameterTask, TaskResult]
+#: yields steps, is sent what became of each, and returns something
+Procedure = Generator[ParameterTask, TaskResult, ResultT]
 
 
 def _belongs(response: ParameterFrame, task: ParameterTask) -> bool:

@@ -13,7 +13,7 @@ Before anything is sent to the mailbox, 1603h is read by SDO: where the receive 
 map something else than 3000h, a read of the mailbox would be process data, and nothing is asked.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drive_can_bridge.core import frame_sentences
@@ -29,7 +29,7 @@ from drive_can_bridge.protocols.canopen_pkw.options import PROBED
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, describe, PkwLayout, PkwMessage
 from drive_can_bridge.protocols.canopen_pkw.scanner import MAILBOX, STATUS
 from drive_can_bridge.protocols.scanner import (
-    conclude, Conversation, Finding, Prober, Question, spaced)
+    Asking, conclude, Conversation, Finding, Prober, Question, spaced)
 
 #: registers that no device should have; their bytes are no function that writes, in any layout
 MISSING = (Address(9999), Address(65000))
@@ -37,7 +37,7 @@ ORDERS = ('high_first', 'low_first')
 _WIDE_MAX = 12
 #: values that have to agree where no limits help
 _AGREEING = 2
-_Asking = Generator[Question, Frame | None, tuple[bytes, PkwMessage] | None]
+_Asking = Asking[tuple[bytes, PkwMessage] | None]
 
 
 @dataclass
@@ -87,7 +87,7 @@ class PkwProber(Prober):
             return [finding._replace(reason=frame_sentences.node_silent()) for finding in findings]
         return findings
 
-    def _mapped(self) -> Generator[Question, Frame | None, int | None]:
+    def _mapped(self) -> Asking[int | None]:
         """Return the object that the receive PDO4 maps; None: the node does not tell."""
         node = self.drive.station
         if self.drive.options.request_cob_id != network.REQUEST_BASE + node:
@@ -98,7 +98,7 @@ class PkwProber(Prober):
         uploaded = None if answer is None else _uploaded(answer.data)
         return None if uploaded is None or uploaded.value is None else uploaded.value >> 16
 
-    def _try(self, layout: PkwLayout) -> Generator[Question, Frame | None, _Evidence]:
+    def _try(self, layout: PkwLayout) -> Asking[_Evidence]:
         evidence = _Evidence()
         yield self._idle()
         self._toggle = False
@@ -114,7 +114,7 @@ class PkwProber(Prober):
                     evidence.refusals.append((address, answer[0], answer[1].words))
         return evidence
 
-    def _word_order(self, layout: PkwLayout) -> Generator[Question, Frame | None, Finding]:
+    def _word_order(self, layout: PkwLayout) -> Asking[Finding]:
         votes: dict[str, list[str]] = {}
         certain = False
         for parameter in self._wide():

@@ -5,7 +5,7 @@ What takes more than one request: parameters of users, and the safe stop.
 Every generator here is for :class:`.transactor.MailboxChannel`.
 """
 
-from collections.abc import Generator, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
@@ -15,7 +15,7 @@ from drive_can_bridge.protocols.access import Found, Item, ParameterAccess
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    Answered, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
+    Answered, Procedure, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
 from drive_can_bridge.protocols.safe_stop import STOP_ATTEMPTS, StopWrite
 
 NOT_TOGETHER = sentences.not_in_one_frame(
@@ -28,20 +28,20 @@ NOT_TOGETHER = sentences.not_in_one_frame(
 class RegisterAccess(ParameterAccess[Span, Step, Reply]):
     """Parameters by register or object; adjacent registers share a request."""
 
-    def read(self, span: Span) -> Generator[Step, Reply, Found]:
+    def read(self, span: Span) -> Procedure[Found]:
         reply = yield RegisterRead(span.address, span.count)
         if isinstance(reply, Answered):
             return reply.words[:span.count]
         return (self.retry.unanswered() if isinstance(reply, Silence) else
                 reply.failure)
 
-    def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         return self._write(items, blind=False)
 
-    def write_blind(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+    def write_blind(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         return self._write(items, blind=True)
 
-    def _write(self, items: Sequence[Item], *, blind: bool) -> Generator[Step, Reply, Outcomes]:
+    def _write(self, items: Sequence[Item], *, blind: bool) -> Procedure[Outcomes]:
         words: dict[Address, int] = {}
         for parameter, raw in items:
             words.update(zip(self.placement.span(parameter).addresses,
@@ -56,7 +56,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
         fits = len(shared) == 1 and sum(span.count for span in spans) == shared[0].count
         return NOTHING if fits else NOT_TOGETHER
 
-    def _put(self, write: RegisterWrite) -> Generator[Step, Reply, Outcome]:
+    def _put(self, write: RegisterWrite) -> Procedure[Outcome]:
         """
         Write once.
 
@@ -80,7 +80,7 @@ class RegisterAccess(ParameterAccess[Span, Step, Reply]):
 
 
 def tell(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
-         ) -> Generator[Step, Reply, Reply]:
+         ) -> Procedure[Reply]:
     """
     Write a setpoint or control word, and keep the books of what the drive was told.
 
@@ -105,7 +105,7 @@ def tell(duty: StopDuty, channel: Hashable, write: RegisterWrite, *, runs: bool,
 
 
 #: what became of the last writes: why which one may not have been executed
-StopProcedure = Generator[Step, Reply, list[Sentence]]
+StopProcedure = Procedure[list[Sentence]]
 
 
 def write_until_answered(writes: Sequence[StopWrite], placement: Placement, timeout: float,

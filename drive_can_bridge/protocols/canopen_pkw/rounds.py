@@ -1,7 +1,7 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """The rounds of reads of one device: what each asks for, and what the device refuses of it."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
@@ -11,7 +11,7 @@ from drive_can_bridge.protocols.canopen_pkw.addresses import (
     instead_of, Placement, round_plan, round_spans, Span)
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    MailboxChannel, Refused, RegisterRead, Reply, Silence, Step)
+    MailboxChannel, Procedure, Refused, RegisterRead, Silence)
 from drive_can_bridge.protocols.canopen_pkw.writers import Writers
 from drive_can_bridge.protocols.polled_exchange import Raws
 
@@ -49,7 +49,7 @@ class Rounds:
         self.refusals.clear()
         self._plan = round_plan(self._drive)
 
-    def read(self) -> Generator[Step, Reply, Raws | None]:
+    def read(self) -> Procedure[Raws | None]:
         """Read everything once, each in one attempt; return None if something went unanswered."""
         self._words = {}
         pending = list(self._plan)

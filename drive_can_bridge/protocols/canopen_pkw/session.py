@@ -131,7 +131,7 @@ class PkwSession(Session):
 
     # -- online and offline -----------------------------------------------------------------------
 
-    def read_round(self) -> Procedure:
+    def read_round(self) -> Procedure[Raws | None]:
         return self._rounds.read()
 
     def round_answered(self, raws: Raws, now: float, *, found: bool) -> None:

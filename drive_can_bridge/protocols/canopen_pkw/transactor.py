@@ -58,7 +58,7 @@ from drive_can_bridge.protocols.canopen_pkw import pkw
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement, Span
 from drive_can_bridge.protocols.canopen_pkw.pkw import Address, Function, PkwMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
-from drive_can_bridge.protocols.transactor import Transactor
+from drive_can_bridge.protocols.transactor import ResultT, Transactor
 
 #: s that an answer to function 00h is waited for at most
 SYNCHRONISATION_TIMEOUT = 0.1
@@ -152,7 +152,8 @@ class Silence(NamedTuple):
 
 
 Reply = Union[Answered, Refused, Silence]
-Procedure = Generator[Step, Reply, Any]
+#: yields steps, is sent what became of each, and returns something
+Procedure = Generator[Step, Reply, ResultT]
 
 
 class MailboxTransactor(Transactor[Step, Reply]):

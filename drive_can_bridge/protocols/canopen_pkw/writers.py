@@ -18,7 +18,7 @@ a device under local control, say, takes it as soon as it is back under remote c
 """
 
 from collections import Counter
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction
@@ -33,7 +33,8 @@ from drive_can_bridge.protocols.acyclic_output import Acknowledged, AcyclicOutpu
 from drive_can_bridge.protocols.canopen_pkw.addresses import Placement
 from drive_can_bridge.protocols.canopen_pkw.procedures import tell, write_until_answered
 from drive_can_bridge.protocols.canopen_pkw.transactor import (
-    Answered, MailboxChannel, Refused, RegisterRead, RegisterWrite, Reply, Silence, Step)
+    Answered, MailboxChannel, Procedure, Refused, RegisterRead, RegisterWrite, Reply, Silence,
+    Step)
 from drive_can_bridge.protocols.channel import Priority, STOP_PATIENCE
 from drive_can_bridge.protocols.polled_exchange import TOLERANCE
 from drive_can_bridge.protocols.safe_stop import SafeStop, StatusRead, STOP_ATTEMPTS, StopAgain
@@ -152,7 +153,7 @@ class Writers:
         return (setpoint.raw == setpoint.neutral and setpoint not in self._setpoints.held
                 and self._session.duty.runs(index))
 
-    def _write_setpoints(self) -> Generator[Step, Reply, None]:
+    def _write_setpoints(self) -> Procedure[None]:
         """
         Write what is due; what becomes due meanwhile waits: others have their turn first.
 
@@ -169,7 +170,7 @@ class Writers:
             if index not in stopped and self._stops(index, setpoint):
                 yield from self._write_setpoint(index)
 
-    def _write_setpoint(self, index: int) -> Generator[Step, Reply, bool]:
+    def _write_setpoint(self, index: int) -> Procedure[bool]:
         """Write one as it is then; tell whether it was neutral."""
         setpoint = self._setpoints.items[index]
         raw, reply = yield from self._tell_setpoint(index, setpoint)
@@ -195,8 +196,7 @@ class Writers:
             self._session.see_to_control_word(self._channel.now)
         return neutral
 
-    def _tell_setpoint(self, index: int, setpoint: Setpoint,
-                       ) -> Generator[Step, Reply, tuple[int, Reply]]:
+    def _tell_setpoint(self, index: int, setpoint: Setpoint) -> Procedure[tuple[int, Reply]]:
         """
         Write one until it is answered, or is not to be repeated.
 
@@ -263,8 +263,7 @@ class Writers:
             self._channel.run(
                 self._write_word(parameter, control), lambda _: None, now, Priority.CONTROL)
 
-    def _write_word(self, parameter: Parameter, control: ControlMachine,
-                    ) -> Generator[Step, Reply, None]:
+    def _write_word(self, parameter: Parameter, control: ControlMachine) -> Procedure[None]:
         """Write the newest word, until it is answered or silence says to wait a while."""
         output, unanswered = self._output, 0
         while not output.holds_word():
@@ -307,8 +306,7 @@ class Writers:
             if word == control.word:
                 return
 
-    def _read_back(self, parameter: Parameter, word: int,
-                   ) -> Generator[Step, Reply, bool | None]:
+    def _read_back(self, parameter: Parameter, word: int) -> Procedure[bool | None]:
         """Return whether the drive has a word that was not answered; None: nobody knows."""
         if not parameter.readable:
             return None

@@ -14,7 +14,6 @@ then. What differs from the configuration, and cannot be made to fit, is told in
 drive is not cycled.
 """
 
-from collections.abc import Generator
 import math
 
 from drive_can_bridge.core import sentences
@@ -31,11 +30,12 @@ from drive_can_bridge.protocols.cia402.control import DISABLE_WORDS, DriveRules
 from drive_can_bridge.protocols.cia402.limits import LimitCheck
 from drive_can_bridge.protocols.cia402.mapped import read_mapped
 from drive_can_bridge.protocols.cia402.objects import (
-    at_object, differs, ObjectAccess, Procedure, SetUpEnd, SetUpOutcome, SetUpState, silent)
+    at_object, differs, ObjectAccess, SetUpEnd, SetUpOutcome, SetUpState, silent)
 from drive_can_bridge.protocols.cia402.pdo import request_pdos, response_pdos
 from drive_can_bridge.protocols.cia402.pdo_set_up import PdoSetUp
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import (
+    Procedure, SdoChannel, Transfer, TransferResult)
 from drive_can_bridge.protocols.cia402.watch import BridgeWatch
 
 SYNC_COB_ID, SYNC_PERIOD, SYNC_COUNTER = 0x1005, 0x1006, 0x1019
@@ -102,7 +102,7 @@ class BringUp:
         silent_at = max(self._asked_at + answer_time, heard_at + SILENCE_TIME)
         return min(max(self._asked_at, self._stopped_at + STOP_TIME), silent_at)
 
-    def run(self) -> Procedure:
+    def run(self) -> Procedure[SetUpOutcome]:
         """Do it; returns a :class:`SetUpOutcome`."""
         self._asked_at = min(self._asked_at, self._channel.now)
         reply = yield Transfer(states.STATUS_WORD)
@@ -128,7 +128,7 @@ class BringUp:
             return end.outcome
         return SetUpOutcome(SetUpState.READY, status=status)
 
-    def _once_more(self) -> Generator[Transfer, TransferResult, int]:
+    def _once_more(self) -> Procedure[int]:
         """Look again at what nobody looked at meanwhile; return the status word."""
         while True:
             yield from self._beats()
@@ -147,7 +147,7 @@ class BringUp:
 
     # -- the steps --------------------------------------------------------------------------------
 
-    def _stand_still(self, reply: TransferResult) -> Generator[Transfer, TransferResult, int]:
+    def _stand_still(self, reply: TransferResult) -> Procedure[int]:
         """
         Disable a drive that is found enabled, before anything else is touched.
 
@@ -193,14 +193,14 @@ class BringUp:
         self._session.duty.happened(Happened.STOPPED)
         return raw
 
-    def _tell_blindly(self, attempts: int | None = None) -> Procedure:
+    def _tell_blindly(self, attempts: int | None = None) -> Procedure[None]:
         """Stop a drive whose state nobody knows, before SYNC begins."""
         if self._beat is not None and not self._beat.opened and self._stopped_at == math.inf:
             self._stopped_at = self._channel.now
             word = DISABLE_WORDS[self._options.disable_word].to_bytes(2, 'little')
             yield Transfer(states.CONTROL_WORD, 0, word, attempts=attempts)
 
-    def _brakes(self) -> Generator[Transfer, TransferResult, bool]:
+    def _brakes(self) -> Procedure[bool]:
         """Return whether a quick stop takes its course."""
         standing = self._rules.standing
         standing.quick_stop_option = yield from self._read(
@@ -208,7 +208,7 @@ class BringUp:
         yield from standing.look(self._channel, sampled=False)
         return not standing.holds
 
-    def _learn(self) -> Procedure:
+    def _learn(self) -> Procedure[None]:
         """Read what the drive does at a stop."""
         for index in states.STOP_OPTIONS:
             value = yield from self._read(index, 0, 2, signed=True)
@@ -218,14 +218,14 @@ class BringUp:
                 self.options[index] = value
             self._rules.standing.quick_stop_option = self.options.get(states.QUICK_STOP_OPTION)
 
-    def learn_again(self) -> Procedure:
+    def learn_again(self) -> Procedure[None]:
         """Read it once more: users have written it."""
         try:
             yield from self._learn()
         except SetUpEnd:    # nobody answers: what was read stands
             return
 
-    def _heartbeat(self) -> Procedure:
+    def _heartbeat(self) -> Procedure[None]:
         """Set up the heartbeats of the drive."""
         node, interval = self._node, round(1000 * self._options.heartbeat_producer)
         node.heartbeat_timeout = self._options.heartbeat_timeout
@@ -241,7 +241,7 @@ class BringUp:
         else:       # it may send them as it is
             self.tell(refusal)
 
-    def _look_at_objects(self, status: TransferResult) -> Procedure:
+    def _look_at_objects(self, status: TransferResult) -> Procedure[None]:
         """See that all is there that is to be mapped, and that limits are not without effect."""
         drive = self._drive
         without_effect = self._limits.found((yield from read_mapped(
@@ -249,14 +249,14 @@ class BringUp:
         if without_effect:
             raise differs(without_effect)
 
-    def _beats(self) -> Procedure:
+    def _beats(self) -> Procedure[None]:
         """Wait for heartbeats that have ceased: it would be online again, and not watched."""
         if self._node.ceased:
             self._session.report.advise(sentences.no_heartbeat(self._node.heartbeat_timeout))
             while self._node.ceased:
                 yield Transfer(pause=LOOK_PERIOD)
 
-    def _start(self) -> Procedure:
+    def _start(self) -> Procedure[None]:
         """Start the node, or wait until somebody else does."""
         if self._beat is not None:
             yield from self._sync_begins(self._beat)
@@ -270,7 +270,7 @@ class BringUp:
             while self._waits_for_start:
                 yield Transfer(pause=LOOK_PERIOD)
 
-    def _sync_begins(self, beat: Beat) -> Procedure:
+    def _sync_begins(self, beat: Beat) -> Procedure[None]:
         """Wait until there is SYNC: a drive that watches it needs it when it is started."""
         while not beat.opened:
             self._session.report.advise(sentences.sync_not_begun())
@@ -279,7 +279,7 @@ class BringUp:
         if pause:
             yield Transfer(pause=pause)
 
-    def _becomes_operational(self) -> Procedure:
+    def _becomes_operational(self) -> Procedure[None]:
         """Wait for what shows that the node is operational; for a heartbeat, if it sends them."""
         node, started_at = self._node, self.started_at
         until = started_at + self._drive.control_timeout
@@ -315,7 +315,7 @@ class BringUp:
         self.nmt_at = max(self.nmt_at, self._channel.now)
         self._session.outbox.put(network.encode_nmt(command, self._drive.station))
 
-    def _find_axes(self) -> Procedure:
+    def _find_axes(self) -> Procedure[None]:
         """Read where axes are that stay where they are, until setpoints can carry it."""
         setpoints = self._session.setpoints
         while True:
@@ -332,14 +332,14 @@ class BringUp:
             self._session.report.advise(setpoints.untold_text)
             yield Transfer(pause=5 * LOOK_PERIOD)
 
-    def _choose_mode(self) -> Procedure:
+    def _choose_mode(self) -> Procedure[None]:
         number, name = self._mode.number, self._options.mode
         offered = yield from self._read(states.MODES_OFFERED)
         if offered is not None and not offered >> number - 1 & 1:
             raise differs(sentences.mode_not_offered(name, number, offered))
         yield from self._must(states.MODE, 0, number, 1)
 
-    def _interpolation_time(self) -> Procedure:
+    def _interpolation_time(self) -> Procedure[None]:
         """Write 60C2h, where the drive has it."""
         index, period = states.INTERPOLATION_TIME, self._drive.period
         value = yield from self._read(index, 1, 1)
@@ -359,7 +359,7 @@ class BringUp:
 
     # -- how PDOs travel --------------------------------------------------------------------------
 
-    def _exchange(self) -> Procedure:
+    def _exchange(self) -> Procedure[None]:
         """Compare the set-up of PDOs and SYNC, and write what differs, if that is wanted."""
         if self._options.mapping == 'configure' and self._options.nmt_start:
             self._nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
@@ -379,7 +379,7 @@ class BringUp:
         if not options.nmt_start and self._node.state is not NmtState.PRE_OPERATIONAL:
             raise differs(sentences.not_pre_operational(text))
 
-    def _sync(self) -> Procedure:
+    def _sync(self) -> Procedure[None]:
         identifier = yield from self._read(SYNC_COB_ID)
         if identifier is not None and identifier & (
                 _PRODUCES_SYNC | pdo.LONG_IDENTIFIER | pdo.LONG_IDENTIFIER - 1

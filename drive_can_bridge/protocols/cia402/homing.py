@@ -20,7 +20,7 @@ attained bit 12 that was low, later than the status may be behind; or, of a driv
 """
 
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 import math
 
@@ -34,7 +34,7 @@ from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.bring_up import LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.standing import Band, IN_A_ROW, LONG, place_of, STILL
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 _DONE = states.BIT_12 | states.TARGET_REACHED
 #: 6098h: the present position becomes the reference, and nothing moves
@@ -263,7 +263,7 @@ class Homing:
                               self._written, self._now)
 
     @staticmethod
-    def _write(mode: int, attempts: int = 1) -> Generator[Transfer, TransferResult, Sentence]:
+    def _write(mode: int, attempts: int = 1) -> Procedure[Sentence]:
         reply = yield Transfer(states.MODE, 0, mode.to_bytes(1, 'little'), attempts=attempts)
         return NOTHING if reply.data is not None else sentences.mode_refused(mode)
 
@@ -281,7 +281,7 @@ class Homing:
     def _change(self, mode: int, then: Callable[[Sentence], None]) -> None:
         step = self._step
 
-        def look() -> Generator[Transfer, TransferResult, Sentence]:
+        def look() -> Procedure[Sentence]:
             if failure := (yield from self._write(mode)):
                 return failure
             until = self._channel.now + self._session.configuration.control_timeout

@@ -13,7 +13,7 @@ effect: its drive counts as ``mapping differs`` until it is seen to have another
 a third value is limited by something else. Silence is asked again, a refusal proves nothing.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 import math
 
 from drive_can_bridge.core import sentences
@@ -23,7 +23,7 @@ from drive_can_bridge.core.process_image import LastSent
 from drive_can_bridge.core.text import value_text
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.mapped import named
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 #: s that a drive may take to show what it was sent
 LIMIT_TIME = 0.5
@@ -124,7 +124,7 @@ class LimitCheck:
         raw = self._sent.raws[limit.place]
         return None if raw is None else limit.parameter.word_from_raw(raw)
 
-    def _look(self, limit: _Limit) -> Generator[Transfer, TransferResult, None]:
+    def _look(self, limit: _Limit) -> Procedure[None]:
         """Read one until it shows what is sent, or for so long that it never will."""
         parameter, tried, until = limit.parameter, set[int](), math.inf
         length = pdo.width(parameter)

@@ -7,7 +7,6 @@ enabled drive is in (6061h), until it shows that of the file; why a drive does n
 (603Fh), when half of its time for that is over.
 """
 
-from collections.abc import Generator
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control_machine import ControlMachine
@@ -19,7 +18,7 @@ from drive_can_bridge.protocols.cia402.bring_up import BringUp, LOOK_PERIOD
 from drive_can_bridge.protocols.cia402.control import DriveRules
 from drive_can_bridge.protocols.cia402.homing import Homing
 from drive_can_bridge.protocols.cia402.states import MODES, ServoState
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 
 class StateLooks:
@@ -63,11 +62,11 @@ class StateLooks:
                 now > control.due - 0.5 * self._session.configuration.control_timeout):
             self._begin(self._look_at_error(), now)
 
-    def _begin(self, look: Generator[Transfer, TransferResult, None], now: float) -> None:
+    def _begin(self, look: Procedure[None], now: float) -> None:
         self._looking = True
         self._channel.run(look, self.ended, now)
 
-    def _look_at_mode(self) -> Generator[Transfer, TransferResult, None]:
+    def _look_at_mode(self) -> Procedure[None]:
         """Read 6061h until it shows the mode."""
         while self._rules.state is ServoState.OPERATION_ENABLED:
             reply = yield Transfer(states.MODE_SHOWN)
@@ -83,13 +82,13 @@ class StateLooks:
                 return
             yield Transfer(pause=LOOK_PERIOD)
 
-    def _look_at_axis(self) -> Generator[Transfer, TransferResult, None]:
+    def _look_at_axis(self) -> Procedure[None]:
         """Read what samples do not say as long as it is to be known whether the axis stands."""
         while self._standing.watching and not self._standing.holds:
             yield from self._standing.look(self._channel)
             yield Transfer(pause=LOOK_PERIOD)
 
-    def _look_at_error(self) -> Generator[Transfer, TransferResult, None]:
+    def _look_at_error(self) -> Procedure[None]:
         """Read 603Fh: why the drive is not enabled."""
         reply = yield Transfer(states.ERROR_CODE)
         self._error_code = -1 if reply.data is None else int.from_bytes(reply.data[:2], 'little')

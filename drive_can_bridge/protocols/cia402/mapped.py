@@ -8,7 +8,7 @@ mapped. Only the drive's own word counts: that it has none (06020000h, 06090011h
 that tells the size of its status word as it is, another size than the profile has.
 """
 
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import Sentence, together
@@ -17,7 +17,7 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
 from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import Pdo
-from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer, TransferResult
 
 
 def named(parameter: Parameter) -> str:
@@ -26,7 +26,7 @@ def named(parameter: Parameter) -> str:
 
 
 def read_mapped(objects: ObjectAccess, pdos: Iterable[Pdo], status: TransferResult,
-                ) -> Generator[Transfer, TransferResult, dict[Parameter, int]]:
+                ) -> Procedure[dict[Parameter, int]]:
     """
     Read all that PDOs are to carry.
 

@@ -6,17 +6,15 @@ Whatever nobody answers ends it. A refusal says that there is no such object onl
 says so (06020000h, 06090011h): it may be write only, or not to be had in this state.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
-from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer, TransferResult
 
-Procedure = Generator[Transfer, TransferResult, Any]
 
 
 class SetUpState(Enum):
@@ -70,7 +68,7 @@ class ObjectAccess:
         """The drive says that it has no such object as was asked for last."""
         return self.abort in sdo.ABSENT
 
-    def transfer(self, ask: Transfer) -> Generator[Transfer, TransferResult, TransferResult]:
+    def transfer(self, ask: Transfer) -> Procedure[TransferResult]:
         """Do one transfer. :raises SetUpEnd: nobody answers."""
         reply = yield ask
         if silent(reply):
@@ -79,7 +77,7 @@ class ObjectAccess:
         return reply
 
     def read(self, index: int, subindex: int = 0, length: int = 4, *, signed: bool = False,
-             ) -> Generator[Transfer, TransferResult, 'int | None']:
+             ) -> Procedure[int | None]:
         """
         Read a number; None: the drive refuses.
 
@@ -94,7 +92,7 @@ class ObjectAccess:
         return int.from_bytes(data, 'little', signed=signed)
 
     def put(self, index: int, subindex: int, value: int, length: int, meant: str = '',
-            ) -> Generator[Transfer, TransferResult, Sentence]:
+            ) -> Procedure[Sentence]:
         """
         Write a number; return the refusal.
 
@@ -106,7 +104,7 @@ class ObjectAccess:
         return NOTHING if reply.abort is None else sentences.object_refused(
             what=at_object(index, subindex), why=sdo.describe(reply.abort), meant=meant)
 
-    def must(self, index: int, subindex: int, value: int, length: int) -> Procedure:
+    def must(self, index: int, subindex: int, value: int, length: int) -> Procedure[None]:
         """Write a number. :raises SetUpEnd: nobody answers, or the drive refuses."""
         refusal = yield from self.put(index, subindex, value, length)
         if refusal:

@@ -1,16 +1,16 @@
 # Copyright 2026 the drive_can_bridge authors. Licensed under the Apache License, Version 2.0.
 """PDOs of a drive as they are set up: compared, written where they differ, compared again."""
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo
-from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import Pdo, request_pdos, response_pdos, same_mapping
-from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure
 
 
 class PdoSetUp:
@@ -28,7 +28,7 @@ class PdoSetUp:
         self._synchronous: bool = drive.options.transmission == 'sync'
         self._may_write, self._tell = may_write, tell
 
-    def set_up(self) -> Procedure:
+    def set_up(self) -> Procedure[None]:
         """Compare them with the configuration, and write what differs, if that is wanted."""
         for wanted in self._received:
             yield from self._look_at(wanted, transmit=False)
@@ -38,7 +38,7 @@ class PdoSetUp:
             yield from self._close(pdo.RPDO_COMMUNICATION, self._received)
             yield from self._close(pdo.TPDO_COMMUNICATION, self._sent)
 
-    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Procedure:
+    def _look_at(self, wanted: Pdo, *, transmit: bool) -> Procedure[None]:
         """Compare one PDO; write it where it differs, and compare again."""
         difference, identifier = yield from self._compare(wanted, transmit=transmit)
         if difference:
@@ -57,7 +57,7 @@ class PdoSetUp:
         return (pdo.SYNCHRONOUS,) if transmit else (pdo.SYNCHRONOUS, *event)
 
     def _compare(self, wanted: Pdo, *, transmit: bool, written: bool = False,
-                 ) -> Generator[Transfer, TransferResult, tuple[Sentence, int]]:
+                 ) -> Procedure[tuple[Sentence, int]]:
         """
         Return what differs, and the COB-ID as it is.
 
@@ -87,7 +87,7 @@ class PdoSetUp:
                     return _difference(at, subindex, time, value), identifier
         return NOTHING, identifier
 
-    def _other_content(self, wanted: Pdo) -> Generator[Transfer, TransferResult, Sentence]:
+    def _other_content(self, wanted: Pdo) -> Procedure[Sentence]:
         """Return in what a PDO holds something else, by its meaning."""
         mapping, needed = wanted.communication + pdo.MAPPING_OFFSET, len(wanted.entries)
         count = yield from self._objects.read(mapping, 0, 1)
@@ -115,8 +115,7 @@ class PdoSetUp:
         return [(pdo.INHIBIT_TIME, min(round(5000 * self._drive.period), 0xFFFF)),
                 (pdo.EVENT_TIMER, round(1000 * self._drive.period))]
 
-    def _write(self, wanted: Pdo, identifier: int, *, transmit: bool,
-               ) -> Generator[Transfer, TransferResult, Sentence]:
+    def _write(self, wanted: Pdo, identifier: int, *, transmit: bool) -> Procedure[Sentence]:
         """
         Write one PDO, in the order that all devices take.
 
@@ -144,8 +143,7 @@ class PdoSetUp:
             raise differs(refusal, remedy)
         return fixed
 
-    def _map(self, wanted: Pdo,
-             undo: list[tuple[int, int]]) -> Generator[Transfer, TransferResult, Sentence]:
+    def _map(self, wanted: Pdo, undo: list[tuple[int, int]]) -> Procedure[Sentence]:
         """
         Write what a PDO holds, unless it holds that: it may be fixed.
 
@@ -177,8 +175,7 @@ class PdoSetUp:
                 held[place] = content
         return NOTHING
 
-    def _put_entry(self, wanted: Pdo, place: int, content: int,
-                   ) -> Generator[Transfer, TransferResult, Sentence]:
+    def _put_entry(self, wanted: Pdo, place: int, content: int) -> Procedure[Sentence]:
         """Write an entry; a refusal names the parameters that were meant."""
         names = [each.name for each in wanted.parameters]
         if 0 < place <= len(names):
@@ -188,8 +185,7 @@ class PdoSetUp:
             wanted.communication + pdo.MAPPING_OFFSET, place, content, 4 if place else 1,
             ', '.join(names)))
 
-    def _pace(self, at: int, *, fixed: bool,
-              transmit: bool) -> Generator[Transfer, TransferResult, Sentence]:
+    def _pace(self, at: int, *, fixed: bool, transmit: bool) -> Procedure[Sentence]:
         """Write when a PDO is sent; return the refusal of what it cannot do without."""
         types, refusal = self._types(transmit=transmit), NOTHING
         for kind in types[:1] if fixed else types:
@@ -209,7 +205,7 @@ class PdoSetUp:
                 self._tell(refusal)
         return NOTHING
 
-    def _close(self, first: int, used: Iterable[Pdo]) -> Procedure:
+    def _close(self, first: int, used: Iterable[Pdo]) -> Procedure[None]:
         """Make PDOs invalid that are not needed."""
         needed = {each.number for each in used}
         for number in range(1, pdo.PDO_MAX + 1):

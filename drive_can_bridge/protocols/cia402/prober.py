@@ -7,13 +7,13 @@ need no writing. ``disable_word``: 605Ch and 605Bh say what brakes. ``bridge_hea
 1016h nobody watches the bridge.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.errors import RemoteProtocolError
-from drive_can_bridge.core.frame import Frame, Route, STANDARD_IDENTIFIER_MAX
+from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.cia402 import states
@@ -23,7 +23,8 @@ from drive_can_bridge.protocols.cia402.pdo import (
 from drive_can_bridge.protocols.cia402.scanner import PROFILE
 from drive_can_bridge.protocols.cia402.states import (
     ABORT_CONNECTION_OPTION, DISABLE_OPTION, MODES, MODES_OFFERED, SHUTDOWN_OPTION)
-from drive_can_bridge.protocols.scanner import Conversation, Finding, Prober, Question, undecided
+from drive_can_bridge.protocols.scanner import (
+    Asking, Conversation, Finding, Prober, Question, undecided)
 from drive_can_bridge.protocols.telegrams import Direction
 
 _CONSUMER_HEARTBEAT = 0x1016
@@ -57,7 +58,7 @@ class _Read(NamedTuple):
         return None if self.value is None else (self.value & 0xFFFF ^ 0x8000) - 0x8000
 
 
-_Reading = Generator[Question, Frame | None, _Read]
+_Reading = Asking[_Read]
 
 
 class Cia402Prober(Prober):
@@ -86,7 +87,7 @@ class Cia402Prober(Prober):
         return [(yield from self._mode()), (yield from self._mapping()),
                 (yield from self._disable_word()), (yield from self._bridge_heartbeat())]
 
-    def _axes(self) -> Generator[Question, Frame | None, list[tuple[int, int]]]:
+    def _axes(self) -> Asking[list[tuple[int, int]]]:
         """Return the status words of further axes, with their indices."""
         found: list[tuple[int, int]] = []
         for axis in range(1, _AXES_MAX):
@@ -97,7 +98,7 @@ class Cia402Prober(Prober):
             found.append((index, word & 0xFFFF))
         return found
 
-    def _mode(self) -> Generator[Question, Frame | None, Finding]:
+    def _mode(self) -> Asking[Finding]:
         offered = yield from self._value(MODES_OFFERED, 0)
         if offered.value is None:
             return undecided('mode', offered.why)
@@ -106,7 +107,7 @@ class Cia402Prober(Prober):
         wanted = self.drive.options.mode
         return Finding('mode', wanted if wanted in names else None, told)
 
-    def _mapping(self) -> Generator[Question, Frame | None, Finding]:
+    def _mapping(self) -> Asking[Finding]:
         for wanted in (*request_pdos(self.drive), *response_pdos(self.drive)):
             found, why = yield from self._entries(wanted)
             place = f'{wanted.communication + MAPPING_OFFSET:04X}h'
@@ -117,7 +118,7 @@ class Cia402Prober(Prober):
                     place, _entries_text(found), _entries_text(wanted.entries)))
         return Finding('mapping', 'verify', frame_sentences.mapping_fits())
 
-    def _entries(self, pdo: Pdo) -> Generator[Question, Frame | None, tuple[list[int], str]]:
+    def _entries(self, pdo: Pdo) -> Asking[tuple[list[int], str]]:
         """Return what a PDO holds, or why that is not known."""
         place = pdo.communication + MAPPING_OFFSET
         count = yield from self._value(place, 0)
@@ -131,7 +132,7 @@ class Cia402Prober(Prober):
             found.append(entry.value or 0)
         return found, ''
 
-    def _disable_word(self) -> Generator[Question, Frame | None, Finding]:
+    def _disable_word(self) -> Asking[Finding]:
         options = {}
         for index in (DISABLE_OPTION, SHUTDOWN_OPTION):
             options[index] = yield from self._value(index, 0)
@@ -154,7 +155,7 @@ class Cia402Prober(Prober):
             return Finding('disable_word', None, frame_sentences.manual_says(told, '0006h'))
         return Finding('disable_word', 'disable_operation', frame_sentences.always_coasts(told))
 
-    def _bridge_heartbeat(self) -> Generator[Question, Frame | None, Finding]:
+    def _bridge_heartbeat(self) -> Asking[Finding]:
         places = yield from self._value(_CONSUMER_HEARTBEAT, 0)
         if places.unknown:
             return undecided('bridge_heartbeat', places.why)

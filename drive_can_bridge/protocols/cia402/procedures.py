@@ -7,7 +7,7 @@ it is acknowledged, and not read back. No parameter has more than four bytes, so
 takes segments; an object that is longer, which a raw name may find, is refused in words.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 from drive_can_bridge.core import requests, sentences
 from drive_can_bridge.core.messages import Sentence
@@ -20,7 +20,8 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.canopen.sdo import EXPEDITED_MAX
 from drive_can_bridge.protocols.cia402.pdo import is_map, width
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import (
+    Procedure, SdoChannel, Transfer, TransferResult)
 
 NO_OBJECT = sentences.no_object()
 NOT_ATOMIC = sentences.not_in_one_frame('an SDO carries one object')
@@ -52,7 +53,7 @@ class SdoAccess(ParameterAccess[Parameter, Transfer, TransferResult]):
     def __init__(self, channel: SdoChannel, retry: RetryPolicy) -> None:
         super().__init__(channel, retry, OneByOne())
 
-    def read(self, span: Parameter) -> Generator[Transfer, TransferResult, Found]:
+    def read(self, span: Parameter) -> Procedure[Found]:
         reply = yield Transfer(span.index or 0, span.subindex or 0)
         failure = self._failure(reply)
         if failure is not None:
@@ -70,7 +71,7 @@ class SdoAccess(ParameterAccess[Parameter, Transfer, TransferResult]):
             return Failure(FailureKind.REFUSED, sentences.other_length(len(data), span.type.value))
         return (word,)
 
-    def write(self, items: Sequence[Item]) -> Generator[Transfer, TransferResult, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         (parameter, raw), = items
         return ((yield from self._write(parameter, raw)),)
 
@@ -82,8 +83,7 @@ class SdoAccess(ParameterAccess[Parameter, Transfer, TransferResult]):
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _write(self, parameter: Parameter, raw: int) -> Generator[Transfer, TransferResult,
-                                                                  Outcome]:
+    def _write(self, parameter: Parameter, raw: int) -> Procedure[Outcome]:
         """Write one parameter; of one whose width only the drive knows, it is asked first."""
         length = width(parameter)
         if not _own_width(parameter):

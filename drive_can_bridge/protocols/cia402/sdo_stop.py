@@ -8,7 +8,7 @@ What says that it may be: its heartbeat; or that neither the control word nor it
 answered, and neither a heartbeat nor a PDO shows that it is in another state.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from drive_can_bridge.core import sentences
@@ -20,7 +20,7 @@ from drive_can_bridge.protocols.canopen.node import WatchedNode
 from drive_can_bridge.protocols.cia402.pdo import width
 from drive_can_bridge.protocols.cia402.procedures import refused
 from drive_can_bridge.protocols.cia402.transactor import (
-    SdoChannel, SILENT, Transfer, TransferResult)
+    Procedure, SdoChannel, SILENT, Transfer, TransferResult)
 from drive_can_bridge.protocols.safe_stop import ANSWER_TIME, STOP_ATTEMPTS, StopWrite
 
 #: s between two NMT commands to a node that may be stopped, and for which they are repeated
@@ -28,7 +28,7 @@ NMT_SPACING, NMT_TIME = 0.05, 1.0
 _ATTEMPTS_UNTIL_NMT = 2
 _ROUNDING = 1e-6
 
-StopProcedure = Generator[Transfer, TransferResult, list[Sentence]]
+StopProcedure = Procedure[list[Sentence]]
 
 
 class SdoStop:
@@ -78,8 +78,7 @@ class SdoStop:
                     failed.append(sentences.node_may_be_stopped())
         return failed
 
-    def _word(self, word: Transfer, *, unheard: bool) -> Generator[Transfer, TransferResult,
-                                                                   tuple[TransferResult, int]]:
+    def _word(self, word: Transfer, *, unheard: bool) -> Procedure[tuple[TransferResult, int]]:
         """Write the control word; return what became of it, and the number of attempts."""
         began, attempts = self._channel.now, 0
         waited = began if unheard else began + _ATTEMPTS_UNTIL_NMT * self._answer_time
@@ -95,8 +94,7 @@ class SdoStop:
             if reply is not SILENT:
                 return reply, attempts
 
-    def _wake(self, word: Transfer, attempts: int) -> Generator[Transfer, TransferResult,
-                                                                tuple[TransferResult, int]]:
+    def _wake(self, word: Transfer, attempts: int) -> Procedure[tuple[TransferResult, int]]:
         """Send NMT so that the node answers SDO, and the control word behind it, till it does."""
         until = self._channel.now + NMT_TIME - 0.5 * NMT_SPACING
         command = network.encode_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node.number)

@@ -12,7 +12,7 @@ mapping can misroute. At the end, stop cycles go on until the drive says that it
 for ``control_timeout``; then it watches the bridge no more.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from functools import partial
 import math
 
@@ -60,7 +60,7 @@ from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, INTERPOLATION_MAX, MODES, ServoState, state_of, STATUS_PARAMETER)
 from drive_can_bridge.protocols.cia402.stop_options import stops_by
 from drive_can_bridge.protocols.cia402.transactor import (
-    SdoChannel, SdoTransactor, Transfer, TransferResult)
+    Procedure, SdoChannel, SdoTransactor, Transfer, TransferResult)
 from drive_can_bridge.protocols.cyclic_exchange import CyclicExchange, EXPIRY_SPACING
 from drive_can_bridge.protocols.life import Life, Script
 from drive_can_bridge.protocols.safe_stop import (
@@ -631,7 +631,7 @@ class Cia402Session(Session):
         self._runs_on = bool(failed)
         return failed
 
-    def _state_in_the_end(self) -> Generator[Transfer, TransferResult, ServoState]:
+    def _state_in_the_end(self) -> Procedure[ServoState]:
         state = ServoState.UNKNOWN
         while True:
             reply = yield Transfer(states.STATUS_WORD, timeout=self._stop.answer_time, attempts=1)

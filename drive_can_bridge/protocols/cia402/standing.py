@@ -19,7 +19,7 @@ that state whatever 605Ah says, freeze 606Ch at its last value, never set bit 10
 all these; encoders dither.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from itertools import chain
 import math
 
@@ -29,7 +29,7 @@ from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.pdo import response_pdos
 from drive_can_bridge.protocols.cia402.states import ServoState, state_of
-from drive_can_bridge.protocols.cia402.transactor import SdoChannel, Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, SdoChannel, Transfer
 
 #: s for which nothing may say that the axis moves
 STILL = 0.5
@@ -173,8 +173,7 @@ class Standing:
             elif index == self._velocity_object:
                 self._take_velocity(raw, now)
 
-    def look(self, channel: SdoChannel, *,
-             sampled: bool = True) -> Generator[Transfer, TransferResult, None]:
+    def look(self, channel: SdoChannel, *, sampled: bool = True) -> Procedure[None]:
         """
         Read once what says whether the axis moves.
 

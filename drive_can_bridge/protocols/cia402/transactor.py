@@ -6,7 +6,7 @@ An answer says which object it is about, so that only the late answer to a trans
 object could be mistaken for that to another one.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from drive_can_bridge.protocols.canopen.sdo import SdoCommand, SdoMessage
 from drive_can_bridge.protocols.channel import Channel, LATE_MAX, STOP_PATIENCE
 from drive_can_bridge.protocols.cia402.states import STATUS_WORD
 from drive_can_bridge.protocols.telegrams import Direction
-from drive_can_bridge.protocols.transactor import Transactor
+from drive_can_bridge.protocols.transactor import ResultT, Transactor
 
 #: what every node has: device type, error register, identity; a refusal will do, too
 ASIDE = (0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1)
@@ -249,6 +249,8 @@ class SdoTransactor(Transactor[Transfer, TransferResult]):
 
 
 SdoChannel = Channel[Transfer, TransferResult]
+#: yields steps, is sent what became of each, and returns something
+Procedure = Generator[Transfer, TransferResult, ResultT]
 
 
 def _belongs(found: SdoMessage, step: Transfer) -> bool:

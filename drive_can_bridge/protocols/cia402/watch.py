@@ -8,16 +8,16 @@ sub-index 5). Without 6007h nobody knows what it does: there are stacks that rep
 on moving (Lely core 2.4.0).
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.messages import NOTHING, Sentence
 from drive_can_bridge.protocols.canopen import sdo
 from drive_can_bridge.protocols.cia402 import pdo, states
-from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess, Procedure
+from drive_can_bridge.protocols.cia402.objects import at_object, differs, ObjectAccess
 from drive_can_bridge.protocols.cia402.pdo import request_pdos
-from drive_can_bridge.protocols.cia402.transactor import Transfer, TransferResult
+from drive_can_bridge.protocols.cia402.transactor import Procedure, Transfer
 
 CONSUMER, GUARD_TIME, LIFE_FACTOR = 0x1016, 0x100C, 0x100D
 #: the bridge's heartbeat may be late by so many intervals
@@ -43,7 +43,7 @@ class BridgeWatch:
         self._received = request_pdos(drive)
         self._unsure = NOTHING      # why nobody knows whether the drive watches
 
-    def set_up(self) -> Procedure:
+    def set_up(self) -> Procedure[None]:
         """Set up what stops the drive when the bridge dies, and learn what does."""
         interval, mapping = self._options.bridge_heartbeat, self._options.mapping
         self._unsure = NOTHING
@@ -82,13 +82,13 @@ class BridgeWatch:
         return NOTHING if self._objects.absent else sentences.object_refused(
             at_object(index, subindex), sdo.describe(self._objects.abort or 0))
 
-    def _guarding(self) -> Generator[Transfer, TransferResult, Sentence]:
+    def _guarding(self) -> Procedure[Sentence]:
         """Name life guarding, if that is set."""
         time = (yield from self._objects.read(GUARD_TIME, 0, 2)) or 0
         factor = (yield from self._objects.read(LIFE_FACTOR, 0, 1)) or 0
         return sentences.life_guarding(time * factor) if time * factor else NOTHING
 
-    def _time_out(self) -> Generator[Transfer, TransferResult, Sentence]:
+    def _time_out(self) -> Procedure[Sentence]:
         """Name the receive PDO that may be missing for a time only."""
         for each in self._received:
             time = yield from self._objects.read(each.communication, pdo.EVENT_TIMER, 2)
@@ -97,7 +97,7 @@ class BridgeWatch:
                     at_object(each.communication, pdo.EVENT_TIMER), time)
         return NOTHING
 
-    def _watchers(self) -> Generator[Transfer, TransferResult, list[int]]:
+    def _watchers(self) -> Procedure[list[int]]:
         count = yield from self._objects.read(CONSUMER, 0, 1)
         if count is None:
             self._unsure = self._refused(CONSUMER)
@@ -109,7 +109,7 @@ class BridgeWatch:
             found.append(entry or 0)
         return found
 
-    def _write_watch(self, interval: float) -> Generator[Transfer, TransferResult, 'int | None']:
+    def _write_watch(self, interval: float) -> Procedure[int | None]:
         node = self._options.bridge_node
         entries = yield from self._watchers()
         slots = [place for place, entry in enumerate(entries, 1) if entry >> 16 & 0x7F == node] + [
@@ -132,7 +132,7 @@ class BridgeWatch:
             return None
         return self.slot
 
-    def _read_watch(self, interval: float) -> Generator[Transfer, TransferResult, 'int | None']:
+    def _read_watch(self, interval: float) -> Procedure[int | None]:
         for place, entry in enumerate((yield from self._watchers()), 1):
             if entry >> 16 & 0x7F == self._options.bridge_node and entry & 0xFFFF:
                 if entry & 0xFFFF < 2000 * interval:
@@ -143,7 +143,7 @@ class BridgeWatch:
                 return place
         return None
 
-    def release(self, timeout: float) -> Procedure:
+    def release(self, timeout: float) -> Procedure[None]:
         """End the watch of the drive for the bridge, behind an ordered stop."""
         slot, self.slot = self.slot, None
         if slot is not None:

@@ -224,7 +224,7 @@ class ExtendedSession(Session):
                 return False
         return True
 
-    def _positions(self) -> Procedure:
+    def _positions(self) -> Procedure[list[int] | None]:
         raws: list[int] = []
         for setpoint in self.setpoints.held:
             words = yield self._side.numbers.read(setpoint.measured)
@@ -271,7 +271,7 @@ class ExtendedSession(Session):
             return self._channel.now
         return self._rewritten_at + self._pause
 
-    def _rewrite(self) -> Procedure:
+    def _rewrite(self) -> Procedure[bool]:
         """Rewrite the maps, and note it even if the life has ended meanwhile: cells wear."""
         if self._rewritten_at > -math.inf:
             self._pause = min(2 * self._pause, REWRITE_PAUSE_MAX)

@@ -7,7 +7,7 @@ told. Reg.122 to 125 and 126 to 129 hold the numbers that the file configures, m
 themselves. That a drive does not answer for other numbers shows nothing: an answer may be lost.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from typing import NamedTuple
 
 from drive_can_bridge.core import frame_sentences
@@ -18,13 +18,13 @@ from drive_can_bridge.protocols.datamodel import extended, standard
 from drive_can_bridge.protocols.datamodel.extended import SLOTS
 from drive_can_bridge.protocols.datamodel.options import effective, NUMBER_MAX, PROBED
 from drive_can_bridge.protocols.datamodel.scanner import numbers_text
-from drive_can_bridge.protocols.scanner import Conversation, Finding, Prober, Question
+from drive_can_bridge.protocols.scanner import Asking, Conversation, Finding, Prober, Question
 
 #: how far the two ways of counting are apart, of those who count from 0 and from 1
 OFFSETS = (0, -1, 1)
 #: even ones are parameter tasks of CANnord inverters
 _CANNORD_TASKS = range(0x200, 0x400)
-_Asking = Generator[Question, Frame | None, tuple[int, ...] | None]
+_Asking = Asking[tuple[int, ...] | None]
 
 
 class _Maps(NamedTuple):

@@ -9,7 +9,7 @@ and from 1 on the other.
 Every generator here is for :class:`.transactor.AcyclicChannel`.
 """
 
-from collections.abc import Container, Generator, Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from typing import NamedTuple
 
 from drive_can_bridge.core import sentences
@@ -23,7 +23,7 @@ from drive_can_bridge.protocols.access import (
 from drive_can_bridge.protocols.datamodel.extended import CYCLIC_PARAMETER, SLOTS
 from drive_can_bridge.protocols.datamodel.options import effective, padded
 from drive_can_bridge.protocols.datamodel.transactor import (
-    AcyclicChannel, ParameterRead, ParameterWrite, Reply, Step, Words)
+    AcyclicChannel, ParameterRead, ParameterWrite, Procedure, Reply, Step, Words)
 from drive_can_bridge.protocols.polled_exchange import Chunk, plan_reads
 
 
@@ -84,7 +84,7 @@ class Put(NamedTuple):
     sent: bool = True
 
 
-def put(write: ParameterWrite, *, look: bool, verify: bool = True) -> Generator[Step, Reply, Put]:
+def put(write: ParameterWrite, *, look: bool, verify: bool = True) -> Procedure[Put]:
     """
     Write words and read them back, since nobody acknowledges writes.
 
@@ -126,7 +126,7 @@ class DataModelAccess(ParameterAccess[Chunk, Step, Reply]):
         never = write and self._numbers.number(parameter) == CYCLIC_PARAMETER
         return Failure(FailureKind.INVALID, NOT_WRITABLE) if never else None
 
-    def read(self, span: Chunk) -> Generator[Step, Reply, Found]:
+    def read(self, span: Chunk) -> Procedure[Found]:
         # one bad number makes the drive ignore the whole frame
         words = yield ParameterRead(span.address, span.size)
         return self.retry.unanswered() if words is None else words
@@ -142,13 +142,13 @@ class DataModelAccess(ParameterAccess[Chunk, Step, Reply]):
                 'fit')
         return sentences.not_in_one_frame(what)
 
-    def write(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+    def write(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         return self._write(items, look=True)
 
-    def write_blind(self, items: Sequence[Item]) -> Generator[Step, Reply, Outcomes]:
+    def write_blind(self, items: Sequence[Item]) -> Procedure[Outcomes]:
         return self._write(items, look=False)
 
-    def _write(self, items: Sequence[Item], *, look: bool) -> Generator[Step, Reply, Outcomes]:
+    def _write(self, items: Sequence[Item], *, look: bool) -> Procedure[Outcomes]:
         numbers = [self._numbers.number(parameter) for parameter, _ in items]
         first = min(numbers)
         words = [0] * len(items)
@@ -178,7 +178,7 @@ class Maps(NamedTuple):
 
 
 def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] | None = None,
-              ) -> Generator[Step, Reply, Maps | None]:
+              ) -> Procedure[Maps | None]:
     """
     Read both maps, each in one frame; None when nobody answers.
 
@@ -195,7 +195,7 @@ def read_maps(request_base: int, response_base: int, *, needed: tuple[int, ...] 
 
 
 def write_maps(request_base: int, response_base: int, *, request: Sequence[int],
-               response: Sequence[int]) -> Generator[Step, Reply, tuple[Sentence, bool]]:
+               response: Sequence[int]) -> Procedure[tuple[Sentence, bool]]:
     """
     Rewrite both maps in the safe order: request slot 0 off first and on last.
 

@@ -138,7 +138,7 @@ class ControlByNumber:
                 self._known(now)
             now += STATUS_PERIOD_PENDING if self._control.pending else STATUS_PERIOD
 
-    def _read(self, status: Parameter) -> Procedure:
+    def _read(self, status: Parameter) -> Procedure[int | None]:
         words = yield self._numbers.read(status)
         return None if words is None else status.raw_from_word(words[0])
 

@@ -12,7 +12,7 @@ from drive_can_bridge.protocols.datamodel.extended import PAYLOAD
 from drive_can_bridge.protocols.datamodel.procedures import Numbers
 from drive_can_bridge.protocols.datamodel.transactor import (
     ParameterRead, ParameterTransactor, Procedure)
-from drive_can_bridge.protocols.polled_exchange import Chunk, round_time
+from drive_can_bridge.protocols.polled_exchange import Chunk, Raws, round_time
 
 FRAME_BITS = worst_bits(PAYLOAD, extended=False)
 
@@ -73,7 +73,7 @@ class StandardRound:
         self._status_read = None if status_slot is None else next(
             chunk for chunk in self._reads if self._numbers[status_slot] in chunk.addresses)
 
-    def read(self) -> Procedure:
+    def read(self) -> Procedure[Raws | None]:
         """Read all; return the raw integers, or None when one read was not answered."""
         found: dict[int, int] = {}
         for chunk in self._reads:

@@ -159,7 +159,7 @@ class StandardSession(Session):
 
     # -- rounds -----------------------------------------------------------------------------------
 
-    def read_round(self) -> Procedure:
+    def read_round(self) -> Procedure[Raws | None]:
         return self._round.read()
 
     def round_found(self, now: float) -> None:

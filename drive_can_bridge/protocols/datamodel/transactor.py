@@ -26,7 +26,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Hashable
 from dataclasses import dataclass
 import math
-from typing import Any, Protocol, Union
+from typing import Protocol, Union
 
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.outbox import Left
@@ -35,7 +35,7 @@ from drive_can_bridge.protocols.access import SentWrites
 from drive_can_bridge.protocols.channel import Channel, STOP_PATIENCE
 from drive_can_bridge.protocols.datamodel.options import REQUEST_MAP_BASE, RESPONSE_MAP_BASE
 from drive_can_bridge.protocols.polled_exchange import Chunk, TOLERANCE
-from drive_can_bridge.protocols.transactor import ANYTHING, Transactor
+from drive_can_bridge.protocols.transactor import ANYTHING, ResultT, Transactor
 
 #: s between an unacknowledged write and the next acyclic frame, so that a drive with a single
 #: receive buffer has fetched the first; and, where answers carry no address, between an answer and
@@ -87,7 +87,8 @@ class ParameterWrite:
 Step = Union[ParameterRead, ParameterWrite]
 Words = tuple[int, ...]
 Reply = Union[Words, None]
-Procedure = Generator[Step, Reply, Any]
+#: yields steps, is sent what became of each, and returns something
+Procedure = Generator[Step, Reply, ResultT]
 Send = Callable[[Frame, Union[Left, None]], None]
 #: what a procedure is told of a write that left
 SENT: Words = ()
