@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter
 
-#: name among the parameters of a drive of a status word that is built in
-STATUS_NAME = 'status_word'
-
 
 def control_word(drive: DriveConfiguration, *, controlled: bool) -> Parameter | None:
     """

@@ -16,10 +16,9 @@ import re
 from typing import Protocol
 
 from drive_can_bridge.core.parameters import Value
-from drive_can_bridge.core.process_image import STATUS_NAME
+from drive_can_bridge.core.status_bits import BUILT_IN, STATUS_NAME
 from drive_can_bridge.core.text import is_ros_name, printable
 from drive_can_bridge.monitor.values import ParameterInfo
-from drive_can_bridge.protocols.families import FAMILIES
 
 #: characters kept of a line of the log, which may name several drives
 LOG_LIMIT = 2000
@@ -304,8 +303,7 @@ class DriveSnapshot:
     def bits_of(self, parameter: str) -> list['Bit']:
         """Return the bits of a word by number; those without a known number at the end."""
         info = next((info for info in self.parameters if info.name == parameter), None)
-        family = FAMILIES.get(self.place.protocol)
-        built_in = family.status_bits if family and parameter == STATUS_NAME else {}
+        built_in = BUILT_IN.get(self.place.protocol, {}) if parameter == STATUS_NAME else {}
         numbers = info.bits if info is not None else built_in
         found = []
         for name, state in self.bits.get(parameter, {}).items():

@@ -197,8 +197,6 @@ class Family(ABC):
     control_built_in: bool = False
     #: names of what is built in and published like the parameters of a profile
     builtin_names: frozenset[str] = frozenset()
-    #: numbers of the bits of a status word that is built in, by name
-    status_bits: Mapping[str, int] = MappingProxyType({})
     #: bits of the types that its parameters may have
     widths: frozenset[int] = frozenset((16, 32))
     #: the keys that only this family has: a frozen dataclass

@@ -23,6 +23,7 @@ from drive_can_bridge.core.errors import (
 )
 from drive_can_bridge.core.frame import Frame
 from drive_can_bridge.core.parameters import Parameter
+from drive_can_bridge.protocols.families import FAMILIES
 from drive_can_bridge.simulation.motor import MotorPlant
 from drive_can_bridge.simulation.registers import WriteRefusal
 from drive_can_bridge.simulation.simulation import make_drives, Simulation
@@ -245,13 +246,14 @@ def test_a_plant_of_ones_own() -> None:
                                          response=())), plants={'mixer': MotorPlant})
 
 
-@pytest.mark.parametrize('protocol', ['datamodel_extended', 'datamodel_standard', 'cannord',
-                                      'canopen_pkw'])
+@pytest.mark.parametrize('protocol', [name for name, family in FAMILIES.items()
+                                      if family.mode_key is None])  # a mode needs its setpoint
 def test_any_profile_is_plain_memory_at_least(protocol: str) -> None:
     table = [parameter('blue', 10, type=INT16, minimum=-5, maximum=50), parameter('green', 11),
              parameter('red', 12, access=RO, unit='furlong')]
     made = make_drives(bridge(configuration(table, protocol=protocol, request=(), response=(
-        replace(table[2], number=None if protocol == 'cannord' else 12),))))['conveyor']
+        replace(table[2], number=None if FAMILIES[protocol].control_built_in else 12),),
+        )))['conveyor']
     before = made.value('red')
     made.registers.write('blue', -3)
     assert (made.value('blue'), made.value('red')) == (-3, before)

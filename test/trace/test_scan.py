@@ -259,7 +259,8 @@ def test_a_mailbox_that_another_master_asks_for() -> None:
     assert list(scanned('canopen_pkw', pair[1]).nodes) == [5]
 
 
-@pytest.mark.parametrize('protocol', ['canopen_pkw', 'cia402'])
+@pytest.mark.parametrize('protocol', [name for name, family in FAMILIES.items()
+                                      if family.on_canopen])
 def test_a_drive_of_cia_402_says_so_whoever_asked(protocol: str) -> None:
     objects = {'001000': '92010200', '181001': '05550000', '181002': '02040000'}
 

@@ -20,9 +20,9 @@ from collections.abc import Callable, Sequence
 
 from drive_can_bridge.core.control_machine import ControlMachine
 from drive_can_bridge.core.messages import NOTHING, Sentence
-from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
 from drive_can_bridge.core.sentences import bus_not_in_control, quick_stop_active, voltage_disabled
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.core.status_reports import Wording
 from drive_can_bridge.protocols.cannord.states import (
     ACKNOWLEDGE, is_faulted, parameter_set_bits, QUICK_STOP, READY, RUN, state_of)

@@ -8,8 +8,8 @@ from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType, Storage
-from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cannord.identifiers import (
     ADDRESS_MAX, broadcast_identifier, broadcasts, groups, identifier, MessageObject, route)
 from drive_can_bridge.protocols.cannord.monitoring import TIMEOUT_NUMBER, timeout_parameter
@@ -17,7 +17,6 @@ from drive_can_bridge.protocols.cannord.options import CannordOptions, PROBED
 from drive_can_bridge.protocols.cannord.parameter_frame import INDEX_MAX, NUMBER_MAX
 from drive_can_bridge.protocols.cannord.process_data import (
     EXTRA_LENGTH, EXTRA_VALUES, main_length, MAIN_VALUES)
-from drive_can_bridge.protocols.cannord.states import STATUS_BITS
 from drive_can_bridge.protocols.family import (
     Claim, Complaint, Family, out_of_range, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
@@ -51,7 +50,6 @@ class Cannord(Family):
     cyclic = True
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
-    status_bits = STATUS_BITS
     options_type = CannordOptions
     probed = PROBED
     scan_entry = ScanEntry('inverter', 'nord_sk500e', ('frequency_setpoint',),

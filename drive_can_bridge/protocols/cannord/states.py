@@ -23,7 +23,7 @@ from enum import Enum
 from drive_can_bridge.core import state_names
 from drive_can_bridge.core.errors import LocalProtocolError
 from drive_can_bridge.core.parameters import AccessMode, Parameter
-from drive_can_bridge.core.process_image import STATUS_NAME
+from drive_can_bridge.core.status_bits import CANNORD, STATUS_NAME
 
 READY = 0x047E
 RUN = 0x047F
@@ -46,22 +46,7 @@ PARAMETER_SET_SHIFT = 14
 PARAMETER_SETS = 4
 
 #: names of the bits of the status word, as they are published
-STATUS_BITS = {
-    'ready_to_switch_on': 0,
-    'ready': 1,
-    'enabled': 2,
-    'fault': 3,
-    'voltage_enabled': 4,
-    'no_quick_stop': 5,
-    'switch_on_disabled': 6,
-    'warning': 7,
-    'setpoint_reached': 8,
-    'bus_control': 9,
-    'bit_10': 10,
-    'rotating_right': 11,
-    'rotating_left': 12,
-    'bit_13': 13,
-}
+STATUS_BITS = CANNORD
 FAULT_BIT = 0x0008
 
 STATUS_PARAMETER = Parameter(

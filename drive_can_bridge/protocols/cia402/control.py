@@ -30,8 +30,8 @@ from typing import Any, Protocol
 from drive_can_bridge.core import sentences
 from drive_can_bridge.core.control import ControlAction, TableRules
 from drive_can_bridge.core.messages import NOTHING, Sentence, together
-from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.profile import ControlTable, StatusPattern
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.cia402 import states
 from drive_can_bridge.protocols.cia402.standing import Standing
 from drive_can_bridge.protocols.cia402.states import PATTERNS, ServoState

@@ -8,8 +8,8 @@ from drive_can_bridge.core import complaints
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.frame import Route, STANDARD_IDENTIFIER_MAX, worst_bits
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.process_image import STATUS_NAME
 from drive_can_bridge.core.session import Session
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import (
     node_claims, object_of_name, reserved_claims, station_complaints)
@@ -20,7 +20,7 @@ from drive_can_bridge.protocols.cia402.options import Cia402Options, PROBED
 from drive_can_bridge.protocols.cia402.pdo import PDO_MAX
 from drive_can_bridge.protocols.cia402.states import (
     CONTROL_PARAMETER, CONTROL_WORD, INTERPOLATION_MAX, MODE, MODES, MOVING, state_of,
-    STATUS_BITS, STATUS_PARAMETER, STATUS_WORD)
+    STATUS_PARAMETER, STATUS_WORD)
 from drive_can_bridge.protocols.family import (
     Claim, Complaint, Family, ImportRules, ModeKey, ScanEntry, Talk)
 from drive_can_bridge.protocols.observer import DriveObserver, Emit
@@ -45,7 +45,6 @@ class Cia402(Family):
     cyclic = True
     control_built_in = True
     builtin_names = frozenset((STATUS_NAME,))
-    status_bits = STATUS_BITS
     widths = frozenset((8, 16, 32))
     options_type = Cia402Options
     mode_key = ModeKey({mode.number: name for name, mode in MODES.items()}, (

@@ -65,12 +65,10 @@ class HeartbeatSender:
     def __init__(self, session: Session, heartbeat: BridgeHeartbeat | None) -> None:
         self._session, self._heartbeat = session, heartbeat
 
-    def send(self, now: float) -> None:
+    def handle_timer(self, now: float) -> None:
         """Send one, if it is due."""
         if self._heartbeat is not None:
             self._heartbeat.beat(self._session.outbox, now)
-
-    handle_timer = send
 
     @property
     def due(self) -> float:

@@ -13,7 +13,7 @@ import math
 from drive_can_bridge.core import frame_sentences
 from drive_can_bridge.core.configuration import DriveConfiguration
 from drive_can_bridge.core.parameters import Parameter, ParameterType
-from drive_can_bridge.core.process_image import STATUS_NAME
+from drive_can_bridge.core.status_bits import STATUS_NAME
 from drive_can_bridge.core.text import printable, TEXT_MAX
 from drive_can_bridge.protocols.canopen import network, sdo
 from drive_can_bridge.protocols.canopen.addressing import name_of_object

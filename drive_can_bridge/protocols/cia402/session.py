@@ -233,7 +233,7 @@ class Cia402Session(Session):
         if again > now:
             now = yield again
         while True:
-            self._heartbeats.send(now)      # to be heard before the drive is to watch it
+            self._heartbeats.handle_timer(now)     # to be heard before the drive is to watch it
             if self._stopped_by_nmt(now) and now >= bring_up.nmt_at + START_PERIOD:
                 bring_up.wake(now)
             outcome: SetUpOutcome = yield bring_up.run()

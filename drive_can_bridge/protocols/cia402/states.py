@@ -21,7 +21,7 @@ from enum import Enum
 
 from drive_can_bridge.core import state_names
 from drive_can_bridge.core.parameters import AccessMode, Parameter, ParameterType
-from drive_can_bridge.core.process_image import STATUS_NAME
+from drive_can_bridge.core.status_bits import CIA402, STATUS_NAME
 
 CONTROL_WORD, STATUS_WORD = 0x6040, 0x6041
 MODE, MODE_SHOWN, MODES_OFFERED = 0x6060, 0x6061, 0x6502
@@ -60,12 +60,7 @@ BIT_13 = 0x2000
 #: answered cycles by which a status may be behind its control word
 STATUS_LAG = 3
 
-STATUS_BITS = {
-    'ready_to_switch_on': 0, 'switched_on': 1, 'enabled': 2, 'fault': 3, 'voltage_enabled': 4,
-    'no_quick_stop': 5, 'switch_on_disabled': 6, 'warning': 7, 'bit_8': 8, 'remote': 9,
-    'target_reached': 10, 'internal_limit': 11, 'bit_12': 12, 'bit_13': 13, 'bit_14': 14,
-    'bit_15': 15,
-}
+STATUS_BITS = CIA402
 STATUS_PARAMETER = Parameter(
     name=STATUS_NAME, index=STATUS_WORD, subindex=0, access=AccessMode.READ_ONLY,
     bits=tuple(STATUS_BITS.items()), description='Status word of the drive')
